@@ -1,0 +1,85 @@
+//! The halo plan: which owned points go to which rank, and where the ghosts that come back lie.
+//!
+//! Ghosts follow the owned points, grouped by owner and sorted by id, so that what one rank sends is
+//! one contiguous range here.
+
+use std::ops::Range;
+
+use super::{Communicator, Message};
+
+/// What is exchanged with one other rank.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbour {
+    /// The other rank.
+    pub rank: usize,
+    /// Local indices of owned points that are ghosts there, in the order of that rank's ghosts.
+    pub send: Vec<u32>,
+    /// Local indices of the ghosts that this rank owns.
+    pub receive: Range<usize>,
+}
+
+/// The plan with its message buffers, all allocated once.
+#[derive(Debug, Default)]
+pub struct Halo {
+    neighbours: Vec<Neighbour>,
+    messages: Vec<Message>,
+}
+
+impl Halo {
+    /// Prepares messages of up to `width` numbers a point.
+    pub fn new(neighbours: Vec<Neighbour>, width: usize) -> Self {
+        let messages = neighbours
+            .iter()
+            .map(|neighbour| Message {
+                rank: neighbour.rank,
+                send: Vec::with_capacity(width * neighbour.send.len()),
+                receive: Vec::with_capacity(width * neighbour.receive.len()),
+            })
+            .collect();
+        Self {
+            neighbours,
+            messages,
+        }
+    }
+
+    /// Number of ghosts received.
+    pub fn ghosts(&self) -> usize {
+        self.neighbours.iter().map(|n| n.receive.len()).sum()
+    }
+
+    /// Number of ranks exchanged with.
+    pub fn ranks(&self) -> usize {
+        self.neighbours.len()
+    }
+
+    /// Copies the values that other ranks need into the messages: `components` arrays over the local
+    /// points, each sent for every point.
+    pub fn pack(&mut self, components: &[&[f64]]) {
+        for (neighbour, message) in self.neighbours.iter().zip(&mut self.messages) {
+            message.send.clear();
+            for component in components {
+                let values = neighbour.send.iter().map(|i| component[*i as usize]);
+                message.send.extend(values);
+            }
+            message
+                .receive
+                .resize(components.len() * neighbour.receive.len(), 0.0);
+        }
+    }
+
+    /// Sends what was packed, and calls `during` while the messages are in flight.
+    pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut dyn FnMut()) {
+        comm.exchange(&mut self.messages, during);
+    }
+
+    /// Copies what was received to the ghosts: the same arrays, in the same order, as in `pack`.
+    pub fn unpack(&self, components: &mut [&mut [f64]]) {
+        for (neighbour, message) in self.neighbours.iter().zip(&self.messages) {
+            let count = neighbour.receive.len();
+            for (k, component) in components.iter_mut().enumerate() {
+                component[neighbour.receive.clone()]
+                    .copy_from_slice(&message.receive[k * count..(k + 1) * count]);
+            }
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Talking between ranks. The only folder that names MPI.
+//!
+//! The rest of the code sees [`Communicator`]: a handful of collective operations and one
+//! nearest-neighbour exchange that runs work while messages are in flight. Two things implement it:
+//! [`mpi::World`] for real runs and [`threads`] for one rank without MPI and for ranks that are
+//! threads of one process, in tests.
+
+pub mod halo;
+pub mod mpi;
+pub mod sum;
+pub mod threads;
+
+pub use halo::Halo;
+pub use sum::ExactSum;
+
+use crate::error::{Error, ErrorKind, Result};
+
+/// The raw MPI handle that the parallel file layer needs.
+pub type RawCommunicator = mpi_sys::MPI_Comm;
+
+/// One message each way between this rank and another.
+#[derive(Debug, Default)]
+pub struct Message {
+    /// The other rank.
+    pub rank: usize,
+    /// What goes there.
+    pub send: Vec<f64>,
+    /// Where its message lands; the length is what is expected.
+    pub receive: Vec<f64>,
+}
+
+/// What a rank can ask of the others. Every method is collective: all ranks call it alike.
+pub trait Communicator {
+    /// This rank's number, from 0.
+    fn rank(&self) -> usize;
+
+    /// The number of ranks.
+    fn size(&self) -> usize;
+
+    /// Returns when all ranks have called it.
+    fn barrier(&self);
+
+    /// Element-wise sum over the ranks (wrapping), in place.
+    fn sum(&self, values: &mut [u64]);
+
+    /// Element-wise maximum over the ranks, in place. Values must not be NaN.
+    fn max(&self, values: &mut [f64]);
+
+    /// Replaces `data` on every rank by that of `root`.
+    fn broadcast(&self, root: usize, data: &mut Vec<u8>);
+
+    /// Sends `outgoing[q]` to rank q; returns what each rank sent here, by rank.
+    fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
+
+    /// Sends and receives all messages, and calls `during` while they are in flight.
+    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut());
+
+    /// Ends all ranks at once, for when agreement is no longer possible.
+    fn abort(&self, code: i32) -> !;
+
+    /// The raw MPI handle, where there is one.
+    fn raw(&self) -> Option<RawCommunicator>;
+}
+
+/// Sum of one count over the ranks.
+pub fn total(comm: &dyn Communicator, value: u64) -> u64 {
+    let mut values = [value];
+    comm.sum(&mut values);
+    values[0]
+}
+
+/// Element-wise minimum over the ranks, in place. Values must not be NaN.
+pub fn min(comm: &dyn Communicator, values: &mut [f64]) {
+    values.iter_mut().for_each(|value| *value = -*value);
+    comm.max(values);
+    values.iter_mut().for_each(|value| *value = -*value);
+}
+
+/// The value of every rank, in rank order.
+pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
+    let mut values = vec![0; comm.size()];
+    values[comm.rank()] = value;
+    comm.sum(&mut values);
+    values
+}
+
+/// The sum of `value` over the ranks before this one, and over all.
+pub fn scan(comm: &dyn Communicator, value: u64) -> (u64, u64) {
+    let values = all_gather(comm, value);
+    let before = values[..comm.rank()].iter().sum();
+    (before, values.iter().sum())
+}
+
+/// Turns a result that can differ between ranks into one that does not: where any rank failed, all
+/// get the error of the lowest rank that did.
+pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
+    let none = comm.size() as f64;
+    let mut first = [if result.is_err() {
+        comm.rank() as f64
+    } else {
+        none
+    }];
+    min(comm, &mut first);
+    if first[0] == none {
+        return result;
+    }
+    let mut packed = match &result {
+        Err(error) => {
+            let mut bytes = vec![error.exit_code()];
+            bytes.extend_from_slice(error.message.as_bytes());
+            bytes
+        }
+        Ok(_) => Vec::new(),
+    };
+    comm.broadcast(first[0] as usize, &mut packed);
+    let kind = if packed[0] == 2 {
+        ErrorKind::Input
+    } else {
+        ErrorKind::Run
+    };
+    Err(Error {
+        kind,
+        message: String::from_utf8_lossy(&packed[1..]).into_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_ranks_leave_with_the_lowest_failing_ranks_message() {
+        let messages = threads::run(4, |comm| {
+            let result = if comm.rank() >= 2 {
+                Err(Error::input(format!("rank {} failed", comm.rank())))
+            } else {
+                Ok(())
+            };
+            agree(comm, result).unwrap_err()
+        });
+        for error in messages {
+            assert_eq!(error.message, "rank 2 failed");
+            assert_eq!(error.kind, ErrorKind::Input);
+        }
+    }
+
+    #[test]
+    fn scan_gives_what_came_before_and_the_total() {
+        let scans = threads::run(3, |comm| scan(comm, 10 * (comm.rank() as u64 + 1)));
+        assert_eq!(scans, [(0, 60), (10, 60), (30, 60)]);
+    }
+}

@@ -1,0 +1,214 @@
+//! The communicator of a real run: MPI's world.
+//!
+//! Only the thread that made the world may call it (MPI's "funneled" level of thread support).
+
+use std::cell::RefCell;
+use std::ffi::c_void;
+use std::os::raw::c_int;
+
+use mpi::collective::SystemOperation;
+use mpi::environment::Universe;
+use mpi::topology::{Communicator as _, SimpleCommunicator};
+use mpi::traits::*;
+use mpi_sys::{MPI_Request, RSMPI_COMM_WORLD};
+
+use super::{Communicator, Message, RawCommunicator};
+use crate::error::{Error, Result};
+
+/// One MPI message holds at most this many bytes: counts are 32-bit.
+const LARGEST_MESSAGE: usize = 1 << 30;
+const HALO_TAG: c_int = 1;
+const SET_UP_TAG: c_int = 2;
+
+/// Whether MPI has been started in this process.
+pub fn is_running() -> bool {
+    let mut running = 0;
+    // SAFETY: may be called at any time; the pointer is to a local.
+    unsafe { mpi_sys::MPI_Initialized(&mut running) };
+    running != 0
+}
+
+/// All ranks that `mpirun` started; one rank when started without it.
+pub struct World {
+    world: SimpleCommunicator,
+    /// Kept so that an exchange in the time loop allocates nothing.
+    requests: RefCell<Requests>,
+    // Dropped last: it calls MPI_Finalize.
+    _universe: Universe,
+}
+
+impl World {
+    /// Starts MPI.
+    ///
+    /// # Errors
+    /// When MPI was started before in this process or has no support for threads.
+    pub fn start() -> Result<Self> {
+        let (universe, level) = mpi::initialize_with_threading(mpi::Threading::Funneled)
+            .ok_or_else(|| Error::run("MPI is already running in this process"))?;
+        if level < mpi::Threading::Funneled {
+            return Err(Error::run(
+                "this MPI library has no support for threads (MPI_THREAD_FUNNELED)",
+            ));
+        }
+        Ok(Self {
+            world: universe.world(),
+            requests: RefCell::default(),
+            _universe: universe,
+        })
+    }
+
+    /// The number of hosts that the ranks run on.
+    pub fn hosts(&self) -> usize {
+        let name = mpi::environment::processor_name().unwrap_or_default();
+        let outgoing = (0..self.size())
+            .map(|q| {
+                if q == 0 {
+                    name.clone().into_bytes()
+                } else {
+                    Vec::new()
+                }
+            })
+            .collect();
+        let mut names = self.all_to_all(outgoing);
+        names.sort();
+        names.dedup();
+        let mut count = [if self.rank() == 0 {
+            names.len() as u64
+        } else {
+            0
+        }];
+        self.sum(&mut count);
+        count[0] as usize
+    }
+}
+
+/// Non-blocking sends and receives of byte ranges, completed together.
+#[derive(Default)]
+struct Requests(Vec<MPI_Request>);
+
+impl Requests {
+    /// # Safety
+    /// The bytes must stay in place until `wait`.
+    unsafe fn send(&mut self, bytes: &[u8], rank: usize, tag: c_int) {
+        for chunk in bytes.chunks(LARGEST_MESSAGE) {
+            let mut request = unsafe { mpi_sys::RSMPI_REQUEST_NULL };
+            unsafe {
+                mpi_sys::MPI_Isend(
+                    chunk.as_ptr().cast::<c_void>(),
+                    chunk.len() as c_int,
+                    mpi_sys::RSMPI_UINT8_T,
+                    rank as c_int,
+                    tag,
+                    RSMPI_COMM_WORLD,
+                    &mut request,
+                );
+            }
+            self.0.push(request);
+        }
+    }
+
+    /// # Safety
+    /// The bytes must stay in place, and nobody may read them, until `wait`.
+    unsafe fn receive(&mut self, bytes: &mut [u8], rank: usize, tag: c_int) {
+        for chunk in bytes.chunks_mut(LARGEST_MESSAGE) {
+            let mut request = unsafe { mpi_sys::RSMPI_REQUEST_NULL };
+            unsafe {
+                mpi_sys::MPI_Irecv(
+                    chunk.as_mut_ptr().cast::<c_void>(),
+                    chunk.len() as c_int,
+                    mpi_sys::RSMPI_UINT8_T,
+                    rank as c_int,
+                    tag,
+                    RSMPI_COMM_WORLD,
+                    &mut request,
+                );
+            }
+            self.0.push(request);
+        }
+    }
+
+    fn wait(&mut self) {
+        for request in &mut self.0 {
+            unsafe { mpi_sys::MPI_Wait(request, mpi_sys::RSMPI_STATUS_IGNORE) };
+        }
+        self.0.clear();
+    }
+}
+
+impl Communicator for World {
+    fn rank(&self) -> usize {
+        self.world.rank() as usize
+    }
+
+    fn size(&self) -> usize {
+        self.world.size() as usize
+    }
+
+    fn barrier(&self) {
+        self.world.barrier();
+    }
+
+    fn sum(&self, values: &mut [u64]) {
+        let own = values.to_vec();
+        self.world
+            .all_reduce_into(&own[..], values, SystemOperation::sum());
+    }
+
+    fn max(&self, values: &mut [f64]) {
+        let own = values.to_vec();
+        self.world
+            .all_reduce_into(&own[..], values, SystemOperation::max());
+    }
+
+    fn broadcast(&self, root: usize, data: &mut Vec<u8>) {
+        let process = self.world.process_at_rank(root as i32);
+        let mut length = data.len() as u64;
+        process.broadcast_into(&mut length);
+        data.resize(length as usize, 0);
+        for chunk in data.chunks_mut(LARGEST_MESSAGE) {
+            process.broadcast_into(chunk);
+        }
+    }
+
+    fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        let sizes: Vec<u64> = outgoing.iter().map(|bytes| bytes.len() as u64).collect();
+        let mut incoming_sizes = vec![0_u64; self.size()];
+        self.world
+            .all_to_all_into(&sizes[..], &mut incoming_sizes[..]);
+        let mut incoming: Vec<Vec<u8>> = incoming_sizes
+            .iter()
+            .map(|size| vec![0; *size as usize])
+            .collect();
+        let mut requests = self.requests.borrow_mut();
+        for (rank, bytes) in incoming.iter_mut().enumerate() {
+            unsafe { requests.receive(bytes, rank, SET_UP_TAG) };
+        }
+        for (rank, bytes) in outgoing.iter().enumerate() {
+            unsafe { requests.send(bytes, rank, SET_UP_TAG) };
+        }
+        requests.wait();
+        incoming
+    }
+
+    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut()) {
+        let mut requests = self.requests.borrow_mut();
+        for message in messages.iter_mut() {
+            let bytes = bytemuck::cast_slice_mut(&mut message.receive);
+            unsafe { requests.receive(bytes, message.rank, HALO_TAG) };
+        }
+        for message in messages.iter() {
+            let bytes = bytemuck::cast_slice(&message.send);
+            unsafe { requests.send(bytes, message.rank, HALO_TAG) };
+        }
+        during();
+        requests.wait();
+    }
+
+    fn abort(&self, code: i32) -> ! {
+        self.world.abort(code)
+    }
+
+    fn raw(&self) -> Option<RawCommunicator> {
+        Some(unsafe { RSMPI_COMM_WORLD })
+    }
+}

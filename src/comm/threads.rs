@@ -1,0 +1,149 @@
+//! Ranks that are threads of one process: for one rank without MPI, and for tests of several.
+
+use std::sync::{Arc, Barrier, Mutex};
+
+use super::{Communicator, Message, RawCommunicator};
+
+/// What the ranks share: a barrier and, per pair of ranks, a slot for one message.
+struct Shared {
+    barrier: Barrier,
+    slots: Vec<Mutex<Vec<u8>>>,
+}
+
+/// One rank of a group of threads.
+pub struct ThreadRank {
+    rank: usize,
+    size: usize,
+    shared: Arc<Shared>,
+}
+
+/// A communicator of one rank.
+pub fn alone() -> ThreadRank {
+    group(1).remove(0)
+}
+
+fn group(size: usize) -> Vec<ThreadRank> {
+    let shared = Arc::new(Shared {
+        barrier: Barrier::new(size),
+        slots: (0..size * size).map(|_| Mutex::default()).collect(),
+    });
+    (0..size)
+        .map(|rank| ThreadRank {
+            rank,
+            size,
+            shared: Arc::clone(&shared),
+        })
+        .collect()
+}
+
+/// Runs `body` on `size` ranks, each a thread, and returns their results in rank order.
+pub fn run<T: Send>(size: usize, body: impl Fn(&dyn Communicator) -> T + Sync) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let handles: Vec<_> = group(size)
+            .into_iter()
+            .map(|rank| {
+                let body = &body;
+                scope.spawn(move || body(&rank))
+            })
+            .collect();
+        handles
+            .into_iter()
+            .map(|handle| handle.join().expect("a rank panicked"))
+            .collect()
+    })
+}
+
+impl ThreadRank {
+    fn slot(&self, from: usize, to: usize) -> std::sync::MutexGuard<'_, Vec<u8>> {
+        self.shared.slots[from * self.size + to]
+            .lock()
+            .expect("no rank panics while it holds a slot")
+    }
+
+    /// Every rank's values, in rank order.
+    fn gather<T: bytemuck::Pod>(&self, values: &[T]) -> Vec<Vec<T>> {
+        let outgoing = vec![bytemuck::cast_slice(values).to_vec(); self.size];
+        self.all_to_all(outgoing)
+            .iter()
+            .map(|bytes| bytemuck::pod_collect_to_vec(bytes))
+            .collect()
+    }
+}
+
+impl Communicator for ThreadRank {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn size(&self) -> usize {
+        self.size
+    }
+
+    fn barrier(&self) {
+        self.shared.barrier.wait();
+    }
+
+    fn sum(&self, values: &mut [u64]) {
+        if self.size == 1 {
+            return;
+        }
+        let all = self.gather(values);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value = all.iter().fold(0, |sum, row| row[k].wrapping_add(sum));
+        }
+    }
+
+    fn max(&self, values: &mut [f64]) {
+        if self.size == 1 {
+            return;
+        }
+        let all = self.gather(values);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value = all
+                .iter()
+                .fold(f64::NEG_INFINITY, |max, row| max.max(row[k]));
+        }
+    }
+
+    fn broadcast(&self, root: usize, data: &mut Vec<u8>) {
+        let outgoing = if self.rank == root {
+            vec![data.clone(); self.size]
+        } else {
+            vec![Vec::new(); self.size]
+        };
+        *data = self.all_to_all(outgoing).swap_remove(root);
+    }
+
+    fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        for (to, message) in outgoing.into_iter().enumerate() {
+            *self.slot(self.rank, to) = message;
+        }
+        self.barrier();
+        let incoming = (0..self.size)
+            .map(|from| std::mem::take(&mut *self.slot(from, self.rank)))
+            .collect();
+        self.barrier();
+        incoming
+    }
+
+    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut()) {
+        let mut outgoing = vec![Vec::new(); self.size];
+        for message in messages.iter() {
+            outgoing[message.rank] = bytemuck::cast_slice(&message.send).to_vec();
+        }
+        during();
+        let incoming = self.all_to_all(outgoing);
+        for message in messages {
+            let values: Vec<f64> = bytemuck::pod_collect_to_vec(&incoming[message.rank]);
+            message.receive.copy_from_slice(&values);
+        }
+    }
+
+    fn abort(&self, code: i32) -> ! {
+        std::process::exit(code)
+    }
+
+    fn raw(&self) -> Option<RawCommunicator> {
+        None
+    }
+}

@@ -1,0 +1,58 @@
+//! The one error type: what went wrong, in words a user can act on, and whose fault it is.
+
+use std::fmt;
+
+/// Whose fault an error is; it decides the process's exit code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// The deck or the command line is wrong: exit code 2.
+    Input,
+    /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
+    Run,
+}
+
+/// An error with a message that names the file, the place and what would be right.
+#[derive(Debug, Clone)]
+pub struct Error {
+    /// Whose fault it is.
+    pub kind: ErrorKind,
+    /// The message, without a leading `error:`; may span several lines.
+    pub message: String,
+}
+
+/// The result of anything that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A wrong deck or wrong arguments.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self {
+            kind: ErrorKind::Input,
+            message: message.into(),
+        }
+    }
+
+    /// A run that failed.
+    pub fn run(message: impl Into<String>) -> Self {
+        Self {
+            kind: ErrorKind::Run,
+            message: message.into(),
+        }
+    }
+
+    /// The process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments.
+    pub fn exit_code(&self) -> u8 {
+        match self.kind {
+            ErrorKind::Run => 1,
+            ErrorKind::Input => 2,
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Error {}
