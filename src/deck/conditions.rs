@@ -1,0 +1,147 @@
+//! Initial values, loads and supports of a deck, validated.
+
+use super::expression::Expression;
+use super::grammar::{self, Deck};
+use super::plan::{self, Action};
+use super::resolve::{ALL_VARIABLES, POSITION, Scope};
+use super::validate::find_set;
+use crate::error::Result;
+
+/// Validates the initial values.
+///
+/// # Errors
+/// On an unknown set, a wrong expression, or a table that sets nothing.
+pub fn initials(scope: &Scope, deck: &Deck, sets: &[plan::Set]) -> Result<Vec<plan::Initial>> {
+    deck.initial
+        .iter()
+        .map(|(name, table)| {
+            let initial = table.get_ref();
+            let key = format!("[initial.{name}]");
+            if initial.displacement.is_none() && initial.velocity.is_none() {
+                let message = format!("{key}: give `displacement`, `velocity` or both");
+                return Err(scope.error(table.span(), message));
+            }
+            let values = |vector: &Option<_>, name: &str| {
+                vector
+                    .as_ref()
+                    .map(|vector| scope.expressions(vector, &format!("{key} {name}"), &POSITION))
+                    .transpose()
+            };
+            Ok(plan::Initial {
+                name: name.clone(),
+                set: find_set(scope, &initial.set, sets, &format!("{key} set"))?,
+                span: initial.set.span(),
+                displacement: values(&initial.displacement, "displacement")?,
+                velocity: values(&initial.velocity, "velocity")?,
+            })
+        })
+        .collect()
+}
+
+/// Validates the loads and supports.
+///
+/// # Errors
+/// On an unknown set, a wrong expression, or anything but one quantity a table.
+pub fn conditions(
+    scope: &Scope,
+    deck: &Deck,
+    sets: &[plan::Set],
+    spacing: Option<f64>,
+) -> Result<Vec<plan::Condition>> {
+    deck.condition
+        .iter()
+        .map(|(name, table)| {
+            let condition = table.get_ref();
+            let key = format!("[condition.{name}]");
+            let given = [
+                condition.displacement.is_some(),
+                condition.velocity.is_some(),
+                condition.body_force.is_some(),
+                condition.traction.is_some(),
+                condition.pressure.is_some(),
+                condition.force.is_some(),
+            ];
+            if given.iter().filter(|given| **given).count() != 1 {
+                let message = format!(
+                    "{key}: give exactly one of `displacement`, `velocity`, `body_force`, \
+                     `traction`, `pressure` and `force`"
+                );
+                return Err(scope.error(table.span(), message));
+            }
+            Ok(plan::Condition {
+                name: name.clone(),
+                set: find_set(scope, &condition.set, sets, &format!("{key} set"))?,
+                span: condition.set.span(),
+                action: action(scope, &key, condition, spacing)?,
+            })
+        })
+        .collect()
+}
+
+fn action(
+    scope: &Scope,
+    key: &str,
+    condition: &grammar::Condition,
+    spacing: Option<f64>,
+) -> Result<Action> {
+    let on_a_layer = condition.traction.is_some() || condition.pressure.is_some();
+    if let (Some(depth), false) = (&condition.depth, on_a_layer) {
+        let message = format!("{key} depth: only a traction or a pressure has a depth");
+        return Err(scope.error(depth.span(), message));
+    }
+    if let (Some(normal), None) = (&condition.normal, &condition.pressure) {
+        let message = format!("{key} normal: only a pressure has a normal");
+        return Err(scope.error(normal.span(), message));
+    }
+    let depth = |place: std::ops::Range<usize>| match (&condition.depth, spacing) {
+        (Some(depth), _) => scope.positive(depth, &format!("{key} depth")),
+        (None, Some(spacing)) => Ok(spacing),
+        (None, None) => {
+            let message =
+                format!("{key}: needs `depth`, the thickness of the layer that it acts on");
+            Err(scope.error(place, message))
+        }
+    };
+    let expressions = |vector, name: &str| -> Result<Vec<Expression>> {
+        scope.expressions(vector, &format!("{key} {name}"), &ALL_VARIABLES)
+    };
+    if let Some(vector) = &condition.displacement {
+        return scope
+            .motion(vector, &format!("{key} displacement"))
+            .map(Action::Displacement);
+    }
+    if let Some(vector) = &condition.velocity {
+        return scope
+            .motion(vector, &format!("{key} velocity"))
+            .map(Action::Velocity);
+    }
+    if let Some(vector) = &condition.body_force {
+        return Ok(Action::BodyForce(
+            expressions(vector, "body_force")?,
+            vec![1.0; scope.dimension],
+        ));
+    }
+    if let Some(vector) = &condition.force {
+        return Ok(Action::Force(expressions(vector, "force")?));
+    }
+    if let Some(vector) = &condition.traction {
+        let factor = 1.0 / depth(vector.span())?;
+        return Ok(Action::BodyForce(
+            expressions(vector, "traction")?,
+            vec![factor; scope.dimension],
+        ));
+    }
+    let pressure = condition.pressure.as_ref().expect("one quantity is given");
+    let Some(normal) = &condition.normal else {
+        let message = format!("{key} pressure: needs `normal`, the outward normal of the surface");
+        return Err(scope.error(pressure.span(), message));
+    };
+    let direction = scope.direction(normal, &format!("{key} normal"))?;
+    let depth = depth(pressure.span())?;
+    let value = scope.expression(pressure, &format!("{key} pressure"), &ALL_VARIABLES)?;
+    let factors = direction[..scope.dimension].iter().map(|n| -n / depth);
+    Ok(Action::BodyForce(
+        vec![value; scope.dimension],
+        factors.collect(),
+    ))
+}

@@ -1,0 +1,96 @@
+//! A deck with every default filled in.
+
+use super::grammar::Deck;
+use super::number::{Number, default_number};
+use super::plan::{Interval, Plan};
+use super::source::Source;
+use super::validate::validate;
+use crate::dimension::Dimension;
+use crate::error::{Error, Result};
+
+/// The deck as TOML with every default written out.
+///
+/// # Errors
+/// When the deck is wrong.
+pub fn explain(source: &Source) -> Result<String> {
+    let mut deck = super::grammar(source)?;
+    let plan = validate(source, &deck)?;
+    fill(&mut deck, &plan);
+    toml::to_string(&deck).map_err(|error| Error::run(format!("cannot write the deck: {error}")))
+}
+
+/// Writes into the deck whatever it leaves to a default that depends on other values.
+fn fill(deck: &mut Deck, plan: &Plan) {
+    let number = |value| Some(default_number(value));
+    match plan.dimension {
+        Dimension::Line { cross_section } => {
+            deck.cross_section = deck.cross_section.take().or(number(cross_section));
+        }
+        Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
+            deck.thickness = deck.thickness.take().or(number(thickness));
+        }
+        Dimension::Space => {}
+    }
+    let grid = deck.grid.get_mut();
+    let zeros = vec![default_number(0.0); plan.dimension.count()];
+    grid.origin = grid
+        .origin
+        .take()
+        .or(Some(serde_spanned::Spanned::new(0..0, zeros)));
+    for body in deck.body.values_mut().map(|body| body.get_mut()) {
+        if body.shape.is_some() {
+            body.spacing = body.spacing.take().or(grid.spacing.clone());
+        }
+    }
+    for material in deck.material.values_mut() {
+        let super::grammar::Material::Pmb(elastic) = material.get_mut();
+        let own = plan.dimension.bond_based_poisson_ratio();
+        let without_ratio = [
+            &elastic.youngs_modulus,
+            &elastic.bulk_modulus,
+            &elastic.shear_modulus,
+            &elastic.lame_lambda,
+        ];
+        if without_ratio
+            .iter()
+            .filter(|constant| constant.is_some())
+            .count()
+            == 1
+        {
+            elastic.poisson_ratio = elastic.poisson_ratio.take().or(number(own));
+        }
+    }
+    for condition in deck.condition.values_mut().map(|table| table.get_mut()) {
+        if condition.traction.is_some() || condition.pressure.is_some() {
+            condition.depth = condition.depth.take().or(grid.spacing.clone());
+        }
+    }
+    let output = deck.output.get_mut();
+    fill_interval(
+        &mut output.every,
+        output.every_steps.is_some(),
+        plan.output.every,
+    );
+    output.fields.get_or_insert_with(|| {
+        let names = plan.output.fields.iter().map(|field| field.name());
+        names
+            .map(|name| serde_spanned::Spanned::new(0..0, name.to_owned()))
+            .collect()
+    });
+    let history = deck.history.get_mut();
+    fill_interval(
+        &mut history.every,
+        history.every_steps.is_some(),
+        plan.history.every,
+    );
+    history.damage_threshold = history
+        .damage_threshold
+        .take()
+        .or(number(plan.history.damage_threshold));
+}
+
+fn fill_interval(every: &mut Option<Number>, in_steps: bool, interval: Interval) {
+    if let (Interval::Seconds(seconds), false) = (interval, in_steps) {
+        every.get_or_insert_with(|| default_number(seconds));
+    }
+}

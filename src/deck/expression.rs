@@ -1,0 +1,194 @@
+//! The expression language of decks: formulas of position, time and named parameters.
+//!
+//! # Language
+//!
+//! Every value is a 64-bit float; a condition is true if it is not 0, and comparisons give 1 or 0.
+//! From the tightest to the loosest, the operators are:
+//!
+//! | operators | |
+//! |---|---|
+//! | `a ^ b` | from the right: `2^3^2` is `2^(3^2)` |
+//! | `-a` `+a` `!a` | `-x^2` is `-(x^2)`; also in an exponent: `2^-1` |
+//! | `a * b` `a / b` | from the left |
+//! | `a + b` `a - b` | from the left |
+//! | `a < b` `<=` `>` `>=` `==` `!=` | not chained: `a < b < c` is an error |
+//! | `a && b` | from the left |
+//! | `a \|\| b` | from the left |
+//!
+//! `and`, `or` and `not` are other names of `&&`, `||` and `!`. As `not x < 1` reads like
+//! `not (x < 1)` but would be `(not x) < 1`, a `!` at the start of a comparison has to be put in
+//! parentheses one way or the other.
+//!
+//! The variables are `x`, `y`, `z` and `t`, as far as they are allowed where the expression stands;
+//! the only constant is `pi`. These names, and not those of functions, hide parameters of the same
+//! name. The functions are:
+//!
+//! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
+//! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
+//! - `sign(a)`: -1, 0 or 1;
+//! - `min(a, b, …)`, `max(a, b, …)`: NaN if any argument is;
+//! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
+//! - `step(a)`: 0 if `a < 0`, otherwise 1;
+//! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 from there on; if
+//!   `end` is not after `start`, it jumps at `end`;
+//! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. What is not chosen does
+//!   not matter, even if it is infinite or NaN.
+//!
+//! # Powers
+//!
+//! If the exponent is an integer from -16 to 16, `a ^ b` is evaluated by multiplication
+//! (`f64::powi`), so that `x^2` is exactly `x * x`; all other powers are `f64::powf`. This depends
+//! only on the exponent's value, not on whether it was written as a number.
+
+mod evaluate;
+mod names;
+mod parse;
+mod token;
+
+use evaluate::Instruction;
+use std::fmt;
+
+/// A variable that an expression may use at evaluation time, beside named parameters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Variable {
+    /// `x`, the first coordinate.
+    X,
+    /// `y`, the second coordinate.
+    Y,
+    /// `z`, the third coordinate.
+    Z,
+    /// `t`, the time.
+    T,
+}
+
+impl Variable {
+    /// The variable of that name.
+    fn from_name(name: &str) -> Option<Self> {
+        [Self::X, Self::Y, Self::Z, Self::T]
+            .into_iter()
+            .find(|variable| variable.name() == name)
+    }
+
+    /// The variable's name.
+    fn name(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::T => "t",
+        }
+    }
+}
+
+/// An error with the byte range that it has in the expression's text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpressionError {
+    /// The first byte.
+    pub start: usize,
+    /// The byte after the last; the same as `start` at the end of the text.
+    pub end: usize,
+    /// What is wrong, and what would be right.
+    pub message: String,
+}
+
+impl ExpressionError {
+    /// An error about a byte range.
+    fn new(start: usize, end: usize, message: impl Into<String>) -> Self {
+        Self {
+            start,
+            end,
+            message: message.into(),
+        }
+    }
+}
+
+impl fmt::Display for ExpressionError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for ExpressionError {}
+
+/// An expression whose parameters have been replaced by their values and whose constant parts have
+/// been evaluated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expression {
+    /// Postfix code, which is never empty.
+    code: Vec<Instruction>,
+    /// The most values that the code has on its stack at once.
+    stack_size: usize,
+}
+
+impl Expression {
+    /// Parses the text, where `parameters` gives the value of a named parameter, `known_names` are
+    /// the names that an error about an unknown one may offer, and `variables` are the variables
+    /// that may be used.
+    ///
+    /// # Errors
+    ///
+    /// If the text is not an expression, or uses a name that has no value here.
+    pub fn parse(
+        text: &str,
+        parameters: &dyn Fn(&str) -> Option<f64>,
+        known_names: &[&str],
+        variables: &[Variable],
+    ) -> Result<Self, ExpressionError> {
+        let scope = names::Scope {
+            parameters,
+            known_names,
+            variables,
+        };
+        let code = parse::parse(text, &scope)?;
+        Ok(Self {
+            stack_size: evaluate::stack_size(&code),
+            code,
+        })
+    }
+
+    /// The expression that has the same value everywhere and always.
+    pub fn constant(value: f64) -> Self {
+        Self {
+            code: vec![Instruction::Constant(value)],
+            stack_size: 1,
+        }
+    }
+
+    /// The value at a position and a time.
+    pub fn evaluate(&self, position: [f64; 3], time: f64) -> f64 {
+        let [x, y, z] = position;
+        evaluate::evaluate(&self.code, self.stack_size, [x, y, z, time])
+    }
+
+    /// Whether the value is not 0.
+    pub fn is_true(&self, position: [f64; 3], time: f64) -> bool {
+        self.evaluate(position, time) != 0.0
+    }
+
+    /// Whether the variable occurs in the expression.
+    pub fn uses(&self, variable: Variable) -> bool {
+        self.code.contains(&Instruction::Variable(variable))
+    }
+
+    /// The value, if no variable occurs in the expression.
+    pub fn as_constant(&self) -> Option<f64> {
+        match self.code[..] {
+            [Instruction::Constant(value)] => Some(value),
+            _ => None,
+        }
+    }
+
+    /// The names in the text that are neither functions nor constants, each once, in the order in
+    /// which they first occur. Variables are among them. The text may be wrong in ways that only
+    /// [`Expression::parse`] sees.
+    ///
+    /// # Errors
+    ///
+    /// If the text cannot be split into names, numbers and symbols.
+    pub fn names(text: &str) -> Result<Vec<String>, ExpressionError> {
+        parse::names(text)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,314 @@
+//! The postfix code of an expression, its folding of constants, and the arithmetic of its
+//! operations.
+
+use super::Variable;
+
+/// Largest magnitude of an integer exponent that is raised by multiplication.
+const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
+
+/// Stack that nearly every expression fits in; clearing it costs next to nothing.
+const SHALLOW_STACK: usize = 16;
+
+/// Stack that the most deeply nested expression fits in: while the parser is inside one level of
+/// nesting, that level has left at most two operands waiting (the first two arguments of three).
+const DEEP_STACK: usize = 2 * super::parse::DEEPEST_NESTING + 1;
+
+/// One step of postfix code.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Instruction {
+    /// Pushes a value.
+    Constant(f64),
+    /// Pushes the value of a variable.
+    Variable(Variable),
+    /// Replaces the topmost value.
+    Unary(Unary),
+    /// Replaces the two topmost values by one.
+    Binary(Binary),
+    /// Replaces the three topmost values by one.
+    Ternary(Ternary),
+}
+
+/// An operation on one value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unary {
+    /// `-a`
+    Negate,
+    /// `!a`
+    Not,
+    /// `a^n` with a small integer `n` known when the expression was parsed.
+    IntegerPower(i32),
+    /// `sin(a)`
+    Sine,
+    /// `cos(a)`
+    Cosine,
+    /// `tan(a)`
+    Tangent,
+    /// `asin(a)`
+    ArcSine,
+    /// `acos(a)`
+    ArcCosine,
+    /// `atan(a)`
+    ArcTangent,
+    /// `sinh(a)`
+    HyperbolicSine,
+    /// `cosh(a)`
+    HyperbolicCosine,
+    /// `tanh(a)`
+    HyperbolicTangent,
+    /// `exp(a)`
+    Exponential,
+    /// `log(a)`, the natural logarithm
+    Logarithm,
+    /// `log10(a)`
+    DecimalLogarithm,
+    /// `sqrt(a)`
+    SquareRoot,
+    /// `abs(a)`
+    Absolute,
+    /// `floor(a)`
+    Floor,
+    /// `ceil(a)`
+    Ceiling,
+    /// `sign(a)`
+    Sign,
+    /// `step(a)`
+    Step,
+}
+
+/// An operation on two values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Binary {
+    /// `a + b`
+    Add,
+    /// `a - b`
+    Subtract,
+    /// `a * b`
+    Multiply,
+    /// `a / b`
+    Divide,
+    /// `a ^ b`
+    Power,
+    /// `a < b`
+    Less,
+    /// `a <= b`
+    LessOrEqual,
+    /// `a > b`
+    Greater,
+    /// `a >= b`
+    GreaterOrEqual,
+    /// `a == b`
+    Equal,
+    /// `a != b`
+    NotEqual,
+    /// `a && b`
+    And,
+    /// `a || b`
+    Or,
+    /// `min(a, b)`
+    Minimum,
+    /// `max(a, b)`
+    Maximum,
+    /// `atan2(a, b)`
+    ArcTangent,
+    /// `hypot(a, b)`
+    Hypotenuse,
+}
+
+/// An operation on three values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ternary {
+    /// `if(a, b, c)`
+    Choose,
+    /// `ramp(a, b, c)`
+    Ramp,
+    /// `clamp(a, b, c)`
+    Clamp,
+}
+
+impl Unary {
+    /// The operation's value.
+    fn apply(self, value: f64) -> f64 {
+        match self {
+            Self::Negate => -value,
+            Self::Not => truth(value == 0.0),
+            Self::IntegerPower(exponent) => value.powi(exponent),
+            Self::Sine => value.sin(),
+            Self::Cosine => value.cos(),
+            Self::Tangent => value.tan(),
+            Self::ArcSine => value.asin(),
+            Self::ArcCosine => value.acos(),
+            Self::ArcTangent => value.atan(),
+            Self::HyperbolicSine => value.sinh(),
+            Self::HyperbolicCosine => value.cosh(),
+            Self::HyperbolicTangent => value.tanh(),
+            Self::Exponential => value.exp(),
+            Self::Logarithm => value.ln(),
+            Self::DecimalLogarithm => value.log10(),
+            Self::SquareRoot => value.sqrt(),
+            Self::Absolute => value.abs(),
+            Self::Floor => value.floor(),
+            Self::Ceiling => value.ceil(),
+            // Unlike `signum`, zero has sign zero.
+            Self::Sign if value > 0.0 => 1.0,
+            Self::Sign if value < 0.0 => -1.0,
+            Self::Sign => value,
+            Self::Step if value < 0.0 => 0.0,
+            Self::Step => 1.0,
+        }
+    }
+}
+
+impl Binary {
+    /// The operation's value.
+    fn apply(self, left: f64, right: f64) -> f64 {
+        match self {
+            Self::Add => left + right,
+            Self::Subtract => left - right,
+            Self::Multiply => left * right,
+            Self::Divide => left / right,
+            Self::Power => match small_integer(right) {
+                Some(exponent) => left.powi(exponent),
+                None => left.powf(right),
+            },
+            Self::Less => truth(left < right),
+            Self::LessOrEqual => truth(left <= right),
+            Self::Greater => truth(left > right),
+            Self::GreaterOrEqual => truth(left >= right),
+            Self::Equal => truth(left == right),
+            Self::NotEqual => truth(left != right),
+            Self::And => truth(left != 0.0 && right != 0.0),
+            Self::Or => truth(left != 0.0 || right != 0.0),
+            Self::Minimum => minimum(left, right),
+            Self::Maximum => maximum(left, right),
+            Self::ArcTangent => left.atan2(right),
+            Self::Hypotenuse => left.hypot(right),
+        }
+    }
+}
+
+impl Ternary {
+    /// The operation's value.
+    fn apply(self, first: f64, second: f64, third: f64) -> f64 {
+        match self {
+            Self::Choose if first != 0.0 => second,
+            Self::Choose => third,
+            Self::Ramp if first >= third => 1.0,
+            Self::Ramp if first <= second => 0.0,
+            Self::Ramp => (first - second) / (third - second),
+            Self::Clamp => minimum(maximum(first, second), third),
+        }
+    }
+}
+
+/// 1 for true, 0 for false.
+fn truth(condition: bool) -> f64 {
+    f64::from(u8::from(condition))
+}
+
+/// The lesser value, or NaN if either is; `f64::min` would hide the NaN and leaves the sign of zero
+/// open.
+fn minimum(left: f64, right: f64) -> f64 {
+    if left < right || left.is_nan() {
+        left
+    } else {
+        right
+    }
+}
+
+/// The greater value, or NaN if either is.
+fn maximum(left: f64, right: f64) -> f64 {
+    if left > right || left.is_nan() {
+        left
+    } else {
+        right
+    }
+}
+
+/// The exponent as an integer, if it is one that is raised by multiplication.
+fn small_integer(exponent: f64) -> Option<i32> {
+    (exponent.abs() <= LARGEST_INTEGER_EXPONENT && exponent.fract() == 0.0)
+        .then_some(exponent as i32)
+}
+
+/// Appends an instruction, or replaces it and its operands by their value if they are constants.
+///
+/// A constant at the end of postfix code is a whole operand, so looking at the last instructions
+/// is enough.
+pub(super) fn append(code: &mut Vec<Instruction>, instruction: Instruction) {
+    use Instruction::{Constant, Unary as One};
+    let (operands, replacement) = match (instruction, code.as_slice()) {
+        (One(operation), &[.., Constant(value)]) => (1, Constant(operation.apply(value))),
+        (Instruction::Binary(operation), &[.., Constant(left), Constant(right)]) => {
+            (2, Constant(operation.apply(left, right)))
+        }
+        (
+            Instruction::Ternary(operation),
+            &[.., Constant(first), Constant(second), Constant(third)],
+        ) => (3, Constant(operation.apply(first, second, third))),
+        (Instruction::Binary(Binary::Power), &[.., Constant(right)]) => {
+            match small_integer(right) {
+                Some(exponent) => (1, One(Unary::IntegerPower(exponent))),
+                None => (0, instruction),
+            }
+        }
+        _ => (0, instruction),
+    };
+    code.truncate(code.len() - operands);
+    code.push(replacement);
+}
+
+/// The most values that the code has on its stack at once.
+pub(super) fn stack_size(code: &[Instruction]) -> usize {
+    let mut size = 0;
+    let mut largest = 0;
+    for instruction in code {
+        match instruction {
+            Instruction::Constant(_) | Instruction::Variable(_) => size += 1,
+            Instruction::Unary(_) => {}
+            Instruction::Binary(_) => size -= 1,
+            Instruction::Ternary(_) => size -= 2,
+        }
+        largest = largest.max(size);
+    }
+    largest
+}
+
+/// The code's value with the variables in the order of [`Variable`], where `stack_size` is what
+/// the function of that name says.
+pub(super) fn evaluate(code: &[Instruction], stack_size: usize, variables: [f64; 4]) -> f64 {
+    match code {
+        [Instruction::Constant(value)] => *value,
+        _ if stack_size <= SHALLOW_STACK => run::<SHALLOW_STACK>(code, variables),
+        _ => run::<DEEP_STACK>(code, variables),
+    }
+}
+
+/// Runs the code on a stack of a fixed size.
+fn run<const SIZE: usize>(code: &[Instruction], variables: [f64; 4]) -> f64 {
+    let mut stack = [0.0; SIZE];
+    let mut size = 0;
+    for instruction in code {
+        match *instruction {
+            Instruction::Constant(value) => {
+                stack[size] = value;
+                size += 1;
+            }
+            Instruction::Variable(variable) => {
+                stack[size] = variables[variable as usize];
+                size += 1;
+            }
+            Instruction::Unary(operation) => {
+                stack[size - 1] = operation.apply(stack[size - 1]);
+            }
+            Instruction::Binary(operation) => {
+                size -= 1;
+                stack[size - 1] = operation.apply(stack[size - 1], stack[size]);
+            }
+            Instruction::Ternary(operation) => {
+                size -= 2;
+                stack[size - 1] = operation.apply(stack[size - 1], stack[size], stack[size + 1]);
+            }
+        }
+    }
+    stack[0]
+}

@@ -1,0 +1,168 @@
+//! The functions, and what the other names in an expression mean.
+
+use super::Variable;
+use super::evaluate::{Binary, Instruction, Ternary, Unary};
+
+/// How many of the known names an error message lists.
+const MOST_NAMES_LISTED: usize = 16;
+
+/// A function: the instruction that evaluates it, which says how many arguments it takes.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Function {
+    /// One argument.
+    Unary(Unary),
+    /// Two arguments.
+    Binary(Binary),
+    /// Three arguments.
+    Ternary(Ternary),
+    /// Two or more arguments, taken together from the left.
+    Several(Binary),
+}
+
+/// Every function by its name.
+const FUNCTIONS: &[(&str, Function)] = &[
+    ("sin", Function::Unary(Unary::Sine)),
+    ("cos", Function::Unary(Unary::Cosine)),
+    ("tan", Function::Unary(Unary::Tangent)),
+    ("asin", Function::Unary(Unary::ArcSine)),
+    ("acos", Function::Unary(Unary::ArcCosine)),
+    ("atan", Function::Unary(Unary::ArcTangent)),
+    ("atan2", Function::Binary(Binary::ArcTangent)),
+    ("sinh", Function::Unary(Unary::HyperbolicSine)),
+    ("cosh", Function::Unary(Unary::HyperbolicCosine)),
+    ("tanh", Function::Unary(Unary::HyperbolicTangent)),
+    ("exp", Function::Unary(Unary::Exponential)),
+    ("log", Function::Unary(Unary::Logarithm)),
+    ("log10", Function::Unary(Unary::DecimalLogarithm)),
+    ("sqrt", Function::Unary(Unary::SquareRoot)),
+    ("abs", Function::Unary(Unary::Absolute)),
+    ("floor", Function::Unary(Unary::Floor)),
+    ("ceil", Function::Unary(Unary::Ceiling)),
+    ("sign", Function::Unary(Unary::Sign)),
+    ("min", Function::Several(Binary::Minimum)),
+    ("max", Function::Several(Binary::Maximum)),
+    ("hypot", Function::Binary(Binary::Hypotenuse)),
+    ("if", Function::Ternary(Ternary::Choose)),
+    ("step", Function::Unary(Unary::Step)),
+    ("ramp", Function::Ternary(Ternary::Ramp)),
+    ("clamp", Function::Ternary(Ternary::Clamp)),
+];
+
+/// The name of the circle's constant.
+pub(super) const PI: &str = "pi";
+
+/// What the names in an expression mean.
+pub(super) struct Scope<'a> {
+    /// The value of a named parameter.
+    pub(super) parameters: &'a dyn Fn(&str) -> Option<f64>,
+    /// The names to offer in error messages.
+    pub(super) known_names: &'a [&'a str],
+    /// The variables that may be used.
+    pub(super) variables: &'a [Variable],
+}
+
+impl Scope<'_> {
+    /// The function of that name, or the message about it.
+    pub(super) fn function(&self, name: &str) -> Result<Function, String> {
+        if let Some((_, function)) = FUNCTIONS.iter().find(|(known, _)| *known == name) {
+            return Ok(*function);
+        }
+        let is_value =
+            name == PI || Variable::from_name(name).is_some() || (self.parameters)(name).is_some();
+        let message = if is_value {
+            format!("`{name}` is not a function; to multiply, write `{name} * (…)`")
+        } else {
+            let names: Vec<&str> = FUNCTIONS.iter().map(|(known, _)| *known).collect();
+            let suggestion = suggestion(name, &names);
+            format!(
+                "unknown function `{name}`{suggestion} functions are: {}",
+                names.join(", ")
+            )
+        };
+        Err(message)
+    }
+
+    /// What pushes the value of that name, or the message about it.
+    pub(super) fn value(&self, name: &str) -> Result<Instruction, String> {
+        if let Some(variable) = Variable::from_name(name) {
+            return if self.variables.contains(&variable) {
+                Ok(Instruction::Variable(variable))
+            } else {
+                Err(self.not_allowed(name))
+            };
+        }
+        if name == PI {
+            return Ok(Instruction::Constant(std::f64::consts::PI));
+        }
+        if let Some(value) = (self.parameters)(name) {
+            return Ok(Instruction::Constant(value));
+        }
+        Err(if FUNCTIONS.iter().any(|(known, _)| *known == name) {
+            format!("`{name}` is a function: write `{name}(…)`")
+        } else if self.known_names.contains(&name) {
+            format!("`{name}` has no value that could be used here")
+        } else if name == "e" {
+            "unknown name `e`; for Euler's number, write `exp(1)`".to_owned()
+        } else {
+            self.unknown(name)
+        })
+    }
+
+    /// The message about a variable that may not be used.
+    fn not_allowed(&self, name: &str) -> String {
+        let allowed: Vec<&str> = self
+            .variables
+            .iter()
+            .map(|variable| variable.name())
+            .collect();
+        if allowed.is_empty() {
+            return format!("`{name}` cannot be used here: this expression must be constant");
+        }
+        format!(
+            "`{name}` cannot be used here: of x, y, z and t, this expression may use only {}",
+            allowed.join(", ")
+        )
+    }
+
+    /// The message about a name that nothing has.
+    fn unknown(&self, name: &str) -> String {
+        let variables = self.variables.iter().map(|variable| variable.name());
+        let names: Vec<&str> = variables
+            .chain(self.known_names.iter().copied())
+            .chain([PI])
+            .collect();
+        let listed = names.len().min(MOST_NAMES_LISTED);
+        let more = if listed < names.len() { ", …" } else { "" };
+        format!(
+            "unknown name `{name}`{} known here: {}{more}",
+            suggestion(name, &names),
+            names[..listed].join(", "),
+        )
+    }
+}
+
+/// The part of a message that offers the nearest name, ending the sentence before it.
+fn suggestion(name: &str, names: &[&str]) -> String {
+    let lower = name.to_lowercase();
+    let tolerance = match lower.len() {
+        // Every other single letter is one edit away.
+        1 => 0,
+        length => (length / 3).clamp(1, 3),
+    };
+    let nearest = names
+        .iter()
+        // Also keeps absurdly long names out of the quadratic comparison.
+        .filter(|known| known.len().abs_diff(name.len()) <= tolerance)
+        .map(|known| {
+            (
+                strsim::damerau_levenshtein(&lower, &known.to_lowercase()),
+                known,
+            )
+        })
+        .filter(|(distance, _)| *distance <= tolerance)
+        .min_by_key(|(distance, _)| *distance);
+    match nearest {
+        Some((_, known)) => format!("; did you mean `{known}`?"),
+        None => ";".to_owned(),
+    }
+}

@@ -1,0 +1,410 @@
+//! The deck's grammar: what may stand in the TOML file, section by section.
+//!
+//! Every number may be a string with an expression of the `[parameters]`; all values are SI.
+//! Unknown keys are errors. Choices are tables named by the choice (`[material.glass.pmb]`), which
+//! keeps the place of an error.
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+use serde_spanned::Spanned;
+
+use super::number::{Number, Vector, default_number};
+
+/// A string with its place in the deck.
+pub type Text = Spanned<String>;
+
+/// Named tables in the order of the deck.
+pub type Tables<T> = IndexMap<String, Spanned<T>>;
+
+/// A whole deck.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deck {
+    /// One line for summaries and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
+    pub dimension: Spanned<DimensionName>,
+    /// Thickness of a plane body in m; 1 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<Number>,
+    /// Cross-section of a 1-D body in m²; 1 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_section: Option<Number>,
+    /// Named numbers for use in expressions; may build on one another.
+    #[serde(default)]
+    pub parameters: IndexMap<String, Number>,
+    /// Spacing and horizon.
+    pub grid: Spanned<Grid>,
+    /// Materials by name.
+    pub material: Tables<Material>,
+    /// Damage laws by name.
+    #[serde(default)]
+    pub damage: Tables<Damage>,
+    /// Bodies by name; each is a block with its own material and damage.
+    pub body: Tables<Body>,
+    /// Sets of points by name. `all` and the names of the bodies are sets as well.
+    #[serde(default)]
+    pub set: Tables<Set>,
+    /// Pre-cracks by name: bonds that cross one start broken.
+    #[serde(default)]
+    pub crack: Tables<Crack>,
+    /// Initial displacements and velocities by name.
+    #[serde(default)]
+    pub initial: Tables<Initial>,
+    /// Loads and supports by name.
+    #[serde(default)]
+    pub condition: Tables<Condition>,
+    /// End time and step.
+    pub time: Spanned<Time>,
+    /// What is written to the result, and how often.
+    #[serde(default = "nowhere")]
+    pub output: Spanned<Output>,
+    /// What is written to the history, and how often.
+    #[serde(default = "nowhere")]
+    pub history: Spanned<History>,
+}
+
+fn nowhere<T: Default>() -> Spanned<T> {
+    Spanned::new(0..0, T::default())
+}
+
+/// The setting of the problem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+pub enum DimensionName {
+    /// A bar under uniaxial strain.
+    #[serde(rename = "1d")]
+    Line,
+    /// A thin plate, free of stress across its thickness.
+    #[serde(rename = "plane-stress")]
+    PlaneStress,
+    /// A slice of a long body, without strain along it.
+    #[serde(rename = "plane-strain")]
+    PlaneStrain,
+    /// A solid.
+    #[serde(rename = "3d")]
+    Space,
+}
+
+/// The lattice and the range of the bonds.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Distance of lattice points in m; for bodies given as shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing: Option<Number>,
+    /// Horizon δ in m: points up to this distance are bonded.
+    pub horizon: Number,
+    /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Vector>,
+}
+
+/// A material law.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Material {
+    /// Prototype microelastic (brittle) material, f = c s e.
+    Pmb(Elastic),
+}
+
+/// Density and one or two elastic constants.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Elastic {
+    /// Density ρ in kg/m³.
+    pub density: Number,
+    /// Young's modulus E in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub youngs_modulus: Option<Number>,
+    /// Bulk modulus K in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bulk_modulus: Option<Number>,
+    /// Shear modulus G in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shear_modulus: Option<Number>,
+    /// Lamé's first parameter λ in Pa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lame_lambda: Option<Number>,
+    /// Poisson's ratio ν.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<Number>,
+}
+
+/// A damage law.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Damage {
+    /// A bond breaks for good at a critical stretch.
+    CriticalStretch(CriticalStretch),
+}
+
+/// Critical stretch, from one of three measures of toughness.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CriticalStretch {
+    /// Fracture energy G0 in J/m².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy: Option<Number>,
+    /// Fracture toughness K_Ic in Pa·√m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_toughness: Option<Number>,
+    /// The critical stretch s0 itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub critical_stretch: Option<Number>,
+    /// α in s ≥ s0 − α s_min; 0.25 if not given, 0 for a plain critical stretch.
+    #[serde(default = "default_alpha")]
+    pub alpha: Number,
+    /// Sets of points whose bonds never break.
+    #[serde(default)]
+    pub no_failure: Vec<Text>,
+}
+
+fn default_alpha() -> Number {
+    default_number(0.25)
+}
+
+/// A body: a shape filled with lattice points, or a file of points.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Name of the material.
+    pub material: Text,
+    /// Name of the damage law; without it bonds never break.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Text>,
+    /// The shape that is filled with lattice points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Spanned<Shape>>,
+    /// The file that holds the points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointFile>,
+    /// Lattice spacing of this body in m; that of `[grid]` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing: Option<Number>,
+}
+
+/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointFile {
+    /// Path, relative to the deck.
+    pub file: Text,
+    /// Take only the rows with this block number; all rows if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<Spanned<u32>>,
+}
+
+/// A region of space.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    /// A box (interval, rectangle) between two corners, in m.
+    Box {
+        /// Lower corner.
+        lower: Vector,
+        /// Upper corner.
+        upper: Vector,
+    },
+    /// A disc (plane problems).
+    Disc {
+        /// Centre.
+        centre: Vector,
+        /// Radius.
+        radius: Number,
+    },
+    /// A cylinder (3-D) between the centres of its two ends.
+    Cylinder {
+        /// Centre of one end.
+        from: Vector,
+        /// Centre of the other end.
+        to: Vector,
+        /// Radius.
+        radius: Number,
+    },
+    /// A ball (3-D).
+    Sphere {
+        /// Centre.
+        centre: Vector,
+        /// Radius.
+        radius: Number,
+    },
+    /// A polygon (plane problems).
+    Polygon {
+        /// Corners [x, y] in order.
+        vertices: Spanned<Vec<Vector>>,
+    },
+    /// A polygon in x and y, extruded along z (3-D).
+    Prism {
+        /// Corners [x, y] in order.
+        vertices: Spanned<Vec<Vector>>,
+        /// Lower z.
+        bottom: Number,
+        /// Upper z.
+        top: Number,
+    },
+    /// Whatever lies in one of the shapes.
+    Union(Spanned<Vec<Shape>>),
+    /// Whatever lies in the first shape and in none of the others.
+    Difference(Spanned<Vec<Shape>>),
+}
+
+/// A set of points; exactly one of the keys.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Set {
+    /// A condition on the reference position, such as `"x < 2*dx && y > 0"`.
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
+    pub condition: Option<Number>,
+    /// A region.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Spanned<Shape>>,
+    /// The points' global ids, from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ids: Option<Spanned<Vec<u64>>>,
+}
+
+/// A surface that cuts bonds.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Crack {
+    /// A straight cut (plane problems).
+    Segment {
+        /// One end.
+        from: Vector,
+        /// The other end.
+        to: Vector,
+    },
+    /// A parallelogram (3-D).
+    Rectangle {
+        /// A corner.
+        corner: Vector,
+        /// The edge from the corner to a neighbouring one.
+        edge_a: Vector,
+        /// The edge from the corner to the other neighbouring one.
+        edge_b: Vector,
+    },
+    /// A flat disc (3-D).
+    Disc {
+        /// Centre.
+        centre: Vector,
+        /// Normal, of any length.
+        normal: Vector,
+        /// Radius.
+        radius: Number,
+    },
+}
+
+/// Initial values of a set; expressions of x, y, z, one a component.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Initial {
+    /// The set; all points if not given.
+    #[serde(default = "all_points")]
+    pub set: Text,
+    /// Displacement in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub displacement: Option<Vector>,
+    /// Velocity in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vector>,
+}
+
+fn all_points() -> Text {
+    Spanned::new(0..0, "all".to_owned())
+}
+
+/// A load or support of a set; exactly one of the quantities. Values are expressions of x, y, z, t,
+/// one a component; the string `"free"` leaves a component of a motion free.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    /// The set that it acts on.
+    pub set: Text,
+    /// Prescribed displacement in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub displacement: Option<Vector>,
+    /// Prescribed velocity in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vector>,
+    /// Body force density in N/m³.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_force: Option<Vector>,
+    /// Traction in Pa on a surface layer of thickness `depth`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction: Option<Vector>,
+    /// Pressure in Pa against the outward `normal` of a surface layer of thickness `depth`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<Number>,
+    /// Total force in N, spread over the set in proportion to volume.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force: Option<Vector>,
+    /// Thickness in m of the layer that carries a traction or pressure; the spacing if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth: Option<Number>,
+    /// Outward normal for a pressure, of any length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal: Option<Vector>,
+}
+
+/// The time axis.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// End time in s.
+    pub end: Number,
+    /// A fixed time step in s; automatic if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<Number>,
+    /// Automatic step as a fraction of the stable one.
+    #[serde(default = "default_safety")]
+    pub safety: Number,
+}
+
+fn default_safety() -> Number {
+    default_number(0.8)
+}
+
+/// The result file.
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// Simulated time between outputs in s; a fiftieth of the run if neither is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Number>,
+    /// Steps between outputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<Spanned<u64>>,
+    /// Names of the fields.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fields: Option<Vec<Text>>,
+}
+
+/// The history: sums and probes over time.
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct History {
+    /// Simulated time between rows in s; a five-hundredth of the run if neither is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Number>,
+    /// Steps between rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<Spanned<u64>>,
+    /// Sets whose reaction force is recorded.
+    #[serde(default)]
+    pub reactions: Vec<Text>,
+    /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage_threshold: Option<Number>,
+    /// Places whose nearest point is followed, by name.
+    #[serde(default)]
+    pub probe: Tables<Probe>,
+}
+
+/// A place to watch.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// The place in m; the nearest point is followed.
+    pub at: Vector,
+}

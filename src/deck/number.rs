@@ -1,0 +1,68 @@
+//! Numbers as they stand in a deck: an integer, a float, or an expression in a string.
+
+use std::fmt;
+
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_spanned::Spanned;
+
+/// What was written for a number.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Written {
+    /// A plain number; TOML integers are accepted.
+    Value(f64),
+    /// The text of an expression.
+    Text(String),
+}
+
+/// A number with its place in the deck.
+pub type Number = Spanned<Written>;
+
+/// A vector of numbers with its place in the deck, one entry a dimension.
+pub type Vector = Spanned<Vec<Number>>;
+
+/// A number that stands nowhere: a default.
+pub fn default_number(value: f64) -> Number {
+    Spanned::new(0..0, Written::Value(value))
+}
+
+impl<'de> Deserialize<'de> for Written {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WrittenVisitor;
+
+        impl Visitor<'_> for WrittenVisitor {
+            type Value = Written;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("a number or an expression in a string")
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Written, E> {
+                Ok(Written::Value(value as f64))
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Written, E> {
+                Ok(Written::Value(value as f64))
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Written, E> {
+                Ok(Written::Value(value))
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Written, E> {
+                Ok(Written::Text(text.to_owned()))
+            }
+        }
+
+        deserializer.deserialize_any(WrittenVisitor)
+    }
+}
+
+impl Serialize for Written {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Value(value) => serializer.serialize_f64(*value),
+            Self::Text(text) => serializer.serialize_str(text),
+        }
+    }
+}

@@ -1,0 +1,372 @@
+//! The validated deck: every number known, every name resolved.
+//!
+//! Positions and vectors have three components; those beyond the dimension are 0.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use super::expression::Expression;
+use super::source::Source;
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
+
+/// Everything that a run needs to know.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The deck's text, for errors found later and for the result's metadata.
+    pub source: Source,
+    /// One line.
+    pub title: String,
+    /// The setting.
+    pub dimension: Dimension,
+    /// Horizon δ, m.
+    pub horizon: f64,
+    /// Bodies in the order of the deck; the index is the block number.
+    pub bodies: Vec<Body>,
+    /// Sets: `all`, then the bodies, then those of the deck.
+    pub sets: Vec<Set>,
+    /// Pre-cracks.
+    pub cracks: Vec<Crack>,
+    /// Initial values, applied in order.
+    pub initials: Vec<Initial>,
+    /// Loads and supports, applied in order.
+    pub conditions: Vec<Condition>,
+    /// The time axis.
+    pub time: Time,
+    /// The result file.
+    pub output: Output,
+    /// The history.
+    pub history: History,
+}
+
+/// A body, which is a block with its own material and damage.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Its name in the deck.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The material's name.
+    pub material_name: String,
+    /// The material.
+    pub material: Material,
+    /// The damage law, if bonds can break.
+    pub damage: Option<CriticalStretch>,
+    /// Where its points come from.
+    pub points: PointSource,
+}
+
+/// A material: density, elastic constants and the law that uses them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// Which law.
+    pub law: Law,
+    /// kg/m³.
+    pub density: f64,
+    /// E and ν; for a bond-based law ν is the law's own.
+    pub elastic: Isotropic,
+}
+
+/// The material laws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// Prototype microelastic.
+    Pmb,
+}
+
+/// Critical-stretch damage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CriticalStretch {
+    /// What sets the critical stretch.
+    pub toughness: Toughness,
+    /// α in s ≥ s0 − α s_min.
+    pub alpha: f64,
+    /// Indices of sets whose bonds never break.
+    pub no_failure: Vec<usize>,
+}
+
+/// Three measures of how much a material resists a crack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Toughness {
+    /// G0, J/m².
+    FractureEnergy(f64),
+    /// K_Ic, Pa·√m.
+    FractureToughness(f64),
+    /// s0 itself.
+    CriticalStretch(f64),
+}
+
+/// Where points come from.
+#[derive(Debug, Clone)]
+pub enum PointSource {
+    /// The centres of lattice cells within a shape.
+    Lattice {
+        /// The shape.
+        shape: Shape,
+        /// Cell edge, m.
+        spacing: f64,
+        /// A corner of a cell, m.
+        origin: [f64; 3],
+    },
+    /// The rows of a file.
+    File {
+        /// Path, already relative to the working directory.
+        path: PathBuf,
+        /// Only rows with this block number.
+        block: Option<u32>,
+        /// Where the file is named in the deck.
+        span: Range<usize>,
+    },
+}
+
+/// A region of space, lengths in m.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Between two corners.
+    Box {
+        /// Lower corner.
+        lower: [f64; 3],
+        /// Upper corner.
+        upper: [f64; 3],
+    },
+    /// A disc or ball.
+    Ball {
+        /// Centre.
+        centre: [f64; 3],
+        /// Radius.
+        radius: f64,
+    },
+    /// Between the centres of its ends.
+    Cylinder {
+        /// Centre of one end.
+        from: [f64; 3],
+        /// Centre of the other.
+        to: [f64; 3],
+        /// Radius.
+        radius: f64,
+    },
+    /// A polygon in x and y, between two values of z.
+    Prism {
+        /// Corners in order.
+        vertices: Vec<[f64; 2]>,
+        /// Lower z; −∞ in the plane.
+        bottom: f64,
+        /// Upper z; ∞ in the plane.
+        top: f64,
+    },
+    /// In any of them.
+    Union(Vec<Shape>),
+    /// In the first and in none of the others.
+    Difference(Vec<Shape>),
+}
+
+/// A named set of points.
+#[derive(Debug, Clone)]
+pub struct Set {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Which points.
+    pub selector: Selector,
+}
+
+/// How points are chosen.
+#[derive(Debug, Clone)]
+pub enum Selector {
+    /// All points.
+    All,
+    /// The points of a body, by index.
+    Body(usize),
+    /// Those whose reference position makes this true.
+    Where(Expression),
+    /// Those within a region.
+    Within(Shape),
+    /// Those with these global ids, sorted.
+    Ids(Vec<u64>),
+}
+
+/// A surface that cuts bonds; lengths in m.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Crack {
+    /// In the plane.
+    Segment {
+        /// One end.
+        from: [f64; 3],
+        /// The other.
+        to: [f64; 3],
+    },
+    /// A parallelogram.
+    Rectangle {
+        /// A corner.
+        corner: [f64; 3],
+        /// One edge from it.
+        edge_a: [f64; 3],
+        /// The other edge from it.
+        edge_b: [f64; 3],
+    },
+    /// A flat disc.
+    Disc {
+        /// Centre.
+        centre: [f64; 3],
+        /// Unit normal.
+        normal: [f64; 3],
+        /// Radius.
+        radius: f64,
+    },
+}
+
+/// Initial values of a set.
+#[derive(Debug, Clone)]
+pub struct Initial {
+    /// Its name.
+    pub name: String,
+    /// Index of the set.
+    pub set: usize,
+    /// Where the set is named.
+    pub span: Range<usize>,
+    /// Displacement (m) by component.
+    pub displacement: Option<Vec<Expression>>,
+    /// Velocity (m/s) by component.
+    pub velocity: Option<Vec<Expression>>,
+}
+
+/// A load or support.
+#[derive(Debug, Clone)]
+pub struct Condition {
+    /// Its name.
+    pub name: String,
+    /// Index of the set.
+    pub set: usize,
+    /// Where the set is named.
+    pub span: Range<usize>,
+    /// What it does.
+    pub action: Action,
+}
+
+/// What a condition does to its points, by component.
+#[derive(Debug, Clone)]
+pub enum Action {
+    /// Prescribes displacement (m); `None` is free.
+    Displacement(Vec<Option<Expression>>),
+    /// Prescribes velocity (m/s); `None` is free.
+    Velocity(Vec<Option<Expression>>),
+    /// Adds a body force density: each expression times its factor (N/m³).
+    BodyForce(Vec<Expression>, Vec<f64>),
+    /// Adds a total force (N), spread by volume.
+    Force(Vec<Expression>),
+}
+
+/// The time axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Time {
+    /// End time, s.
+    pub end: f64,
+    /// The step.
+    pub step: StepRule,
+}
+
+/// How the time step is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StepRule {
+    /// This fraction of the stable step.
+    Automatic(f64),
+    /// Fixed, s.
+    Fixed(f64),
+}
+
+/// How often something is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Interval {
+    /// Seconds of simulated time.
+    Seconds(f64),
+    /// Time steps.
+    Steps(u64),
+}
+
+/// The result file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    /// How often.
+    pub every: Interval,
+    /// Which fields.
+    pub fields: Vec<Field>,
+}
+
+/// The history.
+#[derive(Debug, Clone)]
+pub struct History {
+    /// How often.
+    pub every: Interval,
+    /// Indices of sets whose reaction force is recorded.
+    pub reactions: Vec<usize>,
+    /// Damage above which a point counts as cracked.
+    pub damage_threshold: f64,
+    /// Name and place (m) of each probe.
+    pub probes: Vec<(String, [f64; 3])>,
+}
+
+/// A field of the result that changes with time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Field {
+    /// u, m.
+    Displacement,
+    /// u̇, m/s.
+    Velocity,
+    /// ü, m/s².
+    Acceleration,
+    /// Internal force density, N/m³.
+    ForceDensity,
+    /// φ, share of the family's volume that is cut off.
+    Damage,
+    /// W, J/m³.
+    StrainEnergyDensity,
+    /// Number of intact bonds.
+    Neighbours,
+}
+
+impl Field {
+    /// All fields.
+    pub const ALL: [Self; 7] = [
+        Self::Displacement,
+        Self::Velocity,
+        Self::Acceleration,
+        Self::ForceDensity,
+        Self::Damage,
+        Self::StrainEnergyDensity,
+        Self::Neighbours,
+    ];
+
+    /// Its name in decks and results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::ForceDensity => "force_density",
+            Self::Damage => "damage",
+            Self::StrainEnergyDensity => "strain_energy_density",
+            Self::Neighbours => "neighbours",
+        }
+    }
+
+    /// Its SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Displacement => "m",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s^2",
+            Self::ForceDensity => "N/m^3",
+            Self::Damage | Self::Neighbours => "1",
+            Self::StrainEnergyDensity => "J/m^3",
+        }
+    }
+
+    /// 3 for vectors (padded with 0 in 1-D and 2-D), 1 for scalars.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Displacement | Self::Velocity | Self::Acceleration | Self::ForceDensity => 3,
+            Self::Damage | Self::StrainEnergyDensity | Self::Neighbours => 1,
+        }
+    }
+}

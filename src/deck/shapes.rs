@@ -1,0 +1,206 @@
+//! Shapes and pre-cracks of a deck, validated.
+
+use std::ops::Range;
+
+use serde_spanned::Spanned;
+
+use super::grammar;
+use super::number::Vector;
+use super::plan;
+use super::resolve::Scope;
+use crate::error::Result;
+
+/// Validates a shape.
+///
+/// # Errors
+/// On a shape of another dimension, an empty one, or a wrong number.
+pub fn shape(scope: &Scope, key: &str, shape: &Spanned<grammar::Shape>) -> Result<plan::Shape> {
+    resolve(scope, key, shape.get_ref(), shape.span())
+}
+
+fn resolve(
+    scope: &Scope,
+    key: &str,
+    shape: &grammar::Shape,
+    span: Range<usize>,
+) -> Result<plan::Shape> {
+    use grammar::Shape;
+    let only_in = |dimension: usize, name: &str, instead: &str| {
+        if scope.dimension == dimension {
+            return Ok(());
+        }
+        let message = format!(
+            "{key} {name}: is for {dimension}-D problems, this one is {}-D{instead}",
+            scope.dimension
+        );
+        Err(scope.error(span.clone(), message))
+    };
+    match shape {
+        Shape::Box { lower, upper } => {
+            let low = scope.vector(lower, &format!("{key} lower"))?;
+            let high = scope.vector(upper, &format!("{key} upper"))?;
+            if (0..scope.dimension).any(|k| low[k] >= high[k]) {
+                let message = format!("{key} upper: must be above `lower` in every component");
+                return Err(scope.error(upper.span(), message));
+            }
+            Ok(plan::Shape::Box {
+                lower: low,
+                upper: high,
+            })
+        }
+        Shape::Disc { centre, radius } => {
+            only_in(2, "disc", "; in 3-D use `cylinder` or `sphere`")?;
+            Ok(plan::Shape::Ball {
+                centre: scope.vector(centre, &format!("{key} centre"))?,
+                radius: scope.positive(radius, &format!("{key} radius"))?,
+            })
+        }
+        Shape::Sphere { centre, radius } => {
+            only_in(3, "sphere", "; in 2-D use `disc`")?;
+            Ok(plan::Shape::Ball {
+                centre: scope.vector(centre, &format!("{key} centre"))?,
+                radius: scope.positive(radius, &format!("{key} radius"))?,
+            })
+        }
+        Shape::Cylinder { from, to, radius } => {
+            only_in(3, "cylinder", "; in 2-D use `disc`")?;
+            let start = scope.vector(from, &format!("{key} from"))?;
+            let end = scope.vector(to, &format!("{key} to"))?;
+            if start == end {
+                let message = format!("{key} to: must differ from `from`");
+                return Err(scope.error(to.span(), message));
+            }
+            Ok(plan::Shape::Cylinder {
+                from: start,
+                to: end,
+                radius: scope.positive(radius, &format!("{key} radius"))?,
+            })
+        }
+        Shape::Polygon { vertices } => {
+            only_in(2, "polygon", "; in 3-D use `prism`")?;
+            Ok(plan::Shape::Prism {
+                vertices: corners(scope, key, vertices)?,
+                bottom: f64::NEG_INFINITY,
+                top: f64::INFINITY,
+            })
+        }
+        Shape::Prism {
+            vertices,
+            bottom,
+            top,
+        } => {
+            only_in(3, "prism", "; in 2-D use `polygon`")?;
+            let low = scope.number(bottom, &format!("{key} bottom"))?;
+            let high = scope.number(top, &format!("{key} top"))?;
+            if low >= high {
+                let message = format!("{key} top: must be above `bottom`");
+                return Err(scope.error(top.span(), message));
+            }
+            Ok(plan::Shape::Prism {
+                vertices: corners(scope, key, vertices)?,
+                bottom: low,
+                top: high,
+            })
+        }
+        Shape::Union(parts) => several(scope, key, parts, "union").map(plan::Shape::Union),
+        Shape::Difference(parts) => {
+            several(scope, key, parts, "difference").map(plan::Shape::Difference)
+        }
+    }
+}
+
+fn several(
+    scope: &Scope,
+    key: &str,
+    parts: &Spanned<Vec<grammar::Shape>>,
+    name: &str,
+) -> Result<Vec<plan::Shape>> {
+    if parts.get_ref().len() < 2 {
+        let message = format!("{key} {name}: needs at least two shapes");
+        return Err(scope.error(parts.span(), message));
+    }
+    parts
+        .get_ref()
+        .iter()
+        .map(|part| resolve(scope, &format!("{key} {name}"), part, parts.span()))
+        .collect()
+}
+
+fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<Vec<[f64; 2]>> {
+    let key = format!("{key} vertices");
+    if vertices.get_ref().len() < 3 {
+        let message = format!("{key}: a polygon needs at least three corners");
+        return Err(scope.error(vertices.span(), message));
+    }
+    vertices
+        .get_ref()
+        .iter()
+        .map(|vertex| match &vertex.get_ref()[..] {
+            [x, y] => Ok([scope.number(x, &key)?, scope.number(y, &key)?]),
+            _ => Err(scope.error(vertex.span(), format!("{key}: a corner is [x, y]"))),
+        })
+        .collect()
+}
+
+/// Validates a pre-crack.
+///
+/// # Errors
+/// On a crack of another dimension or one without extent.
+pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<plan::Crack> {
+    use grammar::Crack;
+    let (kind, dimension) = match crack.get_ref() {
+        Crack::Segment { .. } => ("segment", 2),
+        Crack::Rectangle { .. } => ("rectangle", 3),
+        Crack::Disc { .. } => ("disc", 3),
+    };
+    let key = format!("[crack.{name}.{kind}]");
+    if dimension != scope.dimension {
+        let message = format!(
+            "{key}: is for {dimension}-D problems, this one is {}-D",
+            scope.dimension
+        );
+        return Err(scope.error(crack.span(), message));
+    }
+    let flat = || scope.error(crack.span(), format!("{key}: has no extent"));
+    match crack.get_ref() {
+        Crack::Segment { from, to } => {
+            let from = scope.vector(from, &format!("{key} from"))?;
+            let to = scope.vector(to, &format!("{key} to"))?;
+            if from == to {
+                return Err(flat());
+            }
+            Ok(plan::Crack::Segment { from, to })
+        }
+        Crack::Rectangle {
+            corner,
+            edge_a,
+            edge_b,
+        } => {
+            let corner = scope.vector(corner, &format!("{key} corner"))?;
+            let a = scope.vector(edge_a, &format!("{key} edge_a"))?;
+            let b = scope.vector(edge_b, &format!("{key} edge_b"))?;
+            let cross = [
+                a[1] * b[2] - a[2] * b[1],
+                a[2] * b[0] - a[0] * b[2],
+                a[0] * b[1] - a[1] * b[0],
+            ];
+            if cross == [0.0; 3] {
+                return Err(flat());
+            }
+            Ok(plan::Crack::Rectangle {
+                corner,
+                edge_a: a,
+                edge_b: b,
+            })
+        }
+        Crack::Disc {
+            centre,
+            normal,
+            radius,
+        } => Ok(plan::Crack::Disc {
+            centre: scope.vector(centre, &format!("{key} centre"))?,
+            normal: scope.direction(normal, &format!("{key} normal"))?,
+            radius: scope.positive(radius, &format!("{key} radius"))?,
+        }),
+    }
+}

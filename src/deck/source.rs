@@ -1,0 +1,139 @@
+//! The deck's text, and errors that point into it.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// A deck's file name and text.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// The whole text.
+    pub text: String,
+}
+
+impl Source {
+    /// Reads a deck.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is not UTF-8.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            Error::input(format!("cannot read the deck {}: {error}", path.display()))
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            text,
+        })
+    }
+
+    /// An error that names file, line and column and shows the line with a caret below the bytes
+    /// of `span`.
+    pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
+        let start = span.start.min(self.text.len());
+        let start = (0..=start)
+            .rev()
+            .find(|at| self.text.is_char_boundary(*at))
+            .unwrap_or(0);
+        let before = &self.text[..start];
+        let line_number = before.matches('\n').count() + 1;
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        let line = self.text[line_start..].lines().next().unwrap_or("");
+        let column = self.text[line_start..start].chars().count();
+        let rest = line.chars().count().saturating_sub(column);
+        let marked = self
+            .text
+            .get(start..span.end)
+            .map_or(1, |text| text.chars().count());
+        let carets = "^".repeat(marked.clamp(1, rest.max(1)));
+        let gutter = " ".repeat(line_number.to_string().len());
+        let tabs_kept: String = line
+            .chars()
+            .take(column)
+            .map(|c| if c == '\t' { '\t' } else { ' ' })
+            .collect();
+        Error::input(format!(
+            "{}:{line_number}:{}: {}\n{gutter} |\n{line_number} | {line}\n{gutter} | {tabs_kept}{carets}",
+            self.path.display(),
+            column + 1,
+            message.as_ref(),
+        ))
+    }
+
+    /// The error of the TOML reader in this form, with the nearest valid name for an unknown one.
+    pub fn toml_error(&self, error: &toml::de::Error) -> Error {
+        let message = nearest_in_message(error.message());
+        self.error(error.span().unwrap_or(0..0), message)
+    }
+}
+
+/// The entry of `known` that is most like `name`, if any is like it at all.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
+        .filter(|(likeness, _)| *likeness > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// `; did you mean …? known: …`, for an error on an unknown name.
+pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let mean = nearest(name, known.iter().copied())
+        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    match known.is_empty() {
+        true => format!("{mean} (none is defined)"),
+        false => format!("{mean} (known: {})", known.join(", ")),
+    }
+}
+
+/// Serde's "unknown field `a`, expected one of `b`, `c`", with the nearest of the expected names.
+fn nearest_in_message(message: &str) -> String {
+    let message = message.trim();
+    let kind = ["unknown field", "unknown variant"]
+        .into_iter()
+        .find(|kind| message.starts_with(kind));
+    let Some(kind) = kind else {
+        return message.to_owned();
+    };
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let name = quoted.next().unwrap_or_default();
+    let what = if kind == "unknown field" {
+        "key"
+    } else {
+        "name"
+    };
+    format!("unknown {what} `{name}`{}", suggestion(name, quoted))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_caret_stands_below_the_mistake() {
+        let source = Source {
+            path: "a.toml".into(),
+            text: "one = 1\ntwo = µ, bad\n".into(),
+        };
+        let at = source.text.find("bad").unwrap();
+        let error = source.error(at..at + 3, "no such thing");
+        assert_eq!(
+            error.message,
+            "a.toml:2:10: no such thing\n  |\n2 | two = µ, bad\n  |          ^^^"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_names_the_nearest() {
+        let message =
+            nearest_in_message("unknown field `horizn`, expected one of `horizon`, `spacing`");
+        assert_eq!(
+            message,
+            "unknown key `horizn`; did you mean `horizon`? (known: horizon, spacing)"
+        );
+    }
+}
