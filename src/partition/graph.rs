@@ -1,0 +1,146 @@
+//! Dealing out cells to ranks with METIS. The only file that names `metis`.
+
+use crate::error::{Error, Result};
+
+use super::cells::Cells;
+
+/// METIS adds up weights in 32 bits.
+const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
+
+/// Below this many cells a part recursive bisection is used: the k-way method leaves parts empty.
+const FEW_CELLS_PER_PART: usize = 30;
+
+/// The rank of each cell, given the number of points in each. A cell's weight is the bonds of its
+/// points, an edge's weight the bonds across.
+///
+/// # Errors
+/// When METIS fails.
+pub fn partition(cells: &Cells, occupation: &[u64], ranks: usize) -> Result<Vec<u32>> {
+    let occupied: Vec<usize> = (0..cells.count())
+        .filter(|cell| occupation[*cell] > 0)
+        .collect();
+    let mut owner = vec![0; cells.count()];
+    if occupied.len() <= ranks {
+        for (rank, cell) in occupied.iter().enumerate() {
+            owner[*cell] = rank as u32;
+        }
+        return Ok(owner);
+    }
+    let mut vertex = vec![u32::MAX; cells.count()];
+    for (k, cell) in occupied.iter().enumerate() {
+        vertex[*cell] = k as u32;
+    }
+    let mut starts = vec![0];
+    let mut neighbours = Vec::new();
+    let mut bonds_across = Vec::new();
+    let mut bonds = Vec::with_capacity(occupied.len());
+    for cell in &occupied {
+        let here = occupation[*cell] as f64;
+        let mut sum = here * here;
+        for (other, displaced) in cells.adjacent(*cell) {
+            if occupation[other] == 0 {
+                continue;
+            }
+            // A random pair of points in adjacent cells is bonded the more rarely, the more
+            // directions lie between them.
+            let across = here * occupation[other] as f64 * 0.4_f64.powi(displaced as i32);
+            sum += across;
+            neighbours.push(vertex[other] as metis::Idx);
+            bonds_across.push(across);
+        }
+        bonds.push(sum);
+        starts.push(neighbours.len() as metis::Idx);
+    }
+    let vertex_weights = to_integers(&bonds);
+    let edge_weights = to_integers(&bonds_across);
+    let mut part = vec![0; occupied.len()];
+    let failed = |error: &dyn std::fmt::Display| Error::run(format!("METIS failed: {error}"));
+    let graph = metis::Graph::new(1, ranks as metis::Idx, &starts, &neighbours)
+        .map_err(|error| failed(&error))?
+        .set_vwgt(&vertex_weights)
+        .set_adjwgt(&edge_weights)
+        .set_option(metis::option::Seed(1));
+    let cut = if occupied.len() < FEW_CELLS_PER_PART * ranks {
+        graph.part_recursive(&mut part)
+    } else {
+        graph.part_kway(&mut part)
+    };
+    cut.map_err(|error| failed(&error))?;
+    fill_empty_parts(&mut part, ranks);
+    for (cell, rank) in occupied.iter().zip(part) {
+        owner[*cell] = rank as u32;
+    }
+    Ok(owner)
+}
+
+/// Weights as positive integers whose sum METIS can hold.
+fn to_integers(weights: &[f64]) -> Vec<metis::Idx> {
+    let total: f64 = weights.iter().sum();
+    let room = LARGEST_TOTAL - weights.len() as f64;
+    let scale = (room / total).min(1.0);
+    weights
+        .iter()
+        .map(|weight| (weight * scale).max(1.0) as metis::Idx)
+        .collect()
+}
+
+/// Gives each empty part a cell of the part that has most.
+fn fill_empty_parts(part: &mut [metis::Idx], ranks: usize) {
+    let mut sizes = vec![0_usize; ranks];
+    for rank in part.iter() {
+        sizes[*rank as usize] += 1;
+    }
+    for empty in 0..ranks {
+        if sizes[empty] > 0 {
+            continue;
+        }
+        let largest = (0..ranks).max_by_key(|rank| sizes[*rank]).unwrap_or(0);
+        if sizes[largest] < 2 {
+            return;
+        }
+        let cell = part.iter().rposition(|rank| *rank as usize == largest);
+        part[cell.expect("the largest part has cells")] = empty as metis::Idx;
+        sizes[largest] -= 1;
+        sizes[empty] += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::points::Point;
+
+    #[test]
+    fn parts_are_balanced_and_none_is_empty() {
+        let points: Vec<Point> = (0..4000)
+            .map(|k| Point::new(k, [(k % 100) as f64, (k / 100) as f64, 0.0], 1.0, 0))
+            .collect();
+        let comm = threads::alone();
+        let cells = Cells::new(&comm, &points, 4000, 3.0);
+        let occupation = cells.occupation(&comm, &points);
+        for ranks in [2, 3, 4, 7, 64] {
+            let owner = partition(&cells, &occupation, ranks).unwrap();
+            let mut sizes = vec![0; ranks];
+            for point in &points {
+                sizes[owner[cells.of(point.position)] as usize] += 1;
+            }
+            let largest = *sizes.iter().max().unwrap();
+            assert!(sizes.iter().all(|size| *size > 0), "{ranks}: {sizes:?}");
+            assert!(largest <= 3 * 4000 / ranks / 2 + 20, "{ranks}: {sizes:?}");
+        }
+    }
+
+    #[test]
+    fn fewer_cells_than_ranks_leave_ranks_empty() {
+        let points = [
+            Point::new(0, [0.0; 3], 1.0, 0),
+            Point::new(1, [9.0, 0.0, 0.0], 1.0, 0),
+        ];
+        let comm = threads::alone();
+        let cells = Cells::new(&comm, &points, 2, 1.0);
+        let occupation = cells.occupation(&comm, &points);
+        let owner = partition(&cells, &occupation, 4).unwrap();
+        assert_ne!(owner[cells.of([0.0; 3])], owner[cells.of([9.0, 0.0, 0.0])]);
+    }
+}

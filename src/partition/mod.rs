@@ -1,0 +1,126 @@
+//! Dealing out points to ranks: cells, METIS, migration, ghosts.
+
+mod cells;
+mod domain;
+mod ghosts;
+mod graph;
+
+pub use domain::Domain;
+
+use crate::comm::{Communicator, agree};
+use crate::error::Result;
+use crate::points::Point;
+
+use cells::Cells;
+
+/// Moves the pieces that the ranks made to the ranks that will own them, and finds the ghosts.
+///
+/// `total` counts the points of all ranks, `cutoff` (m) is the length of the longest bond.
+///
+/// # Errors
+/// When METIS fails; the same on all ranks.
+pub fn distribute(
+    comm: &dyn Communicator,
+    pieces: Vec<Point>,
+    total: u64,
+    cutoff: f64,
+) -> Result<Domain> {
+    let cells = Cells::new(comm, &pieces, total, cutoff);
+    let occupation = cells.occupation(comm, &pieces);
+    let owner = owners(comm, &cells, &occupation)?;
+    drop(occupation);
+    let owned = migrate(comm, &cells, &owner, pieces);
+    Ok(ghosts::domain(comm, &cells, &owner, owned, total, cutoff))
+}
+
+/// The rank of each cell, from rank 0 to all: 4 bytes a cell.
+fn owners(comm: &dyn Communicator, cells: &Cells, occupation: &[u64]) -> Result<Vec<u32>> {
+    if comm.size() == 1 {
+        return Ok(vec![0; cells.count()]);
+    }
+    let found = match comm.rank() {
+        0 => graph::partition(cells, occupation, comm.size()),
+        _ => Ok(Vec::new()),
+    };
+    let mut bytes = bytemuck::cast_slice(&agree(comm, found)?).to_vec();
+    comm.broadcast(0, &mut bytes);
+    Ok(bytemuck::pod_collect_to_vec(&bytes))
+}
+
+fn migrate(
+    comm: &dyn Communicator,
+    cells: &Cells,
+    owner: &[u32],
+    pieces: Vec<Point>,
+) -> Vec<Point> {
+    if comm.size() == 1 {
+        return pieces;
+    }
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    for point in &pieces {
+        let rank = owner[cells.of(point.position)] as usize;
+        outgoing[rank].extend_from_slice(bytemuck::bytes_of(point));
+    }
+    drop(pieces);
+    comm.all_to_all(outgoing)
+        .iter()
+        .flat_map(|bytes| bytemuck::pod_collect_to_vec::<u8, Point>(bytes))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::points::distance_squared;
+    use proptest::prelude::*;
+
+    fn cloud(seed: &[[f64; 3]]) -> Vec<Point> {
+        seed.iter()
+            .zip(0..)
+            .map(|(position, id)| Point::new(id, *position, 1.0, 0))
+            .collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn every_point_has_one_owner_and_sees_all_its_neighbours(
+            seed in prop::collection::vec(prop::array::uniform3(0.0..4.0_f64), 1..120),
+            ranks in 1_usize..5,
+        ) {
+            let all = cloud(&seed);
+            let domains = threads::run(ranks, |comm| {
+                let share = |rank: usize| all.len() * rank / ranks;
+                let piece = all[share(comm.rank())..share(comm.rank() + 1)].to_vec();
+                let mut domain = distribute(comm, piece, all.len() as u64, 1.0).unwrap();
+                // The halo must bring each ghost its own id.
+                let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
+                ids[domain.owned..].fill(-1.0);
+                domain.halo.pack(&[&ids]);
+                domain.halo.exchange(comm, &mut || {});
+                domain.halo.unpack(&mut [&mut ids]);
+                (domain, ids)
+            });
+            let mut owned: Vec<u64> = Vec::new();
+            for (domain, ids) in &domains {
+                owned.extend(domain.points[..domain.owned].iter().map(|p| p.id));
+                for (point, id) in domain.points.iter().zip(ids) {
+                    prop_assert_eq!(point.id as f64, *id);
+                    prop_assert_eq!(*point, all[point.id as usize]);
+                }
+                for (index, here) in domain.points[..domain.owned].iter().enumerate() {
+                    for there in &all {
+                        if distance_squared(here.position, there.position) <= 1.0 {
+                            let place = domain.points.iter().position(|p| p.id == there.id);
+                            prop_assert!(place.is_some());
+                            prop_assert!(index >= domain.interior || place < Some(domain.owned));
+                        }
+                    }
+                }
+            }
+            owned.sort_unstable();
+            prop_assert_eq!(owned, (0..all.len() as u64).collect::<Vec<_>>());
+        }
+    }
+}

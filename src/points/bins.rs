@@ -1,0 +1,135 @@
+//! Points sorted into boxes, to find those near a position.
+
+use super::distance_squared;
+
+/// Boxes of an edge of at least the search radius over a cloud of positions.
+pub struct Bins {
+    lower: [f64; 3],
+    inverse_edge: f64,
+    counts: [usize; 3],
+    radius_squared: f64,
+    starts: Vec<u32>,
+    /// Index and position of each point, box by box, ascending in the index within a box.
+    entries: Vec<(u32, [f64; 3])>,
+}
+
+impl Bins {
+    /// Sorts positions (m) for searches up to `radius` (m).
+    pub fn new(positions: &[[f64; 3]], radius: f64) -> Self {
+        let mut lower = [f64::INFINITY; 3];
+        let mut upper = [f64::NEG_INFINITY; 3];
+        for position in positions {
+            for k in 0..3 {
+                lower[k] = lower[k].min(position[k]);
+                upper[k] = upper[k].max(position[k]);
+            }
+        }
+        let (edge, counts) = boxes(lower, upper, radius, positions.len());
+        let mut bins = Self {
+            lower,
+            inverse_edge: 1.0 / edge,
+            counts,
+            radius_squared: radius * radius,
+            starts: vec![0; counts.iter().product::<usize>() + 1],
+            entries: vec![(0, [0.0; 3]); positions.len()],
+        };
+        for position in positions {
+            let index = bins.index(bins.coordinates(*position));
+            bins.starts[index + 1] += 1;
+        }
+        for k in 1..bins.starts.len() {
+            bins.starts[k] += bins.starts[k - 1];
+        }
+        let mut next = bins.starts.clone();
+        for (k, position) in positions.iter().enumerate() {
+            let slot = &mut next[bins.index(bins.coordinates(*position))];
+            bins.entries[*slot as usize] = (k as u32, *position);
+            *slot += 1;
+        }
+        bins
+    }
+
+    fn coordinates(&self, position: [f64; 3]) -> [isize; 3] {
+        std::array::from_fn(|k| {
+            ((position[k] - self.lower[k]) * self.inverse_edge).floor() as isize
+        })
+    }
+
+    fn index(&self, coordinates: [isize; 3]) -> usize {
+        let clamped: [usize; 3] =
+            std::array::from_fn(|k| coordinates[k].clamp(0, self.counts[k] as isize - 1) as usize);
+        clamped[0] + self.counts[0] * (clamped[1] + self.counts[1] * clamped[2])
+    }
+
+    /// Calls `found` with the index and the squared distance (m²) of every point within the radius
+    /// of a position, itself included if it is one of them.
+    pub fn within(&self, position: [f64; 3], mut found: impl FnMut(u32, f64)) {
+        if self.entries.is_empty() {
+            return;
+        }
+        let centre = self.coordinates(position);
+        let range = |k: usize| {
+            let last = self.counts[k] as isize - 1;
+            (centre[k] - 1).max(0)..=(centre[k] + 1).min(last)
+        };
+        for z in range(2) {
+            for y in range(1) {
+                let xs = range(0);
+                if xs.is_empty() {
+                    continue;
+                }
+                // Boxes along x are adjacent in memory: one run.
+                let first = self.starts[self.index([*xs.start(), y, z])] as usize;
+                let last = self.starts[self.index([*xs.end(), y, z]) + 1] as usize;
+                for (index, other) in &self.entries[first..last] {
+                    let squared = distance_squared(position, *other);
+                    if squared <= self.radius_squared {
+                        found(*index, squared);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Edge (m) and number of boxes by direction, at least the radius wide and not many more boxes than
+/// points.
+pub fn boxes(lower: [f64; 3], upper: [f64; 3], radius: f64, points: usize) -> (f64, [usize; 3]) {
+    let mut edge = radius * (1.0 + 1e-6);
+    loop {
+        let counts: [f64; 3] =
+            std::array::from_fn(|k| ((upper[k] - lower[k]).max(0.0) / edge).floor() + 1.0);
+        if counts.iter().product::<f64>() <= 2.0 * points as f64 + 64.0 {
+            return (edge, counts.map(|count| count as usize));
+        }
+        edge *= 1.5;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn finds_what_comparing_all_pairs_finds(
+            flat in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 0..80),
+            stretch in 0.0..50.0_f64,
+            radius in 0.01..2.0_f64,
+        ) {
+            let positions: Vec<[f64; 3]> =
+                flat.iter().map(|p| [p[0] * stretch, p[1], p[2]]).collect();
+            let bins = Bins::new(&positions, radius);
+            for here in &positions {
+                let mut found = Vec::new();
+                bins.within(*here, |index, _| found.push(index as usize));
+                found.sort_unstable();
+                let expected: Vec<usize> = (0..positions.len())
+                    .filter(|k| distance_squared(*here, positions[*k]) <= radius * radius)
+                    .collect();
+                prop_assert_eq!(found, expected);
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Points: where they come from, and the geometry that picks them.
+//!
+//! Every rank makes or reads its own piece; no rank ever holds all points.
+
+pub mod bins;
+pub mod crack;
+mod file;
+mod lattice;
+pub mod set;
+pub mod shape;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::comm::{Communicator, agree};
+use crate::deck::plan::{Plan, PointSource};
+use crate::error::{Error, Result};
+
+/// A point as it travels between ranks.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Point {
+    /// Global id, from 0 without gaps, the same on any number of ranks.
+    pub id: u64,
+    /// Reference position, m; components beyond the dimension are 0.
+    pub position: [f64; 3],
+    /// Volume, m³.
+    pub volume: f64,
+    /// Index of its body.
+    pub block: u32,
+    /// Keeps the record free of padding bytes.
+    pub unused: u32,
+}
+
+impl Point {
+    /// A point; see the fields.
+    pub fn new(id: u64, position: [f64; 3], volume: f64, block: usize) -> Self {
+        Self {
+            id,
+            position,
+            volume,
+            block: block as u32,
+            unused: 0,
+        }
+    }
+}
+
+/// Squared distance of two positions, m².
+pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+}
+
+/// This rank's piece of the points: a contiguous range of ids, and the total over all ranks.
+///
+/// # Errors
+/// A body without points, an unreadable or wrong point file, more points than a rank can number;
+/// the same on all ranks.
+pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
+    let mut points = Vec::new();
+    let mut total = 0;
+    for (index, body) in plan.bodies.iter().enumerate() {
+        let piece = match &body.points {
+            PointSource::Lattice { .. } => lattice::piece(plan, index, comm)?,
+            PointSource::File { path, .. } => {
+                if file::users(plan, path)[0].0 != index {
+                    continue;
+                }
+                file::piece(plan, path, comm)?
+            }
+        };
+        let (before, all) = crate::comm::scan(comm, piece.len() as u64);
+        let first = total + before;
+        points.extend(piece.into_iter().enumerate().map(|(k, point)| Point {
+            id: first + k as u64,
+            ..point
+        }));
+        total += all;
+    }
+    no_empty_body(plan, comm, &points)?;
+    let fits = if points.len() < u32::MAX as usize / 2 {
+        Ok(())
+    } else {
+        Err(Error::run(
+            "too many points for one rank (2³¹ at most); use more ranks",
+        ))
+    };
+    agree(comm, fits)?;
+    Ok((points, total))
+}
+
+fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
+    let mut counts = vec![0; plan.bodies.len()];
+    for point in points {
+        counts[point.block as usize] += 1;
+    }
+    comm.sum(&mut counts);
+    match counts.iter().position(|count| *count == 0) {
+        None => Ok(()),
+        Some(empty) => {
+            let body = &plan.bodies[empty];
+            let message = format!(
+                "[body.{}]: has no points; is its shape smaller than the spacing, or covered by a \
+                 later body?",
+                body.name
+            );
+            Err(plan.source.error(body.span.clone(), message))
+        }
+    }
+}
