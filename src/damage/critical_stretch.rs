@@ -1,0 +1,99 @@
+//! A bond breaks for good when its stretch reaches s0 − α s_min.
+//!
+//! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s_min is the smallest stretch among the
+//! intact bonds of a point now; a bond takes the smaller of its ends' thresholds, so that both ends
+//! agree. α = 0 is the plain critical stretch of Dipasquale et al. 2014, eq. 6.
+
+use std::f64::consts::PI;
+
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CriticalStretch {
+    /// s0.
+    pub critical: f64,
+    /// α.
+    pub alpha: f64,
+}
+
+impl CriticalStretch {
+    /// s0 from the fracture energy G0 (J/m²) and the horizon δ (m), for the Poisson ratio that a
+    /// bond-based law has.
+    ///
+    /// 3-D: √(5G0/(9Kδ)). Plane stress: √(4πG0/(9Eδ)), Dipasquale et al. eq. 5. Plane strain:
+    /// √(5πG0/(12Eδ)). 1-D: √(5G0/(2Eδ)).
+    pub fn from_energy(dimension: Dimension, elastic: Isotropic, energy: f64, horizon: f64) -> f64 {
+        let factor = match dimension {
+            Dimension::Space => 5.0 / (9.0 * elastic.bulk_modulus()),
+            Dimension::PlaneStress { .. } => 4.0 * PI / (9.0 * elastic.youngs_modulus),
+            Dimension::PlaneStrain { .. } => 5.0 * PI / (12.0 * elastic.youngs_modulus),
+            Dimension::Line { .. } => 5.0 / (2.0 * elastic.youngs_modulus),
+        };
+        (factor * energy / horizon).sqrt()
+    }
+
+    /// The fracture energy G0 = K_Ic²/E′ (J/m²) of a fracture toughness (Pa·√m), where E′ is E in
+    /// plane stress and E/(1−ν²) otherwise (Irwin).
+    pub fn energy_from_toughness(dimension: Dimension, elastic: Isotropic, toughness: f64) -> f64 {
+        let effective = match dimension {
+            Dimension::PlaneStress { .. } => elastic.youngs_modulus,
+            _ => elastic.youngs_modulus / (1.0 - elastic.poisson_ratio.powi(2)),
+        };
+        toughness * toughness / effective
+    }
+
+    /// The threshold of a point whose intact bonds have this smallest stretch.
+    #[inline(always)]
+    pub fn threshold(&self, smallest: f64) -> f64 {
+        self.critical - self.alpha * smallest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn toughness_and_energy_agree_in_three_dimensions() {
+        // Diehl & Schweitzer's form: s0 = (5√2/12) K_Ic / (K √δ).
+        let alon = Isotropic {
+            youngs_modulus: 1.5 * 210e9,
+            poisson_ratio: 0.25,
+        };
+        let (toughness, horizon) = (2e6, 1.5e-3_f64);
+        let energy = CriticalStretch::energy_from_toughness(Dimension::Space, alon, toughness);
+        let found = CriticalStretch::from_energy(Dimension::Space, alon, energy, horizon);
+        let expected = 5.0 * 2_f64.sqrt() / 12.0 * toughness / (210e9 * horizon.sqrt());
+        assert!((found / expected - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn all_bonds_across_a_line_cost_the_fracture_energy() {
+        // Plane stress, per unit crack length and thickness: 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w ξ dφ dξ dz
+        // with w = c s0² ξ / 2, by the midpoint rule.
+        let glass = Isotropic {
+            youngs_modulus: 72e9,
+            poisson_ratio: 1.0 / 3.0,
+        };
+        let (energy, horizon, cells) = (135.0, 3e-3, 1000);
+        let dimension = Dimension::PlaneStress { thickness: 1.0 };
+        let critical = CriticalStretch::from_energy(dimension, glass, energy, horizon);
+        let c = crate::material::Pmb::new(dimension, 72e9, horizon).micromodulus;
+        let step = horizon / f64::from(cells);
+        let mut sum = 0.0;
+        for i in 0..cells {
+            let z = (f64::from(i) + 0.5) * step;
+            for j in i + 1..cells {
+                let xi = (f64::from(j) + 0.5) * step;
+                sum += 0.5 * c * critical.powi(2) * xi * xi * (z / xi).acos() * step * step;
+            }
+        }
+        assert!(
+            (2.0 * sum / energy - 1.0).abs() < 2e-3,
+            "{}",
+            2.0 * sum / energy
+        );
+    }
+}

@@ -1,0 +1,144 @@
+//! Eight numbers that are worked on together: the same quantity of eight bonds.
+//!
+//! Plain arrays and IEEE operations without contraction: whatever instructions the compiler picks,
+//! the bits are the same.
+
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+/// Bonds that are evaluated together.
+pub const WIDTH: usize = 8;
+
+/// One number for each of eight bonds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub struct Lanes(pub [f64; WIDTH]);
+
+impl Lanes {
+    /// The same number in all lanes.
+    #[inline(always)]
+    pub fn splat(value: f64) -> Self {
+        Self([value; WIDTH])
+    }
+
+    /// Applies a function to each lane.
+    #[inline(always)]
+    fn map(self, function: impl Fn(f64) -> f64) -> Self {
+        let mut result = self;
+        for k in 0..WIDTH {
+            result.0[k] = function(self.0[k]);
+        }
+        result
+    }
+
+    /// Applies a function to each pair of lanes.
+    #[inline(always)]
+    fn zip(self, other: Self, function: impl Fn(f64, f64) -> f64) -> Self {
+        let mut result = self;
+        for k in 0..WIDTH {
+            result.0[k] = function(self.0[k], other.0[k]);
+        }
+        result
+    }
+
+    /// Square root.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        self.map(f64::sqrt)
+    }
+
+    /// The smaller of each pair of lanes; of a NaN and a number, the number in `other`.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    /// The lanes whose bit is set; `otherwise` in the others.
+    #[inline(always)]
+    pub fn select(self, bits: u8, otherwise: f64) -> Self {
+        let mut result = self;
+        for k in 0..WIDTH {
+            result.0[k] = if bits >> k & 1 == 1 {
+                self.0[k]
+            } else {
+                otherwise
+            };
+        }
+        result
+    }
+
+    /// A bit for each lane that is at least as large as the other's.
+    #[inline(always)]
+    pub fn at_least(self, other: Self) -> u8 {
+        let mut bits = 0;
+        for k in 0..WIDTH {
+            bits |= u8::from(self.0[k] >= other.0[k]) << k;
+        }
+        bits
+    }
+
+    /// The sum of all lanes, in a fixed order.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
+    }
+
+    /// The smallest lane.
+    #[inline(always)]
+    pub fn smallest(self) -> f64 {
+        let mut smallest = self.0[0];
+        for k in 1..WIDTH {
+            if self.0[k] < smallest {
+                smallest = self.0[k];
+            }
+        }
+        smallest
+    }
+}
+
+impl Add for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl AddAssign for Lanes {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Sub for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl Mul<f64> for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f64) -> Self {
+        self.map(|a| a * factor)
+    }
+}
+
+impl Div for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+}

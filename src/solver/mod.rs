@@ -1,0 +1,15 @@
+//! The solver: state, bond loops, time integration, conditions and what is observed.
+
+pub mod conditions;
+pub mod forces;
+pub mod kernels;
+pub mod model;
+pub mod observe;
+pub mod schedule;
+pub mod simulation;
+pub mod stable_step;
+pub mod state;
+mod sweep;
+mod verlet;
+
+pub use simulation::Simulation;

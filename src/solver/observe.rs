@@ -1,0 +1,360 @@
+//! What is seen of a run: fields for the result, sums and probes for the history.
+
+use rayon::prelude::*;
+
+use crate::comm::sum::{ExactSum, reduce};
+use crate::comm::{self, Communicator};
+use crate::deck::plan::Field;
+use crate::error::Result;
+use crate::points::distance_squared;
+
+use super::Simulation;
+use super::conditions::{members, not_empty};
+use super::kernels::Stored;
+
+/// Points summed by one task.
+const CHUNK: usize = 4096;
+
+/// Names of the components.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What the bonds hold at one moment; found once, used by fields and history.
+pub struct Snapshot {
+    stored: Vec<Stored>,
+}
+
+impl Snapshot {
+    /// Looks at a run now.
+    pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
+        let displacement = &simulation.state.displacement;
+        Self {
+            stored: simulation.forces.stored(&simulation.model, displacement),
+        }
+    }
+
+    /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
+    /// al. 2014, eq. 7). A point without family has 0.
+    fn damage(&self, family_volume: &[f64], point: usize) -> f64 {
+        match family_volume[point] {
+            0.0 => 0.0,
+            whole => 1.0 - self.stored[point].volume / whole,
+        }
+    }
+
+    /// A field over the owned points, row-major with [`Field::components`] entries a point.
+    pub fn field<const D: usize>(&self, simulation: &Simulation<'_, D>, field: Field) -> Vec<f64> {
+        let (model, state) = (&simulation.model, &simulation.state);
+        let count = model.owned();
+        match field {
+            Field::Displacement => rows(count, |d, k| state.displacement[d][k], D),
+            Field::Velocity => rows(count, |d, k| state.velocity[d][k], D),
+            Field::Acceleration => {
+                let acceleration =
+                    |d: usize, k: usize| state.responses[k].force[d] / model.density_of(k);
+                rows(count, acceleration, D)
+            }
+            Field::ForceDensity => {
+                let mut values = rows(count, |d, k| state.responses[k].force[d], D);
+                for (point, component, reaction) in simulation.conditions.reactions() {
+                    values[3 * point + component] -= reaction;
+                }
+                for (point, load) in simulation.conditions.loads() {
+                    (0..D).for_each(|d| values[3 * point + d] -= load[d]);
+                }
+                values
+            }
+            Field::Damage => (0..count)
+                .map(|point| self.damage(&simulation.family_volume, point))
+                .collect(),
+            Field::StrainEnergyDensity => self.stored.iter().map(|stored| stored.energy).collect(),
+            Field::Neighbours => {
+                let neighbours = |stored: &Stored| f64::from(stored.neighbours);
+                self.stored.iter().map(neighbours).collect()
+            }
+        }
+    }
+}
+
+/// Vectors padded to three components.
+fn rows(count: usize, value: impl Fn(usize, usize) -> f64, dimension: usize) -> Vec<f64> {
+    let mut values = vec![0.0; 3 * count];
+    for k in 0..count {
+        for d in 0..dimension {
+            values[3 * k + d] = value(d, k);
+        }
+    }
+    values
+}
+
+/// A point that is followed.
+struct Probe {
+    /// Local index, on the rank that owns it.
+    point: Option<usize>,
+}
+
+/// The columns of the history and what they need.
+pub struct HistoryObserver {
+    columns: Vec<(String, &'static str)>,
+    reactions: Vec<Vec<u32>>,
+    probes: Vec<Probe>,
+    first_energy: Option<f64>,
+    intact_at_first: u64,
+}
+
+/// Energies of the whole body at one moment, J.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Energies {
+    /// ½ Σ ρ V u̇².
+    pub kinetic: f64,
+    /// Σ W V.
+    pub strain: f64,
+    /// Set free by bonds that broke.
+    pub fracture: f64,
+    /// Work done by loads and supports.
+    pub work: f64,
+    /// Kinetic + strain + fracture − work, less its value at the start: 0 for an exact integrator.
+    pub error: f64,
+}
+
+/// One row of the history.
+pub struct HistoryRow {
+    /// Values in the order of the columns; the same on all ranks.
+    pub values: Vec<f64>,
+    /// The energies among them.
+    pub energies: Energies,
+    /// Bonds broken since the start.
+    pub broken: u64,
+}
+
+impl HistoryObserver {
+    /// Finds the sets and probes.
+    ///
+    /// # Errors
+    /// On a reaction of an empty set; the same on all ranks.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
+        let (plan, comm) = (simulation.plan, simulation.comm);
+        let axes = &AXES[..D];
+        let mut columns: Vec<(String, &'static str)> = [
+            ("time", "s"),
+            ("step", "1"),
+            ("kinetic_energy", "J"),
+            ("strain_energy", "J"),
+            ("fracture_energy", "J"),
+            ("external_work", "J"),
+            ("energy_error", "J"),
+            ("broken_bonds", "1"),
+            ("cracked_points", "1"),
+        ]
+        .map(|(name, unit)| (name.to_owned(), unit))
+        .into();
+        let mut vector = |name: String, unit| {
+            columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), unit)));
+        };
+        vector("momentum".to_owned(), "kg m/s");
+        vector("cracked_lower".to_owned(), "m");
+        vector("cracked_upper".to_owned(), "m");
+        let mut reactions = Vec::new();
+        for set in &plan.history.reactions {
+            let points = members(plan, &simulation.model, *set);
+            not_empty(plan, comm, *set, &points, ("[history] reactions", 0..0))?;
+            reactions.push(points);
+            vector(format!("reaction_{}", plan.sets[*set].name), "N");
+        }
+        let mut probes = Vec::new();
+        for (name, at) in &plan.history.probes {
+            probes.push(nearest(simulation, *at));
+            vector(format!("probe_{name}_displacement"), "m");
+            vector(format!("probe_{name}_velocity"), "m/s");
+        }
+        Ok(Self {
+            columns,
+            reactions,
+            probes,
+            first_energy: None,
+            intact_at_first: 0,
+        })
+    }
+
+    /// Name and unit of each column.
+    pub fn columns(&self) -> &[(String, &'static str)] {
+        &self.columns
+    }
+
+    /// The present row; collective.
+    pub fn row<const D: usize>(
+        &mut self,
+        simulation: &Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) -> HistoryRow {
+        let comm = simulation.comm;
+        let mut sums = point_sums(simulation, snapshot);
+        sums.push(simulation.conditions.work());
+        for members in &self.reactions {
+            sums.extend(simulation.conditions.reaction(&simulation.model, members));
+        }
+        let sums = reduce(comm, &mut sums);
+        let (own, rest) = sums.split_at(3 + D);
+        let (work, reactions) = (rest[0], &rest[1..]);
+
+        let cracked = Cracked::new(simulation, snapshot);
+        let intact: u64 = snapshot
+            .stored
+            .iter()
+            .map(|s| u64::from(s.neighbours))
+            .sum();
+        let mut counts = [intact, cracked.points];
+        comm.sum(&mut counts);
+        let [intact, cracked_points] = counts;
+        let (lower, upper) = cracked.extent(comm);
+
+        let energy = own[0] + own[1] + own[2] - work;
+        if self.first_energy.is_none() {
+            self.first_energy = Some(energy);
+            self.intact_at_first = intact;
+        }
+        let energies = Energies {
+            kinetic: own[0],
+            strain: own[1],
+            fracture: own[2],
+            work,
+            error: energy - self.first_energy.unwrap_or(energy),
+        };
+        let broken = (self.intact_at_first - intact) / 2;
+        let mut values = vec![
+            simulation.time(),
+            simulation.number as f64,
+            energies.kinetic,
+            energies.strain,
+            energies.fracture,
+            energies.work,
+            energies.error,
+            broken as f64,
+            cracked_points as f64,
+        ];
+        values.extend(&own[3..]);
+        values.extend(&lower[..D]);
+        values.extend(&upper[..D]);
+        values.extend(reactions);
+        values.extend(self.probe_values(simulation));
+        HistoryRow {
+            values,
+            energies,
+            broken,
+        }
+    }
+
+    /// Displacement and velocity of the probes, from the ranks that own their points to all.
+    fn probe_values<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<f64> {
+        let state = &simulation.state;
+        let mut bits: Vec<u64> = self
+            .probes
+            .iter()
+            .flat_map(|probe| {
+                let at = |field: &[Vec<f64>; D], d: usize| {
+                    probe.point.map_or(0, |point| field[d][point].to_bits())
+                };
+                let displacement = (0..D).map(move |d| at(&state.displacement, d));
+                displacement.chain((0..D).map(move |d| at(&state.velocity, d)))
+            })
+            .collect();
+        // One rank has the bits, the others add nothing.
+        simulation.comm.sum(&mut bits);
+        bits.into_iter().map(f64::from_bits).collect()
+    }
+}
+
+/// Kinetic, strain and fracture energy (J), then momentum by component (kg m/s).
+fn point_sums<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    snapshot: &Snapshot,
+) -> Vec<ExactSum> {
+    let (model, state) = (&simulation.model, &simulation.state);
+    let add = |sums: &mut [ExactSum], point: usize| {
+        let mass = model.density_of(point) * model.volume[point];
+        let mut square = 0.0;
+        for (d, sum) in sums[3..].iter_mut().enumerate() {
+            let velocity = state.velocity[d][point];
+            square += velocity * velocity;
+            sum.add(mass * velocity);
+        }
+        sums[0].add(0.5 * mass * square);
+        sums[1].add(snapshot.stored[point].energy * model.volume[point]);
+        sums[2].add(state.responses[point].set_free);
+    };
+    (0..model.owned().div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let mut sums = vec![ExactSum::default(); 3 + D];
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(model.owned());
+            range.for_each(|point| add(&mut sums, point));
+            sums
+        })
+        .reduce(
+            || vec![ExactSum::default(); 3 + D],
+            |mut a, b| {
+                a.iter_mut().zip(&b).for_each(|(a, b)| a.merge(b));
+                a
+            },
+        )
+}
+
+/// The points of a rank that count as cracked.
+struct Cracked {
+    points: u64,
+    lower: [f64; 3],
+    upper: [f64; 3],
+}
+
+impl Cracked {
+    fn new<const D: usize>(simulation: &Simulation<'_, D>, snapshot: &Snapshot) -> Self {
+        let mut cracked = Self {
+            points: 0,
+            lower: [f64::MAX; 3],
+            upper: [f64::MIN; 3],
+        };
+        let threshold = simulation.plan.history.damage_threshold;
+        for point in 0..simulation.model.owned() {
+            if snapshot.damage(&simulation.family_volume, point) > threshold {
+                let position = simulation.model.position(point);
+                cracked.points += 1;
+                for d in 0..3 {
+                    cracked.lower[d] = cracked.lower[d].min(position[d]);
+                    cracked.upper[d] = cracked.upper[d].max(position[d]);
+                }
+            }
+        }
+        cracked
+    }
+
+    /// Corners (m) of the box around the cracked points of all ranks; NaN if there is none.
+    fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
+        comm::min(comm, &mut self.lower);
+        comm.max(&mut self.upper);
+        if self.lower[0] > self.upper[0] {
+            return ([f64::NAN; 3], [f64::NAN; 3]);
+        }
+        (self.lower, self.upper)
+    }
+}
+
+/// The point nearest to a place; of several, the one with the smallest id. Collective.
+fn nearest<const D: usize>(simulation: &Simulation<'_, D>, place: [f64; 3]) -> Probe {
+    let model = &simulation.model;
+    let own = (0..model.owned())
+        .map(|point| {
+            (
+                distance_squared(place, model.position(point)),
+                model.ids[point],
+                point,
+            )
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut distance = [own.map_or(f64::MAX, |own| own.0)];
+    comm::min(simulation.comm, &mut distance);
+    let own = own.filter(|own| own.0 == distance[0]);
+    let mut id = [own.map_or(f64::MAX, |own| own.1 as f64)];
+    comm::min(simulation.comm, &mut id);
+    Probe {
+        point: own.filter(|own| own.1 as f64 == id[0]).map(|own| own.2),
+    }
+}

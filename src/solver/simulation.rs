@@ -1,0 +1,294 @@
+//! A run: from the plan to points in motion, step by step.
+
+use std::time::{Duration, Instant};
+
+use crate::comm::{self, Communicator, agree};
+use crate::deck::plan::{Plan, StepRule};
+use crate::error::{Error, Result};
+use crate::partition::{Domain, distribute};
+use crate::{families, points};
+
+use super::conditions::{Conditions, apply_initials, members};
+use super::forces::{ForceTimes, Forces};
+use super::model::{Model, assign, block_damage};
+use super::stable_step::stable_step;
+use super::state::State;
+use super::verlet;
+
+/// Steps between two looks of all ranks at whether any has met a value that is not finite.
+const CHECK_EVERY: u64 = 10;
+
+/// A run on one rank.
+pub struct Simulation<'a, const D: usize> {
+    /// The validated deck.
+    pub plan: &'a Plan,
+    /// The other ranks.
+    pub comm: &'a dyn Communicator,
+    /// The points.
+    pub model: Model<D>,
+    /// Their motion.
+    pub state: State<D>,
+    /// Their bonds.
+    pub forces: Forces<D>,
+    /// Loads and supports.
+    pub conditions: Conditions<D>,
+    /// Volume of each owned point's whole family, broken bonds included, m³.
+    pub family_volume: Vec<f64>,
+    /// The stable step, s.
+    pub stable_step: f64,
+    /// The time step, s.
+    pub step: f64,
+    /// Number of the last step.
+    pub last: u64,
+    /// Number of steps made.
+    pub number: u64,
+    /// Where the time went.
+    pub times: Times,
+    bad: Option<BadPoint>,
+}
+
+/// Wall-clock time by phase on this rank.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Times {
+    /// Points, partition, families.
+    pub set_up: Duration,
+    /// Bonds and halo in the time loop.
+    pub forces: ForceTimes,
+    /// Integration and conditions.
+    pub motion: Duration,
+}
+
+/// The first point of a rank whose velocity was not finite.
+#[derive(Debug, Clone, Copy)]
+struct BadPoint {
+    step: u64,
+    id: u64,
+    index: usize,
+}
+
+impl<'a, const D: usize> Simulation<'a, D> {
+    /// Makes, distributes and bonds the points, and evaluates the forces at time 0.
+    ///
+    /// # Errors
+    /// When the points cannot be made, a set that is acted on is empty, or no stable step exists; the
+    /// same on all ranks.
+    pub fn new(plan: &'a Plan, comm: &'a dyn Communicator) -> Result<Self> {
+        let start = Instant::now();
+        let (pieces, total) = points::generate(plan, comm)?;
+        let mut domain = distribute(comm, pieces, total, families::cutoff(plan.horizon))?;
+        let lists = families::search(&domain, plan.bodies.len(), plan.horizon);
+        let lists = agree(comm, lists)?;
+        let model = Model::new(plan, &domain);
+        let damage: Vec<_> = plan
+            .bodies
+            .iter()
+            .map(|body| block_damage(plan, body))
+            .collect();
+        let halo = std::mem::take(&mut domain.halo);
+        let bonds = assign(plan, lists);
+        let mut forces = Forces::new(bonds, halo, damage, domain.points.len());
+        let mut state = State::new(&model);
+
+        let stiffness = forces.stiffness(&model, &state.displacement);
+        let stable = stable_step(comm, &model, &stiffness);
+        let (step, last) = choose_step(plan, stable)?;
+        let stored = forces.stored(&model, &state.displacement);
+        let family_volume = stored.iter().map(|stored| stored.volume).collect();
+        pre_crack(plan, &domain, &mut forces);
+        protect(plan, &model, comm, &mut forces);
+        drop(domain);
+
+        apply_initials(plan, comm, &model, &mut state)?;
+        let conditions = Conditions::new(plan, comm, &model)?;
+        let mut simulation = Self {
+            plan,
+            comm,
+            model,
+            state,
+            forces,
+            conditions,
+            family_volume,
+            stable_step: stable,
+            step,
+            last,
+            number: 0,
+            times: Times::default(),
+            bad: None,
+        };
+        simulation.conditions.place(&mut simulation.state, 0.0, 0.0);
+        simulation.act(None);
+        simulation.times = Times {
+            set_up: start.elapsed(),
+            ..Times::default()
+        };
+        Ok(simulation)
+    }
+
+    /// Time reached, s.
+    pub fn time(&self) -> f64 {
+        self.number as f64 * self.step
+    }
+
+    /// Makes one step.
+    pub fn advance(&mut self) {
+        let start = Instant::now();
+        self.conditions.before_moving(&self.state);
+        verlet::kick_and_drift(&self.model, &mut self.state, self.step);
+        self.number += 1;
+        let time = self.time();
+        self.conditions.place(&mut self.state, time, self.step);
+        self.times.motion += start.elapsed();
+        self.act(Some(self.step));
+        let start = Instant::now();
+        self.conditions.after_moving(&self.model, &self.state);
+        self.times.motion += start.elapsed();
+    }
+
+    /// Forces, loads and reactions at the present place, and the half kick that ends a step.
+    fn act(&mut self, kick: Option<f64>) {
+        self.forces.evaluate(
+            self.comm,
+            &self.model,
+            &mut self.state.displacement,
+            &mut self.state.responses,
+            &mut self.times.forces,
+        );
+        let start = Instant::now();
+        let time = self.time();
+        self.conditions.add_loads(time, &mut self.state.responses);
+        if let Some(step) = kick {
+            let finite = verlet::kick(&self.model, &mut self.state, step);
+            if !finite && self.bad.is_none() {
+                self.bad = self.first_bad();
+            }
+        }
+        self.conditions
+            .guide(&self.model, &mut self.state, time, self.step);
+        self.times.motion += start.elapsed();
+    }
+
+    /// The point with the smallest id among those with a velocity that is not finite.
+    fn first_bad(&self) -> Option<BadPoint> {
+        (0..self.model.owned())
+            .filter(|k| {
+                self.state
+                    .velocity
+                    .iter()
+                    .any(|velocity| !velocity[*k].is_finite())
+            })
+            .min_by_key(|k| self.model.ids[*k])
+            .map(|index| BadPoint {
+                step: self.number,
+                id: self.model.ids[index],
+                index,
+            })
+    }
+
+    /// Whether [`Self::check`] is due after the present step.
+    pub fn check_is_due(&self) -> bool {
+        self.number.is_multiple_of(CHECK_EVERY) || self.number == self.last
+    }
+
+    /// Looks on all ranks whether every value is still finite.
+    ///
+    /// # Errors
+    /// Names the first point (earliest step, then smallest id) that was not.
+    pub fn check(&self) -> Result<()> {
+        let mut earliest = [self.bad.map_or(f64::MAX, |bad| bad.step as f64)];
+        comm::min(self.comm, &mut earliest);
+        if earliest[0] == f64::MAX {
+            return Ok(());
+        }
+        let own = self.bad.filter(|bad| bad.step as f64 == earliest[0]);
+        let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
+        comm::min(self.comm, &mut smallest);
+        let named = match own.filter(|bad| bad.id as f64 == smallest[0]) {
+            None => Ok(()),
+            Some(bad) => {
+                let block = usize::from(self.model.block[bad.index]);
+                Err(Error::run(format!(
+                    "step {} (t = {:.6e} s): the velocity of point {} of body `{}` is not finite; \
+                     reference position {:?} m. A time step beyond the stable {:.3e} s, or a load \
+                     that grows without bound?",
+                    bad.step,
+                    bad.step as f64 * self.step,
+                    bad.id,
+                    self.plan.bodies[block].name,
+                    &self.model.position(bad.index)[..D],
+                    self.stable_step,
+                )))
+            }
+        };
+        agree(self.comm, named)
+    }
+}
+
+/// The time step and the number of the last one. An automatic step divides the run evenly.
+fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
+    let (step, last) = match plan.time.step {
+        StepRule::Fixed(step) => (step, (plan.time.end / step - 1e-9).ceil()),
+        StepRule::Automatic(_) if stable.is_infinite() => {
+            return Err(Error::input(
+                "no point has a neighbour, so there is no stable step; is the horizon in m and \
+                 larger than the distance of the points?",
+            ));
+        }
+        StepRule::Automatic(safety) => {
+            let last = (plan.time.end / (safety * stable)).ceil();
+            (plan.time.end / last, last)
+        }
+    };
+    if last > 1e15 {
+        return Err(Error::input(format!(
+            "[time] end: {} s take {last:.1e} steps of {step:.1e} s",
+            plan.time.end
+        )));
+    }
+    Ok((step, last.max(1.0) as u64))
+}
+
+/// Breaks the bonds that cross a pre-crack. Both ends ask with the lower id first.
+fn pre_crack<const D: usize>(plan: &Plan, domain: &Domain, forces: &mut Forces<D>) {
+    if plan.cracks.is_empty() {
+        return;
+    }
+    forces.cut(|here, there| {
+        let (a, b) = (&domain.points[here], &domain.points[there]);
+        let (first, second) = if a.id < b.id { (a, b) } else { (b, a) };
+        plan.cracks
+            .iter()
+            .any(|crack| points::crack::crosses(crack, first.position, second.position))
+    });
+}
+
+/// Makes the bonds of no-failure zones unbreakable.
+fn protect<const D: usize>(
+    plan: &Plan,
+    model: &Model<D>,
+    comm: &dyn Communicator,
+    forces: &mut Forces<D>,
+) {
+    let laws = plan.bodies.iter().filter_map(|body| body.damage.as_ref());
+    let mut sets: Vec<usize> = laws
+        .flat_map(|law| law.no_failure.iter().copied())
+        .collect();
+    sets.sort_unstable();
+    sets.dedup();
+    if sets.is_empty() {
+        return;
+    }
+    let mut protected = vec![0.0; model.volume.len()];
+    for set in sets {
+        for point in members(plan, model, set) {
+            let body = &plan.bodies[usize::from(model.block[point as usize])];
+            if body
+                .damage
+                .as_ref()
+                .is_some_and(|law| law.no_failure.contains(&set))
+            {
+                protected[point as usize] = 1.0;
+            }
+        }
+    }
+    forces.protect(comm, &mut protected);
+}
