@@ -1,0 +1,103 @@
+//! Datasets of numbers in rows, and the space they take.
+
+#[cfg(doc)]
+use super::collective::CollectiveFile;
+use hdf5_metno as hdf5;
+use hdf5_metno::plist::dataset_create::{AllocTime, FillTime};
+use std::mem::ManuallyDrop;
+
+/// The largest chunk of a dataset that grows, in bytes.
+const CHUNK_BYTES: u64 = 4 << 20;
+
+/// More than the index entry of a chunk takes, in bytes.
+const CHUNK_ENTRY_BYTES: u64 = 128;
+
+/// The number of rows of a dataset.
+#[derive(Debug, Clone, Copy)]
+pub enum Rows {
+    /// So many, from the start and for ever.
+    Fixed(u64),
+    /// None at first; [`CollectiveFile::extend`] adds some.
+    Extensible {
+        /// How many are usually added at once; decides the size of the chunks.
+        per_append: u64,
+    },
+}
+
+/// A dataset of a [`CollectiveFile`]; it stays open until the file is closed.
+#[derive(Debug)]
+pub struct Dataset {
+    // Closed with the file: to close it alone may write, which must not happen after a failure.
+    pub(super) inner: ManuallyDrop<hdf5::Dataset>,
+    pub(super) path: String,
+    pub(super) columns: Option<usize>,
+    pub(super) rows: u64,
+    row_bytes: u64,
+    /// 0 where it is not extensible.
+    rows_per_chunk: u64,
+}
+
+impl Dataset {
+    /// The number of rows it has now.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    pub(super) fn shape(&self, rows: u64) -> Vec<u64> {
+        let columns = self.columns.map(|columns| columns as u64);
+        std::iter::once(rows).chain(columns).collect()
+    }
+
+    pub(super) fn create<T: hdf5::H5Type>(
+        file: &hdf5::File,
+        path: &str,
+        rows: Rows,
+        columns: Option<usize>,
+    ) -> hdf5::Result<Self> {
+        let row_bytes = (columns.unwrap_or(1) * size_of::<T>()) as u64;
+        let (count, rows_per_chunk) = match rows {
+            Rows::Fixed(rows) => (rows, 0),
+            Rows::Extensible { per_append } => (0, chunk_rows(per_append, row_bytes)),
+        };
+        // Early, so that the file's size is known before anyone writes.
+        let mut builder = file
+            .new_dataset_builder()
+            .alloc_time(Some(AllocTime::Early));
+        builder = builder.fill_time(FillTime::Never);
+        let mut first = hdf5::Extent::fixed(count as usize);
+        if rows_per_chunk > 0 {
+            let chunk = std::iter::once(rows_per_chunk as usize).chain(columns);
+            builder = builder.chunk(chunk.collect::<Vec<_>>());
+            first = hdf5::Extent::resizable(0);
+        }
+        let second = columns.map(hdf5::Extent::fixed);
+        let extents: Vec<_> = std::iter::once(first).chain(second).collect();
+        let builder = builder.empty::<T>();
+        let dataset = builder
+            .shape(hdf5::SimpleExtents::from_vec(extents))
+            .create(path)?;
+        Ok(Self {
+            inner: ManuallyDrop::new(dataset),
+            path: path.to_owned(),
+            columns,
+            rows: count,
+            row_bytes,
+            rows_per_chunk,
+        })
+    }
+
+    /// The space its rows take, or would take if it had so many, in bytes.
+    pub(super) fn bytes(&self, rows: u64) -> u64 {
+        match self.rows_per_chunk {
+            0 => rows * self.row_bytes,
+            chunk => rows.div_ceil(chunk) * (chunk * self.row_bytes + CHUNK_ENTRY_BYTES),
+        }
+    }
+}
+
+/// Rows of a chunk: one append where that is 4 kB to 4 MB, or an even part of it.
+fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
+    let (least, most) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
+    let parts = per_append.div_ceil(most).max(1);
+    per_append.div_ceil(parts).max(least)
+}

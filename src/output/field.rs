@@ -1,0 +1,109 @@
+//! The fields of a result file: what they are, and how they get into it.
+
+use super::attribute::Attribute;
+use super::collective::CollectiveFile;
+use super::dataset::{Dataset, Rows};
+use crate::error::{Error, Result};
+use std::borrow::Cow;
+
+/// The group of the fields.
+pub(super) const POINT_DATA: &str = "/VTKHDF/PointData";
+
+/// A field of a result file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FieldDescription {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit, such as `m/s`; empty if it has none.
+    pub unit: &'static str,
+    /// Numbers per point: 1, 2 (a plane vector, stored with a third component 0), 3, 6 (a
+    /// symmetric tensor: xx, yy, zz, xy, yz, xz) or 9 (a tensor, row-major).
+    pub components: usize,
+}
+
+/// This rank's values of a field, row-major: [points of this rank, components].
+#[derive(Debug, Clone, Copy)]
+pub enum FieldData<'a> {
+    /// Real numbers.
+    F64(&'a [f64]),
+    /// Large whole numbers, such as point ids.
+    U64(&'a [u64]),
+    /// Whole numbers.
+    U32(&'a [u32]),
+    /// Small whole numbers and flags.
+    U8(&'a [u8]),
+}
+
+impl FieldData<'_> {
+    fn len(&self) -> usize {
+        match self {
+            FieldData::F64(values) => values.len(),
+            FieldData::U64(values) => values.len(),
+            FieldData::U32(values) => values.len(),
+            FieldData::U8(values) => values.len(),
+        }
+    }
+}
+
+/// Complains where a field's values do not match the points or its components.
+pub(super) fn check(field: &FieldDescription, data: &FieldData, points: usize) -> Result<()> {
+    let (name, components, length) = (field.name, field.components, data.len());
+    if !matches!(components, 1 | 2 | 3 | 6 | 9) {
+        let text = format!("the field {name} has {components} components, not 1, 2, 3, 6 or 9");
+        return Err(Error::run(text));
+    }
+    if length != points * components {
+        let text = format!(
+            "the field {name} has {length} values, not {components} for each of {points} points"
+        );
+        return Err(Error::run(text));
+    }
+    Ok(())
+}
+
+pub(super) fn create_field(
+    file: &mut CollectiveFile,
+    field: &FieldDescription,
+    data: &FieldData,
+    rows: Rows,
+) -> Result<Dataset> {
+    let path = format!("{POINT_DATA}/{}", field.name);
+    let columns = match field.components {
+        1 => None,
+        2 => Some(3),
+        more => Some(more),
+    };
+    let dataset = match data {
+        FieldData::F64(_) => file.create_dataset::<f64>(&path, rows, columns),
+        FieldData::U64(_) => file.create_dataset::<u64>(&path, rows, columns),
+        FieldData::U32(_) => file.create_dataset::<u32>(&path, rows, columns),
+        FieldData::U8(_) => file.create_dataset::<u8>(&path, rows, columns),
+    }?;
+    file.set_dataset_attribute(&dataset, "unit", Attribute::Text(field.unit))?;
+    Ok(dataset)
+}
+
+pub(super) fn write_field(
+    file: &mut CollectiveFile,
+    dataset: &Dataset,
+    row: u64,
+    field: &FieldDescription,
+    data: &FieldData,
+) -> Result<()> {
+    let plane = field.components == 2;
+    match data {
+        FieldData::F64(values) => file.write_rows(dataset, row, &in_space(values, plane)),
+        FieldData::U64(values) => file.write_rows(dataset, row, &in_space(values, plane)),
+        FieldData::U32(values) => file.write_rows(dataset, row, &in_space(values, plane)),
+        FieldData::U8(values) => file.write_rows(dataset, row, &in_space(values, plane)),
+    }
+}
+
+/// Plane vectors with a third component, which viewers need to warp by them.
+fn in_space<T: Copy + Default>(values: &[T], plane: bool) -> Cow<'_, [T]> {
+    if !plane {
+        return Cow::Borrowed(values);
+    }
+    let spatial = |pair: &[T]| [pair[0], pair[1], T::default()];
+    Cow::Owned(values.chunks_exact(2).flat_map(spatial).collect())
+}

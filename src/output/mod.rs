@@ -1,0 +1,22 @@
+//! Result files: HDF5 in VTKHDF layout, written by all ranks together, with a history and a
+//! side-car for older viewers. The only folder that names HDF5.
+
+mod access;
+mod attribute;
+mod collective;
+mod dataset;
+mod field;
+mod history;
+mod read;
+mod reserve;
+#[cfg(test)]
+mod tests;
+mod transfer;
+mod vtkhdf;
+pub mod xdmf;
+
+pub use access::Creation;
+pub use field::{FieldData, FieldDescription};
+pub use read::{Number, ResultReader, StoredColumn, StoredField};
+pub use transfer::initialise;
+pub use vtkhdf::{Contents, Piece, ResultFile};

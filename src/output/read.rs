@@ -1,0 +1,298 @@
+//! Reading result files, by one process.
+
+use super::field::POINT_DATA;
+use super::history::HISTORY;
+use super::vtkhdf::STEPS;
+use crate::error::{Error, Result};
+use hdf5_metno as hdf5;
+use hdf5_metno::types::{IntSize, TypeDescriptor, VarLenUnicode};
+use std::path::{Path, PathBuf};
+
+/// The type of a field's numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Number {
+    /// 8-byte real numbers.
+    F64,
+    /// 8-byte whole numbers.
+    U64,
+    /// 4-byte whole numbers.
+    U32,
+    /// 1-byte whole numbers.
+    U8,
+}
+
+/// A field of a result file, as stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredField {
+    /// Its name.
+    pub name: String,
+    /// Its unit; empty if it has none.
+    pub unit: String,
+    /// Numbers per point: 1, 3, 6 or 9.
+    pub components: usize,
+    /// The type of its numbers.
+    pub number: Number,
+    /// Whether it changes with time.
+    pub dynamic: bool,
+}
+
+/// A column of the history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredColumn {
+    /// Its name.
+    pub name: String,
+    /// Its unit; empty if it has none.
+    pub unit: String,
+    /// One number per row.
+    pub values: Vec<f64>,
+}
+
+/// A result file open for reading.
+#[derive(Debug)]
+pub struct ResultReader {
+    file: hdf5::File,
+    path: PathBuf,
+    points: usize,
+    steps: usize,
+}
+
+impl ResultReader {
+    /// Opens a result file.
+    ///
+    /// # Errors
+    /// There is no such file, it is no HDF5 file, or not a result of Fissure.
+    pub fn open(path: &Path) -> Result<Self> {
+        let problem = |text: &str| Err(Error::input(format!("{}: {text}", path.display())));
+        if let Err(error) = std::fs::metadata(path) {
+            return problem(&format!("cannot open the result file: {error}"));
+        }
+        let file = match hdf5::File::open(path) {
+            Ok(file) => file,
+            Err(error) => {
+                let stack = error.stack();
+                let frame = stack.as_ref().and_then(|frames| frames.last());
+                let cause = frame.map_or_else(|| error.to_string(), |it| it.desc().to_owned());
+                return problem(&format!("this is not a readable HDF5 file: {cause}"));
+            }
+        };
+        if !file.link_exists("VTKHDF") {
+            return problem("this HDF5 file is not a result of Fissure: it has no group /VTKHDF");
+        }
+        let steps = file.group(STEPS).and_then(|group| group.attr("NSteps"));
+        let Ok(steps) = steps.and_then(|attribute| attribute.read_scalar::<i64>()) else {
+            return problem("this VTKHDF file is not a result of Fissure: it has no time steps");
+        };
+        let points = file.dataset("/VTKHDF/NumberOfPoints");
+        let points = match points
+            .and_then(|dataset| dataset.read_raw::<u64>())
+            .as_deref()
+        {
+            Ok([points]) => *points as usize,
+            _ => return problem("this VTKHDF file is not a result of Fissure: it has many parts"),
+        };
+        Ok(Self {
+            file,
+            path: path.to_path_buf(),
+            points,
+            steps: steps as usize,
+        })
+    }
+
+    /// The number of points.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// The times of the complete steps, in s.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn times(&self) -> Result<Vec<f64>> {
+        self.table(&format!("{STEPS}/Values"))
+    }
+
+    /// The numbers of the complete steps.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn steps(&self) -> Result<Vec<u64>> {
+        self.table(&format!("{STEPS}/Step"))
+    }
+
+    /// The reference positions, in m.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn positions(&self) -> Result<Vec<[f64; 3]>> {
+        let path = "/VTKHDF/Points";
+        let read = self
+            .file
+            .dataset(path)
+            .and_then(|dataset| dataset.read_raw::<f64>());
+        let values = read.map_err(|error| self.damaged(path, &error))?;
+        Ok(values.as_chunks::<3>().0.to_vec())
+    }
+
+    /// The points' global ids, in the order of all other point data.
+    ///
+    /// # Errors
+    /// The file is damaged or has no ids.
+    pub fn ids(&self) -> Result<Vec<u64>> {
+        let path = format!("{POINT_DATA}/id");
+        let read = self
+            .file
+            .dataset(&path)
+            .and_then(|dataset| dataset.read_raw::<u64>());
+        read.map_err(|error| self.damaged(&path, &error))
+    }
+
+    /// The fields, by name.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn fields(&self) -> Result<Vec<StoredField>> {
+        let names = self
+            .file
+            .group(POINT_DATA)
+            .and_then(|group| group.member_names());
+        let names = names.map_err(|error| self.damaged(POINT_DATA, &error))?;
+        names
+            .into_iter()
+            .map(|name| self.stored_field(name))
+            .collect()
+    }
+
+    /// One field's values at one of the [times](Self::times), row-major: [points, components];
+    /// whole numbers are converted.
+    ///
+    /// # Errors
+    /// There is no such field or time, or the file is damaged.
+    pub fn field(&self, name: &str, time_index: usize) -> Result<Vec<f64>> {
+        let path = format!("{POINT_DATA}/{name}");
+        if !self.file.link_exists(&path) {
+            let names: Vec<_> = self.fields()?.into_iter().map(|field| field.name).collect();
+            let (file, known) = (self.path.display(), names.join(", "));
+            return Err(Error::input(format!(
+                "{file}: no field `{name}`; there are {known}"
+            )));
+        }
+        if time_index >= self.steps {
+            let (file, steps) = (self.path.display(), self.steps);
+            return Err(Error::input(format!(
+                "{file}: no time {time_index}; there are {steps}"
+            )));
+        }
+        let offsets: Vec<u64> = self.table(&format!("{STEPS}/PointDataOffsets/{name}"))?;
+        let first = offsets[time_index] as usize;
+        let rows = first..first + self.points;
+        let read = self.file.dataset(&path).and_then(|dataset| {
+            Ok(if dataset.ndim() == 1 {
+                dataset.read_slice_1d::<f64, _>(rows)?.into_iter().collect()
+            } else {
+                dataset
+                    .read_slice_2d::<f64, _>((rows, ..))?
+                    .into_iter()
+                    .collect()
+            })
+        });
+        read.map_err(|error| self.damaged(&path, &error))
+    }
+
+    /// The columns of the history in the order they were made; none where there is no history.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn history(&self) -> Result<Vec<StoredColumn>> {
+        if !self.file.link_exists(HISTORY) {
+            return Ok(Vec::new());
+        }
+        let read = || -> hdf5::Result<Vec<(i64, StoredColumn)>> {
+            let datasets = self.file.group(HISTORY)?.datasets()?.into_iter();
+            datasets
+                .map(|dataset| {
+                    let name = dataset
+                        .name()
+                        .rsplit('/')
+                        .next()
+                        .unwrap_or_default()
+                        .to_owned();
+                    let (unit, values) = (text(&dataset, "unit")?, dataset.read_raw()?);
+                    let position = dataset.attr("column")?.read_scalar()?;
+                    Ok((position, StoredColumn { name, unit, values }))
+                })
+                .collect()
+        };
+        let mut columns = read().map_err(|error| self.damaged(HISTORY, &error))?;
+        columns.sort_by_key(|(position, _)| *position);
+        // A run that was killed may have left columns of different lengths.
+        let rows = columns.iter().map(|(_, column)| column.values.len()).min();
+        let shorten = |(_, mut column): (i64, StoredColumn)| {
+            column.values.truncate(rows.unwrap_or(0));
+            column
+        };
+        Ok(columns.into_iter().map(shorten).collect())
+    }
+
+    /// The file's own attributes (deck, version, command line, …), by name.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn attributes(&self) -> Result<Vec<(String, String)>> {
+        let read = || -> hdf5::Result<Vec<_>> {
+            let names = self.file.attr_names()?.into_iter();
+            names
+                .map(|name| Ok((name.clone(), text(&self.file, &name)?)))
+                .collect()
+        };
+        read().map_err(|error| self.damaged("/", &error))
+    }
+
+    fn stored_field(&self, name: String) -> Result<StoredField> {
+        let path = format!("{POINT_DATA}/{name}");
+        let read = || -> hdf5::Result<StoredField> {
+            let dataset = self.file.dataset(&path)?;
+            let number = match dataset.dtype()?.to_descriptor()? {
+                TypeDescriptor::Float(_) => Number::F64,
+                TypeDescriptor::Unsigned(IntSize::U1) => Number::U8,
+                TypeDescriptor::Unsigned(IntSize::U4) => Number::U32,
+                TypeDescriptor::Unsigned(IntSize::U8) => Number::U64,
+                other => return Err(format!("unexpected numbers of type {other}").into()),
+            };
+            Ok(StoredField {
+                unit: text(&dataset, "unit")?,
+                components: dataset.shape().get(1).copied().unwrap_or(1),
+                number,
+                dynamic: dataset.is_resizable(),
+                name,
+            })
+        };
+        read().map_err(|error| self.damaged(&path, &error))
+    }
+
+    /// One number per complete step.
+    fn table<T: hdf5::H5Type>(&self, path: &str) -> Result<Vec<T>> {
+        let read = self
+            .file
+            .dataset(path)
+            .and_then(|dataset| dataset.read_raw::<T>());
+        let mut values = read.map_err(|error| self.damaged(path, &error))?;
+        if values.len() < self.steps {
+            let error = hdf5::Error::from("there are fewer numbers than steps");
+            return Err(self.damaged(path, &error));
+        }
+        values.truncate(self.steps);
+        Ok(values)
+    }
+
+    fn damaged(&self, object: &str, error: &hdf5::Error) -> Error {
+        let file = self.path.display();
+        Error::input(format!(
+            "{file}: cannot read {object} of this result file: {error}"
+        ))
+    }
+}
+
+fn text(object: &hdf5::Location, name: &str) -> hdf5::Result<String> {
+    let value: VarLenUnicode = object.attr(name)?.read_scalar()?;
+    Ok(value.to_string())
+}

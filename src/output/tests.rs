@@ -1,0 +1,104 @@
+//! What is written reads back.
+
+use super::access::Creation;
+use super::collective::CollectiveFile;
+use super::field::{FieldData, FieldDescription};
+use super::read::ResultReader;
+use super::vtkhdf::{Contents, Piece, ResultFile};
+use crate::comm::threads;
+use crate::error::Result;
+use std::path::Path;
+
+fn describe(name: &'static str, unit: &'static str, components: usize) -> FieldDescription {
+    FieldDescription {
+        name,
+        unit,
+        components,
+    }
+}
+
+#[test]
+fn what_is_written_reads_back() -> Result<()> {
+    let path = std::env::temp_dir().join(format!("fissure-result-{}.h5", std::process::id()));
+    let positions = [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]];
+    let comm = threads::alone();
+    let piece = Piece { first: 0, total: 2 };
+    let fixed = [(describe("id", "", 1), FieldData::U64(&[7, 3]))];
+    let moving = [describe("velocity", "m/s", 2), describe("damage", "", 1)];
+    let metadata = [("deck", "ω = 1".to_owned())];
+    let contents = Contents {
+        piece,
+        positions: &positions,
+        fixed: &fixed,
+        moving: &moving,
+        metadata: &metadata,
+    };
+    let create = || ResultFile::create(&path, &comm, Creation::Exclusive, &contents);
+    let mut file = create()?;
+    let columns = [("time".into(), "s"), ("a".into(), "")];
+    file.create_history(&columns, &path.with_extension("csv"))?;
+    for step in [0, 1] {
+        file.append_history(&[vec![step as f64, 4.5]])?;
+        let velocity = [1.0, 2.0, 3.0, 4.0].map(|value| value + 10.0 * step as f64);
+        let fields = [FieldData::F64(&velocity), FieldData::U8(&[step as u8, 9])];
+        file.write_step(0.5 * step as f64, 100 * step, &fields)?;
+    }
+    let error = file.write_step(1.0, 2, &[FieldData::F64(&[0.0]), FieldData::U8(&[0, 0])]);
+    assert!(error.unwrap_err().message.contains("velocity has 1 values"));
+    file.close()?;
+
+    let error = create().err().unwrap();
+    assert!(
+        error.message.contains("exists already"),
+        "{}",
+        error.message
+    );
+
+    let reader = ResultReader::open(&path)?;
+    assert_eq!(reader.times()?, [0.0, 0.5]);
+    assert_eq!(reader.steps()?, [0, 100]);
+    assert_eq!(reader.positions()?, positions);
+    assert_eq!(reader.ids()?, [7, 3]);
+    assert_eq!(
+        reader.field("velocity", 1)?,
+        [11.0, 12.0, 0.0, 13.0, 14.0, 0.0]
+    );
+    assert_eq!(reader.field("damage", 1)?, [1.0, 9.0]);
+    assert_eq!(reader.field("id", 1)?, [7.0, 3.0]);
+    assert!(
+        reader
+            .field("stress", 0)
+            .unwrap_err()
+            .message
+            .contains("damage, id, velocity")
+    );
+    assert_eq!(
+        reader.attributes()?,
+        [("deck".to_owned(), "ω = 1".to_owned())]
+    );
+    let velocity = &reader.fields()?[2];
+    assert_eq!((velocity.unit.as_str(), velocity.components), ("m/s", 3));
+    let history = reader.history()?;
+    assert_eq!(history[0].name, "time");
+    assert_eq!(history[1].values, [4.5, 4.5]);
+    let csv = std::fs::read_to_string(path.with_extension("csv")).unwrap();
+    assert_eq!(csv, "time [s],a\n0,4.5\n1,4.5\n");
+    for name in ["h5", "csv"] {
+        std::fs::remove_file(path.with_extension(name)).unwrap();
+    }
+    Ok(())
+}
+
+#[test]
+fn what_is_no_result_is_named_so() {
+    let path = std::env::temp_dir().join(format!("fissure-no-result-{}", std::process::id()));
+    let comm = threads::alone();
+    let message = |path: &Path| ResultReader::open(path).unwrap_err().message;
+    assert!(message(&path).contains("cannot open"));
+    std::fs::write(&path, "no HDF5").unwrap();
+    assert!(message(&path).contains("not a readable HDF5 file"));
+    let empty = CollectiveFile::create(&path, &comm, Creation::Truncate).unwrap();
+    empty.close().unwrap();
+    assert!(message(&path).contains("no group /VTKHDF"));
+    std::fs::remove_file(&path).unwrap();
+}

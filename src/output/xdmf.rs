@@ -1,0 +1,202 @@
+//! The side-car that lets ParaView before 5.12 open a result file: XDMF 3, pointing into it.
+
+use super::read::{Number, ResultReader, StoredField};
+use crate::error::{Error, Result};
+use std::fmt::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+/// The components of a symmetric tensor in the order they are stored.
+const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
+
+/// Renders the side-car of a result file.
+///
+/// `file_name` is the result's name without its folder, `points` the number of points, `times` the
+/// steps' times in s.
+pub fn render(file_name: &str, points: usize, fields: &[StoredField], times: &[f64]) -> String {
+    let mut text = String::new();
+    let written = write_document(&mut text, file_name, points, fields, times);
+    debug_assert!(written.is_ok(), "writing to a string cannot fail");
+    text
+}
+
+/// Writes the side-car of a result file beside it, `name.xdmf` for `name.h5`, in one piece: a
+/// reader sees the old one or the new one. Returns its path. One process calls this, when the
+/// result is closed.
+///
+/// # Errors
+/// The result cannot be read, or the side-car cannot be written.
+pub fn write_beside(result: &Path) -> Result<PathBuf> {
+    let reader = ResultReader::open(result)?;
+    let name = result.file_name().unwrap_or_default().to_string_lossy();
+    let text = render(&name, reader.points(), &reader.fields()?, &reader.times()?);
+    let path = result.with_extension("xdmf");
+    write(&path, &text)?;
+    Ok(path)
+}
+
+/// Writes a text file in one piece: first beside its place, then moved there.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    let temporary = path.with_extension("xdmf.part");
+    std::fs::write(&temporary, text)
+        .and_then(|()| std::fs::rename(&temporary, path))
+        .map_err(|error| {
+            // What is left of it is of no use; that it cannot be removed either changes nothing.
+            let _ = std::fs::remove_file(&temporary);
+            Error::run(format!(
+                "{}: cannot write the file: {error}",
+                path.display()
+            ))
+        })
+}
+
+fn write_document(
+    text: &mut String,
+    file_name: &str,
+    points: usize,
+    fields: &[StoredField],
+    times: &[f64],
+) -> fmt::Result {
+    let file = escaped(file_name);
+    writeln!(text, r#"<?xml version="1.0" encoding="utf-8"?>"#)?;
+    writeln!(text, r#"<Xdmf Version="3.0">"#)?;
+    writeln!(text, "<Domain>")?;
+    writeln!(
+        text,
+        r#"<Grid Name="points" GridType="Collection" CollectionType="Temporal">"#
+    )?;
+    for (step, time) in times.iter().enumerate() {
+        writeln!(text, r#"<Grid Name="step {step}" GridType="Uniform">"#)?;
+        writeln!(text, r#"<Time Value="{time:?}"/>"#)?;
+        let kind = r#"TopologyType="Polyvertex" NodesPerElement="1""#;
+        writeln!(text, r#"<Topology {kind} NumberOfElements="{points}"/>"#)?;
+        writeln!(text, r#"<Geometry GeometryType="XYZ">"#)?;
+        let place = format!("{file}:/VTKHDF/Points");
+        write_item(text, Number::F64, &format!("{points} 3"), &place)?;
+        writeln!(text, "</Geometry>")?;
+        for field in fields {
+            write_attribute(text, &file, points, field, step, times.len())?;
+        }
+        writeln!(text, "</Grid>")?;
+    }
+    writeln!(text, "</Grid>\n</Domain>\n</Xdmf>")
+}
+
+/// Writes one field of one step. Symmetric tensors become six scalars: XDMF orders their components
+/// in its own way, and readers differ.
+fn write_attribute(
+    text: &mut String,
+    file: &str,
+    points: usize,
+    field: &StoredField,
+    step: usize,
+    steps: usize,
+) -> fmt::Result {
+    let (name, components) = (escaped(&field.name), field.components);
+    let place = format!("{file}:/VTKHDF/PointData/{name}");
+    let (first, rows) = match field.dynamic {
+        true => (step * points, steps * points),
+        false => (0, points),
+    };
+    let parts: Vec<_> = match components {
+        6 => SYMMETRIC
+            .iter()
+            .map(|part| (format!("{name}_{part}"), "Scalar", 1))
+            .collect(),
+        3 => vec![(name, "Vector", 3)],
+        1 => vec![(name, "Scalar", 1)],
+        _ => vec![(name, "Tensor", components)],
+    };
+    for (column, (name, kind, width)) in parts.iter().enumerate() {
+        writeln!(
+            text,
+            r#"<Attribute Name="{name}" AttributeType="{kind}" Center="Node">"#
+        )?;
+        let part = shape(points, *width);
+        let (axes, slab) = match components {
+            1 => (1, format!("{first} 1 {points}")),
+            _ => (2, format!("{first} {column} 1 1 {points} {width}")),
+        };
+        writeln!(
+            text,
+            r#"<DataItem ItemType="HyperSlab" Dimensions="{part}">"#
+        )?;
+        writeln!(
+            text,
+            r#"<DataItem Dimensions="3 {axes}" Format="XML">{slab}</DataItem>"#
+        )?;
+        write_item(text, field.number, &shape(rows, components), &place)?;
+        writeln!(text, "</DataItem>\n</Attribute>")?;
+    }
+    Ok(())
+}
+
+fn shape(rows: usize, columns: usize) -> String {
+    match columns {
+        1 => format!("{rows}"),
+        _ => format!("{rows} {columns}"),
+    }
+}
+
+fn write_item(text: &mut String, number: Number, dimensions: &str, place: &str) -> fmt::Result {
+    // XDMF has no 8-byte unsigned numbers.
+    let (kind, precision) = match number {
+        Number::F64 => ("Float", 8),
+        Number::U64 => ("Int", 8),
+        Number::U32 => ("UInt", 4),
+        Number::U8 => ("UChar", 1),
+    };
+    let kind = format!(r#"NumberType="{kind}" Precision="{precision}""#);
+    writeln!(
+        text,
+        r#"<DataItem {kind} Dimensions="{dimensions}" Format="HDF">{place}</DataItem>"#
+    )
+}
+
+fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field(name: &str, components: usize, dynamic: bool) -> StoredField {
+        StoredField {
+            name: name.to_owned(),
+            unit: String::new(),
+            components,
+            number: if dynamic { Number::F64 } else { Number::U64 },
+            dynamic,
+        }
+    }
+
+    #[test]
+    fn a_step_selects_its_own_rows() {
+        let fields = [
+            field("id", 1, false),
+            field("velocity", 3, true),
+            field("damage", 1, true),
+            field("stress", 6, true),
+        ];
+        let text = render("a&b.h5", 7, &fields, &[0.0, 1e-6, 2e-6]);
+        assert!(text.contains(">14 0 1 1 7 3</DataItem>"));
+        assert!(text.contains(">14 1 7</DataItem>"));
+        assert!(text.contains(">14 4 1 1 7 1</DataItem>"));
+        assert!(text.contains(r#"Name="stress_yz" AttributeType="Scalar""#));
+        assert!(
+            text.contains(
+                r#"Dimensions="21 3" Format="HDF">a&amp;b.h5:/VTKHDF/PointData/velocity<"#
+            )
+        );
+        assert!(text.contains(r#"NumberType="Int" Precision="8" Dimensions="7" Format="HDF""#));
+        assert!(text.contains(r#"<Time Value="1e-6"/>"#));
+        assert_eq!(
+            text.matches("<Grid").count(),
+            text.matches("</Grid>").count()
+        );
+    }
+}

@@ -1,0 +1,160 @@
+//! Rulers with ticks, the colour bar and the axis triad.
+
+use super::canvas::{INK, Image};
+use super::layout::Bar;
+use super::lettering::{CAPITAL_HEIGHT, Lettering, Running};
+use super::points::Colouring;
+use super::projection::Projection;
+use super::scale::Scale;
+use super::scene::Axis;
+
+/// What annotations are drawn with.
+pub struct Pen<'a> {
+    /// The picture.
+    pub image: &'a mut Image,
+    /// The fonts.
+    pub lettering: &'a Lettering,
+    /// Size of the text in pixels.
+    pub text: f64,
+}
+
+/// A line with ticks, labels and a caption.
+pub struct Ruler<'a> {
+    /// The end with the low numbers, in pixels.
+    pub from: [f64; 2],
+    /// The end with the high numbers, in pixels.
+    pub to: [f64; 2],
+    /// Unit vector towards the side of the labels.
+    pub outward: [f64; 2],
+    /// The ticks.
+    pub scale: &'a Scale,
+    /// Name of the quantity.
+    pub name: &'a str,
+}
+
+/// The place `distance` further along `direction`.
+fn moved(place: [f64; 2], direction: [f64; 2], distance: f64) -> [f64; 2] {
+    [0, 1].map(|axis| place[axis] + distance * direction[axis])
+}
+
+/// Half the extent of a text in a direction, measured from its middle.
+fn half_extent([width, height]: [f64; 2], direction: [f64; 2]) -> f64 {
+    (direction[0].abs() * width + direction[1].abs() * height) / 2.0
+}
+
+impl Pen<'_> {
+    /// Thickness of lines.
+    pub fn thickness(&self) -> f64 {
+        (self.text / 15.0).max(1.0)
+    }
+
+    /// Writes a line of text centred on a place.
+    pub fn write(&mut self, text: &str, centre: [f64; 2], running: Running) {
+        self.lettering
+            .draw(self.image, text, self.text, centre, running, INK);
+    }
+
+    /// Draws a ruler.
+    pub fn ruler(&mut self, ruler: &Ruler) {
+        let height = CAPITAL_HEIGHT * self.text;
+        let (tick, gap) = (0.35 * self.text, 0.4 * self.text);
+        let thickness = self.thickness();
+        self.image.line(ruler.from, ruler.to, thickness, INK);
+        let mut reach: f64 = 0.0;
+        for mark in &ruler.scale.ticks {
+            let start = [0, 1]
+                .map(|axis| ruler.from[axis] + mark.fraction * (ruler.to[axis] - ruler.from[axis]));
+            let end = moved(start, ruler.outward, tick);
+            self.image.line(start, end, thickness, INK);
+            let size = [self.lettering.length(&mark.label, self.text), height];
+            let half = half_extent(size, ruler.outward);
+            self.write(
+                &mark.label,
+                moved(end, ruler.outward, gap + half),
+                Running::Across,
+            );
+            reach = reach.max(2.0 * half);
+        }
+        let caption = ruler.scale.caption(ruler.name);
+        let length = self.lettering.length(&caption, self.text);
+        let (running, size) = if ruler.outward[1] == 0.0 {
+            (Running::Upwards, [height, length])
+        } else {
+            (Running::Across, [length, height])
+        };
+        let middle = [0, 1].map(|axis| (ruler.from[axis] + ruler.to[axis]) / 2.0);
+        let distance = tick + 2.2 * gap + reach + half_extent(size, ruler.outward);
+        self.write(&caption, moved(middle, ruler.outward, distance), running);
+    }
+
+    /// Draws the colour bar with its ruler.
+    pub fn colour_bar(&mut self, bar: &Bar, colouring: Colouring, name: &str, unit: &str) {
+        let ([left, right], [top, bottom]) = (bar.columns, bar.rows);
+        let (low, high) = colouring.range;
+        let length = if bar.upright {
+            bottom - top
+        } else {
+            right - left
+        };
+        for step in 0..length as i64 {
+            let colour = colouring.of(low + (step as f64 + 0.5) / length * (high - low));
+            let (columns, rows) = if bar.upright {
+                let row = bottom as i64 - 1 - step;
+                ([left as i64, right as i64], [row, row + 1])
+            } else {
+                let column = left as i64 + step;
+                ([column, column + 1], [top as i64, bottom as i64])
+            };
+            self.image.fill_rectangle(columns, rows, colour);
+        }
+        self.outline(bar.columns, bar.rows);
+        let spacing = if bar.upright { 3.0 } else { 6.0 };
+        let most = ((length / (spacing * self.text)) as usize).clamp(2, 8);
+        let magnitude = low.abs().max(high.abs());
+        let scale = Scale::new(low, high, unit, magnitude, most);
+        let (from, to, outward) = if bar.upright {
+            ([right, bottom], [right, top], [1.0, 0.0])
+        } else {
+            ([left, bottom], [right, bottom], [0.0, 1.0])
+        };
+        self.ruler(&Ruler {
+            from,
+            to,
+            outward,
+            scale: &scale,
+            name,
+        });
+    }
+
+    /// Draws the four sides of a rectangle.
+    pub fn outline(&mut self, [left, right]: [f64; 2], [top, bottom]: [f64; 2]) {
+        let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
+        for (from, to) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+            self.image.line(*from, *to, self.thickness(), INK);
+        }
+    }
+
+    /// Draws the directions of the three axes in the isometric view.
+    pub fn triad(&mut self, root: [f64; 2]) {
+        let length = 2.4 * self.text;
+        for axis in [Axis::X, Axis::Y, Axis::Z] {
+            let mut step = [0.0; 3];
+            step[axis.index()] = 1.0;
+            let [across, up] = Projection::Isometric.project(step);
+            let size = across.hypot(up);
+            let direction = [across / size, -up / size];
+            let tip = moved(root, direction, length);
+            self.image.line(root, tip, 1.3 * self.thickness(), INK);
+            let aside = [-direction[1], direction[0]];
+            let base = moved(tip, direction, -0.55 * self.text);
+            let head = [
+                moved(tip, direction, 0.1 * self.text),
+                moved(base, aside, 0.2 * self.text),
+                moved(base, aside, -0.2 * self.text),
+            ];
+            self.image.fill_polygon(&head, INK);
+            let place = moved(tip, direction, 0.65 * self.text);
+            self.write(axis.letter(), place, Running::Across);
+        }
+    }
+}

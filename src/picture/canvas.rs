@@ -1,0 +1,219 @@
+//! The pixel raster that everything is drawn on, and its PNG file.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// A colour as red, green and blue bytes (sRGB).
+pub type Colour = [u8; 3];
+
+/// Ink of frames, ticks and letters.
+pub const INK: Colour = [38, 38, 42];
+
+/// Ink of auxiliary lines that must not compete with the data.
+pub const PALE_INK: Colour = [176, 176, 182];
+
+/// A finished picture: rows from top to bottom, three bytes per pixel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels per row.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+    /// Red, green and blue of each pixel; `3 * width * height` bytes.
+    pub rgb: Vec<u8>,
+}
+
+impl Image {
+    /// A white picture of the given size.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            rgb: vec![255; 3 * width as usize * height as usize],
+        }
+    }
+
+    /// Writes the picture as an eight-bit RGB PNG file.
+    pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
+        let mut encoder =
+            png::Encoder::new(BufWriter::new(File::create(path)?), self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        Ok(writer.finish()?)
+    }
+
+    /// The colour of the pixel in `column` and `row`.
+    ///
+    /// # Panics
+    ///
+    /// If the pixel lies outside the picture.
+    pub fn pixel(&self, column: u32, row: u32) -> Colour {
+        assert!(column < self.width && row < self.height);
+        let start = 3 * (row as usize * self.width as usize + column as usize);
+        [self.rgb[start], self.rgb[start + 1], self.rgb[start + 2]]
+    }
+
+    /// Fills the pixels of columns `left..right` and rows `top..bottom`,
+    /// leaving out what lies outside the picture.
+    pub fn fill_rectangle(&mut self, [left, right]: [i64; 2], rows: [i64; 2], colour: Colour) {
+        let left = left.clamp(0, i64::from(self.width)) as usize;
+        let right = right.clamp(0, i64::from(self.width)) as usize;
+        if left >= right {
+            return;
+        }
+        let top = rows[0].clamp(0, i64::from(self.height)) as usize;
+        let bottom = rows[1].clamp(0, i64::from(self.height)) as usize;
+        for row in top..bottom {
+            let start = row * self.width as usize;
+            let span = &mut self.rgb[3 * (start + left)..3 * (start + right)];
+            for pixel in span.chunks_exact_mut(3) {
+                pixel.copy_from_slice(&colour);
+            }
+        }
+    }
+
+    /// Fills the pixels whose centres lie inside a convex polygon.
+    ///
+    /// Centres on a left or upper edge belong to the polygon, centres on a
+    /// right or lower edge do not, so polygons that share an edge share no pixel.
+    pub fn fill_polygon(&mut self, corners: &[[f64; 2]], colour: Colour) {
+        let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
+        let first = first_centre(top).max(0);
+        let last = first_centre(bottom).min(i64::from(self.height));
+        for row in first..last {
+            let centre = row as f64 + 0.5;
+            let crossings = corners
+                .iter()
+                .zip(corners.iter().cycle().skip(1))
+                .filter(|(from, to)| (from[1] <= centre) != (to[1] <= centre))
+                .map(|(from, to)| {
+                    from[0] + (centre - from[1]) / (to[1] - from[1]) * (to[0] - from[0])
+                });
+            let (left, right) = extremes(crossings);
+            if left <= right {
+                let columns = [first_centre(left), first_centre(right)];
+                self.fill_rectangle(columns, [row, row + 1], colour);
+            }
+        }
+    }
+
+    /// Draws a straight line; one along a row or a column covers whole pixels
+    /// to stay crisp, any other is smoothed.
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64, colour: Colour) {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let length = along[0].hypot(along[1]);
+        if along[0] == 0.0 || along[1] == 0.0 {
+            let [columns, rows] = [0, 1].map(|axis| {
+                let whole = thickness.round().max(1.0);
+                let low = (from[axis].min(to[axis]) - whole / 2.0).round();
+                [low as i64, (low + along[axis].abs().round() + whole) as i64]
+            });
+            self.fill_rectangle(columns, rows, colour);
+            return;
+        }
+        let reach = thickness / 2.0 + 1.0;
+        let [columns, rows] = [0, 1].map(|axis| {
+            let low = from[axis].min(to[axis]) - reach;
+            low.floor() as i64..(low + along[axis].abs() + 2.0 * reach).ceil() as i64
+        });
+        for row in rows {
+            for column in columns.clone() {
+                let offset = [column as f64 + 0.5 - from[0], row as f64 + 0.5 - from[1]];
+                let part = (offset[0] * along[0] + offset[1] * along[1]) / (length * length);
+                let part = part.clamp(0.0, 1.0);
+                let distance = (offset[0] - part * along[0]).hypot(offset[1] - part * along[1]);
+                self.blend(column, row, thickness / 2.0 + 0.5 - distance, colour);
+            }
+        }
+    }
+
+    /// Mixes `colour` into one pixel, `coverage` being its share from 0 to 1.
+    pub fn blend(&mut self, column: i64, row: i64, coverage: f64, colour: Colour) {
+        let inside = (0..i64::from(self.width)).contains(&column)
+            && (0..i64::from(self.height)).contains(&row);
+        if !inside || coverage <= 0.0 {
+            return;
+        }
+        let share = coverage.min(1.0);
+        let start = 3 * (row as usize * self.width as usize + column as usize);
+        for (under, over) in self.rgb[start..start + 3].iter_mut().zip(colour) {
+            *under = (f64::from(*under) * (1.0 - share) + f64::from(over) * share).round() as u8;
+        }
+    }
+}
+
+/// The first row or column whose pixel centre is not before `edge`.
+fn first_centre(edge: f64) -> i64 {
+    (edge - 0.5).ceil() as i64
+}
+
+/// Smallest and largest of some numbers; an inverted pair if there are none.
+fn extremes(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
+    numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), number| {
+        (low.min(number), high.max(number))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RED: Colour = [255, 0, 0];
+
+    fn red_pixels(image: &Image) -> usize {
+        image.rgb.chunks(3).filter(|pixel| **pixel == RED).count()
+    }
+
+    #[test]
+    fn rectangles_are_clipped_to_the_picture() {
+        let mut image = Image::new(10, 5);
+        image.fill_rectangle([-3, 2], [4, 99], RED);
+        assert_eq!(red_pixels(&image), 2);
+        assert_eq!(image.pixel(0, 4), RED);
+        image.fill_rectangle([12, 20], [0, 5], RED);
+        assert_eq!(red_pixels(&image), 2);
+    }
+
+    #[test]
+    fn polygons_that_share_an_edge_share_no_pixel_and_leave_no_gap() {
+        let mut image = Image::new(20, 20);
+        image.fill_polygon(&[[2.5, 2.5], [14.5, 2.5], [2.5, 14.5]], RED);
+        let first = red_pixels(&image);
+        let mut other = Image::new(20, 20);
+        other.fill_polygon(&[[14.5, 2.5], [14.5, 14.5], [2.5, 14.5]], RED);
+        let second = red_pixels(&other);
+        image.fill_polygon(&[[14.5, 2.5], [14.5, 14.5], [2.5, 14.5]], RED);
+        assert_eq!(red_pixels(&image), first + second);
+        assert_eq!(first + second, 144);
+    }
+
+    #[test]
+    fn lines_have_the_asked_thickness() {
+        let mut image = Image::new(20, 20);
+        image.line([5.0, 10.0], [15.0, 10.0], 2.0, RED);
+        assert_eq!(red_pixels(&image), 24);
+        let mut image = Image::new(20, 20);
+        image.line([2.0, 2.0], [18.0, 18.0], 3.0, RED);
+        assert_eq!(image.pixel(10, 10), RED);
+        assert_eq!(image.pixel(10, 15), [255; 3]);
+    }
+
+    #[test]
+    fn png_file_holds_the_pixels() {
+        let mut image = Image::new(7, 3);
+        image.fill_rectangle([1, 3], [1, 2], RED);
+        let name = format!("picture_canvas_{}.png", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        image.write_png(&path).unwrap();
+        let file = std::io::BufReader::new(File::open(&path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let information = reader.next_frame(&mut bytes).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!((information.width, information.height), (7, 3));
+        assert_eq!(bytes, image.rgb);
+    }
+}

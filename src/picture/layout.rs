@@ -1,0 +1,173 @@
+//! Where on the picture everything goes.
+
+use super::projection::Projection;
+
+/// The arrangement of a picture; lengths in pixels, downwards from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// Width of the whole picture.
+    pub width: f64,
+    /// Height of the whole picture.
+    pub height: f64,
+    /// Size of the text; all margins are multiples of it.
+    pub text: f64,
+    /// Left and right edge of the frame.
+    pub columns: [f64; 2],
+    /// Top and bottom edge of the frame.
+    pub rows: [f64; 2],
+    /// Left, right, top and bottom edge of the colour bar.
+    pub bar: Bar,
+    /// Pixels per metre.
+    pub scale: f64,
+    /// The place in the drawing plane at the lower left corner of the frame (m).
+    origin: [f64; 2],
+}
+
+/// The place of the colour bar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bar {
+    /// Left and right edge.
+    pub columns: [f64; 2],
+    /// Top and bottom edge.
+    pub rows: [f64; 2],
+    /// Whether it stands to the right of the frame instead of lying below it.
+    pub upright: bool,
+}
+
+/// Margin in text sizes that the labels on the left of the frame need.
+const LEFT: f64 = 5.2;
+/// Margin in text sizes that the title needs.
+const TOP: f64 = 3.4;
+/// Margin in text sizes that the labels below the frame need.
+const BOTTOM: f64 = 4.2;
+/// Room in text sizes for an upright colour bar and its labels.
+const UPRIGHT_BAR: f64 = 8.0;
+/// Room in text sizes for a lying colour bar and its labels.
+const LYING_BAR: f64 = 5.4;
+/// Margin in text sizes where there is nothing.
+const EMPTY: f64 = 2.2;
+/// Least height of the frame in text sizes.
+const LEAST_HEIGHT: f64 = 3.4;
+/// Least height of a frame in text sizes that an upright bar may stand beside.
+const UPRIGHT_HEIGHT: f64 = 11.0;
+/// Greatest height of the frame as a share of the width of the picture.
+const GREATEST_HEIGHT: f64 = 1.1;
+
+impl Layout {
+    /// The arrangement for a drawing that extends between two places of the
+    /// drawing plane.
+    pub fn new(width: u32, [low, high]: [[f64; 2]; 2], projection: Projection) -> Self {
+        let width = f64::from(width);
+        let text = (width * 0.0185).max(6.0);
+        let left = if projection == Projection::Strip {
+            EMPTY
+        } else {
+            LEFT
+        } * text;
+        let extent = [0, 1].map(|direction| high[direction] - low[direction]);
+        let extent = match projection {
+            Projection::Strip => [extent[0], 0.0],
+            Projection::Flat(_) | Projection::Isometric => extent,
+        };
+        let scale_beside = |right: f64| {
+            let across = (width - left - right * text) / extent[0];
+            across.min(GREATEST_HEIGHT * width / extent[1])
+        };
+        let upright = scale_beside(UPRIGHT_BAR) * extent[1] >= UPRIGHT_HEIGHT * text;
+        let right = if upright { UPRIGHT_BAR } else { EMPTY };
+        let scale = scale_beside(right);
+
+        let least = [LEAST_HEIGHT * 2.0 * text, LEAST_HEIGHT * text];
+        let size =
+            [0, 1].map(|direction| (extent[direction] * scale).max(least[direction]).round());
+        let spare = (width - left - right * text - size[0]).max(0.0);
+        let columns = [0.0, size[0]].map(|offset| (left + spare / 2.0).round() + offset);
+        let rows = [0.0, size[1]].map(|offset| (TOP * text).round() + offset);
+        let below = rows[1] + BOTTOM * text;
+        let bar = if upright {
+            let start = (columns[1] + 1.3 * text).round();
+            Bar {
+                columns: [start, start + text.round()],
+                rows,
+                upright,
+            }
+        } else {
+            let start = (below + 0.4 * text).round();
+            Bar {
+                columns,
+                rows: [start, start + text.round()],
+                upright,
+            }
+        };
+        let height = below + if upright { 0.0 } else { LYING_BAR * text };
+        Self {
+            width,
+            height: height.ceil(),
+            text,
+            columns,
+            rows,
+            bar,
+            scale,
+            origin: [0, 1].map(|direction| {
+                (low[direction] + high[direction] - size[direction] / scale) / 2.0
+            }),
+        }
+    }
+
+    /// The pixel coordinates of a place in the drawing plane.
+    pub fn pixel(&self, [across, up]: [f64; 2]) -> [f64; 2] {
+        [
+            self.columns[0] + (across - self.origin[0]) * self.scale,
+            self.rows[1] - (up - self.origin[1]) * self.scale,
+        ]
+    }
+
+    /// Lower left and upper right corner of the frame in the drawing plane.
+    pub fn visible(&self) -> [[f64; 2]; 2] {
+        let size = [
+            self.columns[1] - self.columns[0],
+            self.rows[1] - self.rows[0],
+        ];
+        let end = [0, 1].map(|direction| self.origin[direction] + size[direction] / self.scale);
+        [self.origin, end]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scene::Axis;
+    use super::*;
+
+    const PLANE: Projection = Projection::Flat([Axis::X, Axis::Y]);
+
+    #[test]
+    fn frame_keeps_the_shape_of_the_drawing() {
+        for extent in [[2.0, 1.0], [1.0, 1.0], [1.0, 3.0]] {
+            let layout = Layout::new(1200, [[0.0; 2], extent], PLANE);
+            let width = layout.columns[1] - layout.columns[0];
+            let height = layout.rows[1] - layout.rows[0];
+            assert!((width / height - extent[0] / extent[1]).abs() < 0.01);
+            assert!(layout.columns[0] > 0.0 && layout.rows[1] < layout.height);
+            assert!(layout.bar.upright && layout.bar.columns[1] < layout.width);
+        }
+    }
+
+    #[test]
+    fn thin_drawings_get_a_frame_of_least_height_and_a_lying_bar() {
+        for extent in [[1.0, 1e-6], [1.0, 0.0]] {
+            let layout = Layout::new(1200, [[0.0; 2], extent], PLANE);
+            assert!(layout.rows[1] - layout.rows[0] >= LEAST_HEIGHT * layout.text - 1.0);
+            assert!(!layout.bar.upright && layout.bar.rows[0] > layout.rows[1]);
+        }
+    }
+
+    #[test]
+    fn middle_of_the_drawing_is_the_middle_of_the_frame() {
+        let layout = Layout::new(1000, [[1.0, 2.0], [3.0, 2.5]], PLANE);
+        let [column, row] = layout.pixel([2.0, 2.25]);
+        assert!((column - (layout.columns[0] + layout.columns[1]) / 2.0).abs() < 1e-9);
+        assert!((row - (layout.rows[0] + layout.rows[1]) / 2.0).abs() < 1e-9);
+        let [low, high] = layout.visible();
+        assert!((low[0] + high[0] - 4.0).abs() < 1e-9 && low[1] < high[1]);
+    }
+}

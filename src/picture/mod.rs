@@ -1,0 +1,170 @@
+//! Pictures of point clouds: coloured cells in a frame with ticks, a title
+//! and a colour bar, as PNG files and without any other program.
+//!
+//! ```
+//! # use fissure::picture::{Scene, View, render};
+//! let scene = Scene {
+//!     dimension: 2,
+//!     positions: &[[0.0, 0.0, 0.0], [0.001, 0.0, 0.0]],
+//!     sizes: &[0.001, 0.001],
+//!     values: &[0.0, 0.4],
+//!     field: "damage",
+//!     unit: "",
+//!     title: "two points",
+//!     range: Some((0.0, 1.0)),
+//!     view: View::Plane,
+//!     width: 600,
+//! };
+//! let image = render(&scene);
+//! assert_eq!(image.width, 600);
+//! ```
+
+mod axes;
+mod canvas;
+mod colours;
+mod layout;
+mod lettering;
+mod points;
+mod projection;
+mod scale;
+mod scene;
+
+pub use canvas::Image;
+pub use scene::{Axis, Scene, View};
+
+use axes::{Pen, Ruler};
+use canvas::PALE_INK;
+use layout::Layout;
+use lettering::{Lettering, Running};
+use points::Colouring;
+use projection::{Bounds, Projection};
+use scale::Scale;
+
+/// Draws a scene.
+pub fn render(scene: &Scene) -> Image {
+    let marks = scene.marks();
+    let projection = Projection::of(scene);
+    let bounds = Bounds::of(&marks);
+    let width = scene.width.clamp(200, 16_384);
+    let layout = Layout::new(width, bounds.projected(projection), projection);
+    let colouring = Colouring {
+        map: scene.colours(),
+        range: scene.colour_range(&marks),
+    };
+    let mut image = Image::new(width, layout.height as u32);
+    let lettering = Lettering::new();
+    let mut pen = Pen {
+        image: &mut image,
+        lettering: &lettering,
+        text: layout.text,
+    };
+
+    if marks.is_empty() {
+        pen.outline(layout.columns, layout.rows);
+        let centre = [layout.columns, layout.rows].map(|[low, high]| (low + high) / 2.0);
+        pen.write("no points", centre, Running::Across);
+    } else {
+        if projection == Projection::Isometric {
+            hidden_edges(&mut pen, &layout, &bounds);
+        }
+        points::paint(pen.image, &marks, colouring, &layout, projection);
+        match projection {
+            Projection::Strip => flat_frame(&mut pen, &layout, &[Axis::X]),
+            Projection::Flat(axes) => flat_frame(&mut pen, &layout, &axes),
+            Projection::Isometric => box_rulers(&mut pen, &layout, &bounds),
+        }
+    }
+    pen.colour_bar(&layout.bar, colouring, scene.field, scene.unit);
+    title(&mut pen, &layout, scene.title);
+    image
+}
+
+/// Writes the title above the frame, smaller if it is too long.
+fn title(pen: &mut Pen, layout: &Layout, title: &str) {
+    let size = 1.15 * layout.text;
+    let room = layout.width - 2.0 * layout.text;
+    let length = pen.lettering.length(title, size);
+    let size = size * (room / length).min(1.0);
+    let half = (length / 2.0).min(room / 2.0);
+    let middle = (layout.columns[0] + layout.columns[1]) / 2.0;
+    let middle = middle.clamp(layout.text + half, layout.width - layout.text - half);
+    let centre = [middle, layout.rows[0] - 1.5 * layout.text];
+    let usual = std::mem::replace(&mut pen.text, size);
+    pen.write(title, centre, Running::Across);
+    pen.text = usual;
+}
+
+/// Number of ticks that fit on a ruler whose labels need `spacing` text sizes.
+fn ticks_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
+    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+    ((length / (spacing * text)) as usize).clamp(2, 10)
+}
+
+/// Draws the frame of a flat view with a ruler below it and, given a second
+/// axis, one on its left.
+fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
+    pen.outline(layout.columns, layout.rows);
+    let ([left, right], [top, bottom]) = (layout.columns, layout.rows);
+    let [low, high] = layout.visible();
+    let used = || (0..axes.len()).flat_map(|direction| [low[direction], high[direction]]);
+    let magnitude = used().fold(0.0, |largest: f64, number| largest.max(number.abs()));
+    let ends = [
+        ([left, bottom], [right, bottom], [0.0, 1.0], 5.0),
+        ([left, bottom], [left, top], [-1.0, 0.0], 2.6),
+    ];
+    for (direction, (axis, (from, to, outward, spacing))) in axes.iter().zip(ends).enumerate() {
+        let most = ticks_on(from, to, spacing, layout.text);
+        let scale = Scale::new(low[direction], high[direction], "m", magnitude, most);
+        let name = axis.letter();
+        pen.ruler(&Ruler {
+            from,
+            to,
+            outward,
+            scale: &scale,
+            name,
+        });
+    }
+}
+
+/// Draws the edges of the box that meet in the corner behind the points.
+fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
+    let place = |corner| layout.pixel(Projection::Isometric.project(bounds.corner(corner)));
+    let hidden = [false, true, false];
+    for axis in 0..3 {
+        let mut neighbour = hidden;
+        neighbour[axis] = !neighbour[axis];
+        let thickness = pen.thickness();
+        pen.image
+            .line(place(hidden), place(neighbour), thickness, PALE_INK);
+    }
+}
+
+/// Draws rulers along three outer edges of the box, and the axis triad.
+fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
+    let place = |corner| layout.pixel(Projection::Isometric.project(bounds.corner(corner)));
+    let magnitude = bounds.magnitude(&[Axis::X, Axis::Y, Axis::Z]);
+    let slope = 0.75_f64.sqrt();
+    let rulers = [
+        (Axis::X, [false, false, false], [-0.5, slope]),
+        (Axis::Y, [true, false, false], [0.5, slope]),
+        (Axis::Z, [false, false, false], [-1.0, 0.0]),
+    ];
+    for (axis, start, outward) in rulers {
+        let mut end = start;
+        end[axis.index()] = true;
+        let (from, to) = (place(start), place(end));
+        let most = ticks_on(from, to, 3.4, layout.text);
+        let index = axis.index();
+        let scale = Scale::new(bounds.low[index], bounds.high[index], "m", magnitude, most);
+        let name = axis.letter();
+        pen.ruler(&Ruler {
+            from,
+            to,
+            outward,
+            scale: &scale,
+            name,
+        });
+    }
+    let corner = [layout.columns[0], layout.rows[0]];
+    pen.triad([corner[0] + layout.text, corner[1] + 3.2 * layout.text]);
+}

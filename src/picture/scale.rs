@@ -1,0 +1,202 @@
+//! Ticks at round numbers and units with SI prefixes.
+
+/// One marked place of a scale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tick {
+    /// Place from 0 (low end) to 1 (high end).
+    pub fraction: f64,
+    /// The number written there.
+    pub label: String,
+}
+
+/// The ticks between two numbers and the unit their labels are in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    /// The ticks from low to high.
+    pub ticks: Vec<Tick>,
+    /// The unit, with prefix or power of ten; may be empty.
+    pub unit: String,
+}
+
+impl Scale {
+    /// A scale from `low` to `high` with about `most` ticks or fewer.
+    ///
+    /// `magnitude` is the largest number the prefix must suit; scales that
+    /// belong together are given the same one.
+    pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most: usize) -> Self {
+        let (exponent, unit) = prefixed(unit, magnitude);
+        let factor = 10_f64.powi(-exponent);
+        let (step, ticks) = round_numbers(low * factor, high * factor, most);
+        let decimals = (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
+        let ticks = ticks
+            .into_iter()
+            .map(|number| Tick {
+                fraction: (number / factor - low) / (high - low),
+                label: format!("{number:.decimals$}").replace('-', "−"),
+            })
+            .collect();
+        Self { ticks, unit }
+    }
+
+    /// The name of a quantity followed by the unit in parentheses, if any.
+    pub fn caption(&self, name: &str) -> String {
+        if self.unit.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{name} ({})", self.unit)
+        }
+    }
+}
+
+/// Multiples of a step of 1, 2 or 5 times a power of ten that lie within
+/// `low..=high`, at most `most + 1` of them, preceded by the step.
+pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
+    let coarse = (high - low) / most.max(1) as f64;
+    if !(coarse.is_finite() && coarse > 0.0) {
+        return (1.0, Vec::new());
+    }
+    let power = 10_f64.powi(coarse.log10().floor() as i32);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|digit| digit * power)
+        .into_iter()
+        .find(|step| *step >= coarse * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power);
+    let first = (low / step - 1e-6).ceil();
+    let last = (high / step + 1e-6).floor();
+    let count = (last - first + 1.0).clamp(0.0, most as f64 + 1.0) as usize;
+    // Adding zero turns a negative zero into a positive one.
+    let numbers = (0..count).map(|index| (first + index as f64) * step + 0.0);
+    (step, numbers.collect())
+}
+
+/// SI prefixes with their powers of ten.
+const PREFIXES: [(i32, &str); 10] = [
+    (-15, "f"),
+    (-12, "p"),
+    (-9, "n"),
+    (-6, "µ"),
+    (-3, "m"),
+    (0, ""),
+    (3, "k"),
+    (6, "M"),
+    (9, "G"),
+    (12, "T"),
+];
+
+/// Symbols that take a prefix. Others have one already (kg, MPa) or do not
+/// take one (°C, %).
+const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
+
+/// The power of ten that numbers as large as `magnitude` are written in, and
+/// the unit that says so: "MPa", or "×10⁻³" where no prefix is possible.
+pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
+    let size = magnitude.abs();
+    if !(size.is_finite() && size > 0.0) {
+        return (0, unit.to_owned());
+    }
+    let exponent = 3 * ((size.log10() + 1e-9) / 3.0).floor() as i32;
+    if takes_prefix(unit) {
+        let exponent = exponent.clamp(-15, 12);
+        let prefix = PREFIXES
+            .iter()
+            .find(|(power, _)| *power == exponent)
+            .map_or("", |(_, prefix)| prefix);
+        (exponent, format!("{prefix}{unit}"))
+    } else if (0.01..1e4).contains(&size) {
+        (0, unit.to_owned())
+    } else {
+        let factor = format!("×10{} {unit}", superscript(exponent));
+        (exponent, factor.trim_end().to_owned())
+    }
+}
+
+/// Whether a prefix before the unit scales the whole of it: true for "m/s",
+/// false for "m²", whose "mm²" would be a millionth.
+fn takes_prefix(unit: &str) -> bool {
+    let end = unit
+        .find(|character: char| !character.is_ascii_alphabetic())
+        .unwrap_or(unit.len());
+    let (symbol, rest) = unit.split_at(end);
+    PREFIXABLE.contains(&symbol) && (rest.is_empty() || rest.starts_with(['/', '·', ' ', '*']))
+}
+
+/// An integer in raised characters.
+fn superscript(number: i32) -> String {
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    number
+        .to_string()
+        .chars()
+        .map(|character| match character.to_digit(10) {
+            Some(digit) => RAISED[digit as usize],
+            None => '⁻',
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(low: f64, high: f64, unit: &str, most: usize) -> (Vec<String>, String) {
+        let magnitude = low.abs().max(high.abs());
+        let scale = Scale::new(low, high, unit, magnitude, most);
+        let labels = scale.ticks.into_iter().map(|tick| tick.label).collect();
+        (labels, scale.unit)
+    }
+
+    #[test]
+    fn ticks_are_round_numbers_inside_the_range() {
+        assert_eq!(
+            round_numbers(0.0, 1.0, 5),
+            (0.2, vec![0.0, 0.2, 0.4, 0.6000000000000001, 0.8, 1.0])
+        );
+        assert_eq!(round_numbers(-3.0, 7.0, 4), (5.0, vec![0.0, 5.0]));
+        assert_eq!(round_numbers(2.0, 2.0, 4).1, Vec::<f64>::new());
+        assert_eq!(round_numbers(f64::NAN, 2.0, 4).1, Vec::<f64>::new());
+        for exponent in -20..20 {
+            let high = 7.3 * 10_f64.powi(exponent);
+            for most in 2..12 {
+                let (step, ticks) = round_numbers(-high, high, most);
+                assert!(ticks.len() > most / 3 && ticks.len() <= most + 1);
+                assert!(ticks.iter().all(|tick| tick.abs() <= high));
+                let steps = ticks.windows(2).map(|pair| (pair[1] - pair[0]) / step);
+                assert!(steps.into_iter().all(|ratio| (ratio - 1.0).abs() < 1e-9));
+            }
+        }
+    }
+
+    #[test]
+    fn labels_are_in_prefixed_units_with_the_decimals_they_need() {
+        let (numbers, unit) = labels(-0.01, 0.11, "m", 6);
+        assert_eq!(numbers, ["0", "20", "40", "60", "80", "100"]);
+        assert_eq!(unit, "mm");
+        let (numbers, unit) = labels(-1.5e-6, 1.5e-6, "m", 3);
+        assert_eq!(numbers, ["−1", "0", "1"]);
+        assert_eq!(unit, "µm");
+        let (numbers, unit) = labels(0.0, 0.6, "", 4);
+        assert_eq!(numbers, ["0.0", "0.2", "0.4", "0.6"]);
+        assert_eq!(unit, "");
+        assert_eq!(labels(0.0, 2.5e9, "Pa", 3).1, "GPa");
+    }
+
+    #[test]
+    fn prefixes_suit_the_unit() {
+        assert_eq!(prefixed("m", 1.0), (0, "m".to_owned()));
+        assert_eq!(prefixed("m", 0.001), (-3, "mm".to_owned()));
+        assert_eq!(prefixed("m", 1000.0), (3, "km".to_owned()));
+        assert_eq!(prefixed("Pa", 3.2e7), (6, "MPa".to_owned()));
+        assert_eq!(prefixed("J/m³", 4.0e4), (3, "kJ/m³".to_owned()));
+        assert_eq!(prefixed("m²", 2.0e-5), (-6, "×10⁻⁶ m²".to_owned()));
+        assert_eq!(prefixed("", 5.0e-3), (-3, "×10⁻³".to_owned()));
+        assert_eq!(prefixed("MPa", 50.0), (0, "MPa".to_owned()));
+        assert_eq!(prefixed("m", 0.0), (0, "m".to_owned()));
+        assert_eq!(prefixed("m", 1e-30), (-15, "fm".to_owned()));
+    }
+
+    #[test]
+    fn captions_name_the_unit_only_if_there_is_one() {
+        let scale = |unit| Scale::new(0.0, 1.0, unit, 1.0, 5);
+        assert_eq!(scale("m").caption("x"), "x (m)");
+        assert_eq!(scale("").caption("damage"), "damage");
+    }
+}

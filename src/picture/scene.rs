@@ -1,0 +1,279 @@
+//! What is to be drawn: points with values, and the view of them.
+
+use super::colours::ColourMap;
+
+/// A direction of space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// The first coordinate.
+    X,
+    /// The second coordinate.
+    Y,
+    /// The third coordinate.
+    Z,
+}
+
+impl Axis {
+    /// The place of the coordinate in a position.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The name of the coordinate.
+    pub fn letter(self) -> &'static str {
+        ["x", "y", "z"][self.index()]
+    }
+
+    /// The other two directions, in order.
+    pub fn others(self) -> [Self; 2] {
+        match self {
+            Self::X => [Self::Y, Self::Z],
+            Self::Y => [Self::X, Self::Z],
+            Self::Z => [Self::X, Self::Y],
+        }
+    }
+}
+
+/// The way a scene is looked at.
+///
+/// Only bodies of three dimensions have a choice: those of one are drawn as
+/// a strip, those of two in their plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum View {
+    /// Along z onto the x-y plane.
+    Plane,
+    /// The layer of points at a coordinate, seen along that axis.
+    Slice {
+        /// The normal of the layer.
+        axis: Axis,
+        /// Coordinate of the layer (m).
+        position: f64,
+    },
+    /// Isometric, without perspective: x to the lower right, y to the upper
+    /// right, z up.
+    Orthographic,
+}
+
+/// A point cloud with everything that is written beside it.
+///
+/// The slices are read as far as the shortest of them; points with positions
+/// that are not finite are left out.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// Dimension of the body: 1, 2 or 3.
+    pub dimension: usize,
+    /// Deformed positions (m).
+    pub positions: &'a [[f64; 3]],
+    /// Edge length of the cell of each point (m).
+    pub sizes: &'a [f64],
+    /// Value of each point, shown as its colour; NaN is shown grey.
+    pub values: &'a [f64],
+    /// Name of the values, for the colour bar; "damage" in it selects the
+    /// colour map that sets cracks off.
+    pub field: &'a str,
+    /// Unit of the values without prefix, empty if they have none.
+    pub unit: &'a str,
+    /// Line above the picture.
+    pub title: &'a str,
+    /// Values at the ends of the colour bar; `None` for those that occur.
+    pub range: Option<(f64, f64)>,
+    /// The way the points are looked at.
+    pub view: View,
+    /// Width of the picture in pixels, from 200 to 16384.
+    pub width: u32,
+}
+
+/// One point that is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mark {
+    /// Where it is (m).
+    pub position: [f64; 3],
+    /// Edge length of its cell (m), zero if the given one was unusable.
+    pub size: f64,
+    /// Its value.
+    pub value: f64,
+}
+
+/// Coordinates beyond this are taken for the debris of a failed computation.
+const LARGEST_COORDINATE: f64 = 1e100;
+
+impl Scene<'_> {
+    /// The view after what the dimension allows.
+    pub fn effective_view(&self) -> View {
+        if self.dimension < 3 {
+            View::Plane
+        } else {
+            self.view
+        }
+    }
+
+    /// The points to draw, in the order in which they are painted.
+    pub fn marks(&self) -> Vec<Mark> {
+        let mut marks: Vec<Mark> = self
+            .positions
+            .iter()
+            .zip(self.sizes)
+            .zip(self.values)
+            .map(|((position, size), value)| Mark {
+                position: self.without_unused(*position),
+                size: if (0.0..LARGEST_COORDINATE).contains(size) {
+                    *size
+                } else {
+                    0.0
+                },
+                value: *value,
+            })
+            .filter(|mark| {
+                let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
+                mark.position.iter().all(usable)
+            })
+            .collect();
+        match self.effective_view() {
+            View::Plane if self.dimension == 3 => sort_by_key(&mut marks, |mark| mark.position[2]),
+            // Where cells overlap or share a pixel, damage must stay visible.
+            View::Plane if self.colours() == ColourMap::Damage => {
+                sort_by_key(&mut marks, |mark| mark.value.max(0.0));
+            }
+            View::Plane => {}
+            View::Slice { axis, position } => {
+                // Deformed layers may gape: the reach is a little more than
+                // half a cell, and the nearest points are painted last.
+                let distance = |mark: &Mark| (mark.position[axis.index()] - position).abs();
+                marks.retain(|mark| distance(mark) <= 0.75 * mark.size);
+                sort_by_key(&mut marks, |mark| -distance(mark));
+            }
+            View::Orthographic => sort_by_key(&mut marks, |mark| {
+                mark.position[0] - mark.position[1] + mark.position[2]
+            }),
+        }
+        marks
+    }
+
+    /// The position with zero for coordinates the body does not have.
+    fn without_unused(&self, mut position: [f64; 3]) -> [f64; 3] {
+        for coordinate in position.iter_mut().skip(self.dimension.max(1)) {
+            *coordinate = 0.0;
+        }
+        position
+    }
+
+    /// The colour map of the field.
+    pub fn colours(&self) -> ColourMap {
+        ColourMap::for_field(self.field)
+    }
+
+    /// The values at the ends of the colour bar, the first less than the second.
+    pub fn colour_range(&self, marks: &[Mark]) -> (f64, f64) {
+        let given = self
+            .range
+            .filter(|(low, high)| low.is_finite() && high.is_finite())
+            .map(|(low, high)| (low.min(high), low.max(high)));
+        let occurring = || {
+            let finite = marks.iter().map(|mark| mark.value);
+            let (low, high) = finite
+                .filter(|value| value.is_finite())
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                    (low.min(value), high.max(value))
+                });
+            // Damage is a share of what was there: undamaged is always the low end.
+            match self.colours() {
+                ColourMap::Damage => (low.min(0.0), high.max(0.0)),
+                ColourMap::General => (low, high),
+            }
+        };
+        let (low, high) = given.unwrap_or_else(occurring);
+        widened(low, high, self.colours())
+    }
+}
+
+/// Sorts in ascending order of a number, equal ones staying as they are.
+fn sort_by_key(marks: &mut [Mark], key: impl Fn(&Mark) -> f64) {
+    marks.sort_by(|one, other| key(one).total_cmp(&key(other)));
+}
+
+/// The range, or a wider one if its ends are equal up to rounding.
+fn widened(low: f64, high: f64, colours: ColourMap) -> (f64, f64) {
+    let size = low.abs().max(high.abs());
+    let spread = high - low;
+    if spread.is_finite() && spread > 1e-12 * size {
+        (low, high)
+    } else if !spread.is_finite() || colours == ColourMap::Damage {
+        (0.0, 1.0)
+    } else if size > 0.0 {
+        (low - 0.1 * size, high + 0.1 * size)
+    } else {
+        (-1.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: [f64; 3] = [1.0; 3];
+
+    fn scene<'a>(positions: &'a [[f64; 3]], values: &'a [f64], view: View) -> Scene<'a> {
+        Scene {
+            dimension: 3,
+            positions,
+            sizes: &SIZES,
+            values,
+            field: "velocity",
+            unit: "m/s",
+            title: "",
+            range: None,
+            view,
+            width: 400,
+        }
+    }
+
+    #[test]
+    fn slice_keeps_the_layer_and_paints_the_nearest_last() {
+        let positions = [[0.0, 0.0, 0.1], [0.0, 0.0, 5.0], [0.0, 0.0, 0.6]];
+        let view = View::Slice {
+            axis: Axis::Z,
+            position: 0.0,
+        };
+        let marks = scene(&positions, &[1.0, 2.0, 3.0], view).marks();
+        let values: Vec<f64> = marks.iter().map(|mark| mark.value).collect();
+        assert_eq!(values, [3.0, 1.0]);
+    }
+
+    #[test]
+    fn isometric_view_paints_from_back_to_front() {
+        let positions = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 1.0]];
+        let marks = scene(&positions, &[1.0, 2.0, 3.0], View::Orthographic).marks();
+        let values: Vec<f64> = marks.iter().map(|mark| mark.value).collect();
+        assert_eq!(values, [2.0, 1.0, 3.0]);
+    }
+
+    #[test]
+    fn unusable_positions_are_left_out() {
+        let positions = [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0; 3]];
+        let marks = scene(&positions, &[1.0, 2.0, 3.0], View::Plane).marks();
+        assert_eq!(marks.len(), 1);
+        assert_eq!(marks[0].value, 3.0);
+    }
+
+    #[test]
+    fn colour_range_is_given_or_occurring_and_never_empty() {
+        let range = |values: &[f64], field, range| {
+            let scene = Scene {
+                field,
+                range,
+                ..scene(&[[0.0; 3]; 3], values, View::Plane)
+            };
+            scene.colour_range(&scene.marks())
+        };
+        assert_eq!(range(&[1.0, f64::NAN, 4.0], "speed", None), (1.0, 4.0));
+        assert_eq!(
+            range(&[1.0, 2.0, 4.0], "speed", Some((9.0, 0.0))),
+            (0.0, 9.0)
+        );
+        assert_eq!(range(&[2.0; 3], "speed", None), (1.8, 2.2));
+        assert_eq!(range(&[0.0; 3], "speed", None), (-1.0, 1.0));
+        assert_eq!(range(&[f64::NAN; 3], "speed", None), (0.0, 1.0));
+        assert_eq!(range(&[0.0; 3], "damage", None), (0.0, 1.0));
+        assert_eq!(range(&[0.2, 0.3, 0.4], "damage", None), (0.0, 0.4));
+    }
+}
