@@ -1,0 +1,75 @@
+//! Numbers for people.
+
+/// A value with an SI prefix and its unit, such as `50.0 µs`.
+pub fn si(value: f64, unit: &str) -> String {
+    const PREFIXES: [(f64, &str); 9] = [
+        (1e12, "T"),
+        (1e9, "G"),
+        (1e6, "M"),
+        (1e3, "k"),
+        (1.0, ""),
+        (1e-3, "m"),
+        (1e-6, "µ"),
+        (1e-9, "n"),
+        (1e-12, "p"),
+    ];
+    let size = value.abs();
+    // Half a unit of the last digit shown, so that 999.96 is not shown as 1000.0.
+    let prefix = PREFIXES.iter().find(|(factor, _)| size >= 0.99995 * factor);
+    match prefix {
+        Some((factor, prefix)) => format!("{:.4} {prefix}{unit}", Digits(value / factor)),
+        None if value == 0.0 => format!("0 {unit}"),
+        None => format!("{value:.3e} {unit}"),
+    }
+}
+
+/// A number shown with so many significant digits as its precision says.
+struct Digits(f64);
+
+impl std::fmt::Display for Digits {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let whole = self.0.abs().max(1.0).log10().floor() as usize + 1;
+        let places = formatter.precision().unwrap_or(4).saturating_sub(whole);
+        write!(formatter, "{:.places$}", self.0)
+    }
+}
+
+/// A count with thin separation, such as `1 234 567`.
+pub fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Bytes in binary units.
+pub fn bytes(value: f64) -> String {
+    let units = ["B", "KiB", "MiB", "GiB", "TiB"];
+    let power = (value.max(1.0).log2() / 10.0).floor().min(4.0) as usize;
+    format!(
+        "{:.1} {}",
+        value / 1024_f64.powi(power as i32),
+        units[power]
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_for_people() {
+        assert_eq!(si(5e-5, "s"), "50.00 µs");
+        assert_eq!(si(9.99996e-4, "s"), "1.000 ms");
+        assert_eq!(si(-2.5e9, "Pa"), "-2.500 GPa");
+        assert_eq!(si(0.0, "J"), "0 J");
+        assert_eq!(count(1234567), "1 234 567");
+        assert_eq!(count(12), "12");
+        assert_eq!(bytes(3.0 * 1024.0 * 1024.0), "3.0 MiB");
+    }
+}

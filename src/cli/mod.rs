@@ -1,0 +1,220 @@
+//! The command line: one subcommand a file.
+
+mod check;
+mod explain;
+mod format;
+mod init;
+mod launch;
+mod plot;
+mod progress;
+mod run;
+mod summary;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{ArgAction, Args, Parser, Subcommand};
+use fissure::error::{Error, Result};
+
+/// Peridynamics for batch jobs: cracks that start, run and branch by themselves.
+///
+/// A run is described by a deck, a TOML file. Results are equal to the bit on any number of MPI
+/// ranks and threads.
+#[derive(Parser)]
+#[command(version, propagate_version = true, arg_required_else_help = true)]
+#[command(after_help = "\
+Examples:
+  fissure init plate.toml                       write a commented example deck
+  fissure check plate.toml                      validate it; show points, bonds, step, memory
+  fissure run plate.toml                        run it; the result goes to out/plate/
+  mpirun -n 4 fissure run plate.toml            the same on 4 ranks
+  fissure plot out/plate/result.vtkhdf          a picture of the damage at the end
+
+Exit codes: 0 done, 1 the run failed, 2 the deck or the arguments are wrong.")]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+
+    /// Print nothing but errors.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+
+    /// Print more; twice for even more.
+    #[arg(short, long, global = true, action = ArgAction::Count, conflicts_with = "quiet")]
+    verbose: u8,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(RunArguments),
+    Check(CheckArguments),
+    Plot(PlotArguments),
+    Explain(DeckArguments),
+    Init(InitArguments),
+}
+
+/// Run a deck, alone or under mpirun.
+///
+/// Writes result.vtkhdf (opens in ParaView 5.12 and later), result.xdmf (for older ParaView) and
+/// history.csv into the output folder.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure run plate.toml
+  fissure run plate.toml --threads 8 --output /scratch/plate
+  mpirun -n 2 --bind-to none fissure run plate.toml --threads 4
+  srun fissure run plate.toml                   in a Slurm job, see slurm/
+
+Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.")]
+struct RunArguments {
+    /// The deck.
+    deck: PathBuf,
+
+    /// Folder for the result [default: out/ and the deck's name].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    /// Threads of each rank [default: the cores of the rank].
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+
+    /// Replace a result that is already there.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// Validate a deck and show what it would do, without running it.
+///
+/// Makes the points and finds the bonds on this machine, so it needs the memory of the whole run.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure check plate.toml
+  fissure check plate.toml --ranks 256          memory estimated for 256 ranks")]
+struct CheckArguments {
+    /// The deck.
+    deck: PathBuf,
+
+    /// Estimate the memory for this many ranks.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    ranks: u32,
+}
+
+/// Draw a field of a result as a PNG.
+///
+/// Plane problems are drawn as they are, solids in an oblique view or as a slice.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure plot out/plate/result.vtkhdf
+  fissure plot out/plate/result.vtkhdf --field strain_energy_density --time 25e-6
+  fissure plot out/plate/result.vtkhdf --time all -o frames.png     frames_0000.png, …
+  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0")]
+struct PlotArguments {
+    /// The result, a .vtkhdf file.
+    result: PathBuf,
+
+    /// The field; of a vector the length is drawn.
+    #[arg(short, long, value_name = "NAME", default_value = "damage")]
+    field: String,
+
+    /// Time in s (the nearest output is taken), `last` or `all`.
+    #[arg(short, long, value_name = "T", default_value = "last")]
+    time: String,
+
+    /// Where to draw to [default: the field's name beside the result].
+    #[arg(short, long, value_name = "FILE.png")]
+    output: Option<PathBuf>,
+
+    /// Factor of the drawn displacement, or `auto`.
+    #[arg(long, value_name = "FACTOR", default_value = "auto")]
+    deform: String,
+
+    /// Draw only the points nearest to this plane of a solid, such as z=0.005.
+    #[arg(long, value_name = "AXIS=POSITION")]
+    slice: Option<String>,
+
+    /// Range of the colours, such as 0,1 [default: that of the values].
+    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
+    range: Option<String>,
+
+    /// Width of the picture in pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
+    width: u32,
+}
+
+/// Print a deck with every default filled in.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  fissure explain plate.toml > plate_in_full.toml")]
+struct DeckArguments {
+    /// The deck.
+    deck: PathBuf,
+}
+
+/// Write a commented example deck.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  fissure init plate.toml && fissure run plate.toml")]
+struct InitArguments {
+    /// Name of the new deck.
+    name: PathBuf,
+}
+
+/// How much is printed.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Verbosity {
+    Quiet,
+    Normal,
+    Verbose,
+}
+
+/// Parses the command line, runs the command and turns its outcome into an exit code.
+pub fn main() -> ExitCode {
+    let speaks = launch::rank_from_environment() == 0;
+    let line = match CommandLine::try_parse() {
+        Ok(line) => line,
+        Err(error) => {
+            if speaks {
+                // Nothing can be done about an output that is closed.
+                let _ = error.print();
+            }
+            return ExitCode::from(error.exit_code() as u8);
+        }
+    };
+    let verbosity = match (line.quiet, line.verbose) {
+        (true, _) => Verbosity::Quiet,
+        (_, 0) => Verbosity::Normal,
+        _ => Verbosity::Verbose,
+    };
+    let outcome = match line.command {
+        Command::Run(arguments) => return run::run(&arguments, verbosity),
+        // Under mpirun these are done once.
+        _ if !speaks => Ok(()),
+        Command::Check(arguments) => check::check(&arguments, verbosity),
+        Command::Plot(arguments) => plot::plot(&arguments, verbosity),
+        Command::Explain(arguments) => explain::explain(&arguments),
+        Command::Init(arguments) => init::init(&arguments, verbosity),
+    };
+    finish(outcome, true)
+}
+
+/// The exit code of an outcome; prints an error if `speaks`.
+fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            if speaks {
+                eprintln!("error: {error}");
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// An error about a file that the command itself reads or writes.
+fn file_error(path: &std::path::Path, doing: &str, error: &std::io::Error) -> Error {
+    Error::run(format!("cannot {doing} {}: {error}", path.display()))
+}

@@ -1,0 +1,309 @@
+//! Bodies in motion: conservation, order of the integrator, wave speed, the stable step, supports.
+
+mod support;
+
+use fissure::solver::Simulation;
+use fissure::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
+use support::simulate;
+
+fn row<const D: usize>(
+    observer: &mut HistoryObserver,
+    simulation: &mut Simulation<D>,
+) -> HistoryRow {
+    let snapshot = Snapshot::new(simulation);
+    observer.row(simulation, &snapshot)
+}
+
+/// An elastic block that is stretched, turning and flying.
+fn flying_block(step: f64) -> String {
+    format!(
+        "dimension = '3d'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0, 0], upper = [8, 6, 5] }} }}
+        [initial.motion]
+        displacement = ['0.02*x', '-0.01*y*z/5', 0]
+        velocity = ['1 - 0.02*y', '0.02*x', '0.01*x*y/8']
+        [time]
+        end = 8
+        step = {step}
+        "
+    )
+}
+
+#[test]
+fn momentum_is_constant_to_rounding() {
+    simulate::<3, _>(&flying_block(0.08), |mut simulation| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let start = row(&mut observer, &mut simulation);
+        while simulation.number < simulation.last {
+            simulation.advance();
+        }
+        let end = row(&mut observer, &mut simulation);
+        let total = 2.0 * 240.0;
+        for d in 9..12 {
+            let change = (end.values[d] - start.values[d]).abs();
+            assert!(change < 1e-12 * total, "component {d}: {change}");
+        }
+        assert!(
+            (start.values[9] - total * 0.94).abs() < 1e-9,
+            "mean velocity 1 − 0.02·3"
+        );
+    });
+}
+
+#[test]
+fn energy_drift_falls_by_four_when_the_step_halves() {
+    let largest_error = |step: f64| {
+        simulate::<3, _>(&flying_block(step), |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            row(&mut observer, &mut simulation);
+            let mut largest = 0.0_f64;
+            while simulation.number < simulation.last {
+                simulation.advance();
+                largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
+            }
+            largest
+        })
+    };
+    let ratio = largest_error(0.08) / largest_error(0.04);
+    assert!((3.6..4.4).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn the_error_of_the_motion_falls_by_four_when_the_step_halves() {
+    let end = |step: f64| {
+        simulate::<3, _>(&flying_block(step), |mut simulation| {
+            while simulation.number < simulation.last {
+                simulation.advance();
+            }
+            simulation.state.displacement[0].clone()
+        })
+    };
+    let reference = end(0.005);
+    let error = |step: f64| {
+        let found = end(step);
+        let differences = found.iter().zip(&reference).map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max)
+    };
+    let ratio = error(0.08) / error(0.04);
+    assert!((3.6..4.5).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_pulse_moves_at_the_lattice_speed() {
+    // c_L² = (c/2ρ) Σ ξ⁴/|ξ|³ V: with m = 3 in 1-D, c = 12E/(5·9dx²A) and Σ = 12 dx² A, so
+    // c_L² = 1.6 E/ρ. The long-wave speed is that of the centroid, whatever the dispersion.
+    let speed = (1.6_f64 * 5.0 / 2.0).sqrt();
+    let text = format!(
+        "dimension = '1d'
+        parameters = {{ width = 25, centre = 150, speed = {speed} }}
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [600] }} }}
+        [initial.pulse]
+        displacement = ['1e-4 * exp(-((x - centre)/width)^2)']
+        velocity = ['1e-4 * exp(-((x - centre)/width)^2) * 2*(x - centre)/width^2 * speed']
+        [time]
+        end = 150
+        "
+    );
+    simulate::<1, _>(&text, |mut simulation| {
+        let centroid = |simulation: &Simulation<1>| {
+            let u = &simulation.state.displacement[0];
+            let x = &simulation.model.reference[0];
+            let moment: f64 = u.iter().zip(x).map(|(u, x)| u * x).sum();
+            moment / u.iter().sum::<f64>()
+        };
+        let start = centroid(&simulation);
+        while simulation.number < simulation.last {
+            simulation.advance();
+        }
+        let found = (centroid(&simulation) - start) / simulation.time();
+        assert!(
+            (found / speed - 1.0).abs() < 0.005,
+            "{found} instead of {speed}"
+        );
+    });
+}
+
+/// A square or cube at rest with a small disturbance that holds every frequency.
+fn rattled(dimension: &str, step: f64) -> String {
+    let (upper, lower, velocity) = match dimension {
+        "3d" => (
+            "[7, 7, 7]",
+            "[0, 0, 0]",
+            "['1e-6*cos(3.1*x*y)', '1e-6*sin(7*x+z)', '1e-6*cos(z*z+x)']",
+        ),
+        _ => (
+            "[15, 15]",
+            "[0, 0]",
+            "['1e-6*cos(3.1*x*y)', '1e-6*sin(7*x+y)']",
+        ),
+    };
+    format!(
+        "dimension = '{dimension}'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = {lower}, upper = {upper} }} }}
+        initial.rattle.velocity = {velocity}
+        time = {{ end = {}, step = {step} }}
+        ",
+        2000.0 * step
+    )
+}
+
+#[test]
+fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
+    fn check<const D: usize>(dimension: &str) {
+        let stable = simulate::<D, _>(&rattled(dimension, 0.01), |s| s.stable_step);
+        let (usual, growth) =
+            simulate::<D, _>(&rattled(dimension, 0.98 * stable), |mut simulation| {
+                let displacement = &simulation.state.displacement;
+                let stiffness = simulation.forces.stiffness(&simulation.model, displacement);
+                let trace = |entries: &[f64; 6]| entries[0] + entries[1] + entries[2];
+                let stiffest = stiffness.iter().map(trace).fold(0.0, f64::max);
+                let mut observer = HistoryObserver::new(&simulation).unwrap();
+                let start = row(&mut observer, &mut simulation).energies.kinetic;
+                while simulation.number < simulation.last {
+                    simulation.advance();
+                }
+                let end = row(&mut observer, &mut simulation).energies;
+                (
+                    (2.0_f64 * 2.0 / stiffest).sqrt(),
+                    (end.kinetic + end.strain) / start,
+                )
+            });
+        assert!(
+            (0.3..3.0).contains(&growth),
+            "{dimension}: energy grew to {growth}"
+        );
+        let beyond = simulate::<D, _>(&rattled(dimension, 1.3 * stable), |mut simulation| {
+            while simulation.number < simulation.last {
+                simulation.advance();
+            }
+            simulation.check().is_err()
+        });
+        assert!(
+            beyond,
+            "{dimension}: a step far beyond the limit must not pass unseen"
+        );
+        let ratio = stable / usual;
+        assert!(
+            (ratio / (D as f64).sqrt() - 1.0).abs() < 0.01,
+            "{dimension}: {ratio}"
+        );
+    }
+    check::<2>("plane-stress");
+    check::<3>("3d");
+}
+
+#[test]
+fn supports_do_the_work_that_becomes_energy() {
+    // A bar pulled at one end and held at the other: kinetic + strain energy = work of the pull, up
+    // to an error of second order.
+    let text = |step: f64| {
+        format!(
+            "dimension = 'plane-strain'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [40, 6] }} }}
+            set.left.where = 'x < 3'
+            set.right.where = 'x > 37'
+            condition.hold = {{ set = 'left', displacement = [0, 0] }}
+            [condition.pull]
+            set = 'right'
+            displacement = ['0.01*(1 - cos(pi*min(t, 60)/60))*x/40', 'free']
+            [history]
+            reactions = ['left', 'right']
+            [time]
+            end = 100
+            step = {step}
+            "
+        )
+    };
+    let largest_error = |step: f64| {
+        simulate::<2, _>(&text(step), |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            row(&mut observer, &mut simulation);
+            let mut largest = 0.0_f64;
+            while simulation.number < simulation.last {
+                simulation.advance();
+                largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
+            }
+            let end = row(&mut observer, &mut simulation);
+            let column = |name: &str| {
+                let place = observer
+                    .columns()
+                    .iter()
+                    .position(|(known, _)| known == name);
+                end.values[place.unwrap()]
+            };
+            assert!(column("reaction_right_x") > 0.0);
+            assert!(column("reaction_left_x") < 0.0);
+            let model = &simulation.model;
+            let pulled = (0..model.owned()).find(|k| model.position(*k)[0] > 39.0);
+            let u = simulation.state.displacement[0][pulled.unwrap()];
+            assert!((u - 0.02 * 39.5 / 40.0).abs() < 1e-15, "{u}");
+            largest / end.energies.work
+        })
+    };
+    let (coarse, fine) = (largest_error(0.5), largest_error(0.25));
+    assert!(coarse < 0.01, "{coarse}");
+    assert!((3.5..4.5).contains(&(coarse / fine)), "{coarse} {fine}");
+}
+
+#[test]
+fn loads_accelerate_as_newton_says() {
+    // A total force of 3 N on a free body of 2 kg/m³ · 240 m³, and the same as a body force.
+    for load in ["force = [3, 0, 0]", "body_force = ['3/240', 0, 0]"] {
+        let text = format!(
+            "dimension = '3d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0, 0], upper = [8, 6, 5] }} }}
+            condition.push = {{ set = 'all', {load} }}
+            time = {{ end = 4 }}
+            "
+        );
+        simulate::<3, _>(&text, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            row(&mut observer, &mut simulation);
+            while simulation.number < simulation.last {
+                simulation.advance();
+            }
+            let end = row(&mut observer, &mut simulation);
+            assert!(
+                (end.values[9] / 12.0 - 1.0).abs() < 1e-12,
+                "{}",
+                end.values[9]
+            );
+            // Half of F²t²/m.
+            let work = 0.5 * 12.0_f64.powi(2) / 480.0;
+            assert!((end.energies.work / work - 1.0).abs() < 1e-9);
+            assert!(end.energies.error.abs() < 1e-9 * work);
+        });
+    }
+}
+
+#[test]
+fn a_pressure_pushes_against_its_normal() {
+    let text = "dimension = 'plane-stress'
+        thickness = 0.1
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.block = { material = 'rubber', shape.box = { lower = [0, 0], upper = [8, 6] } }
+        set.top.where = 'y > 4'
+        condition.press = { set = 'top', pressure = 0.5, normal = [0, 2], depth = 2 }
+        time = { end = 1 }
+        ";
+    simulate::<2, _>(text, |simulation| {
+        let volumes = &simulation.model.volume;
+        let responses = simulation.state.responses.iter().zip(volumes);
+        let total: f64 = responses
+            .map(|(response, volume)| response.force[1] * volume)
+            .sum();
+        // Pressure times area 8 × 0.1.
+        assert!((total + 0.5 * 0.8).abs() < 1e-12, "{total}");
+    });
+}

@@ -1,0 +1,365 @@
+//! What every law must do in every dimension: nothing at rest, nothing under rigid motion, equal and
+//! opposite forces, forces that are the slope of the energy, both ends of a bond broken together.
+
+mod support;
+
+use fissure::solver::Simulation;
+use fissure::solver::observe::{HistoryObserver, Snapshot};
+use support::{displace, largest_force, simulate, simulate_on};
+
+/// A body of about 400 points with the material given, in each dimension.
+fn deck(dimension: &str, extra: &str) -> String {
+    let (upper, thickness) = match dimension {
+        "1d" => ("[40]", ""),
+        "3d" => ("[8, 7, 6]", ""),
+        _ => ("[22, 18]", "thickness = 0.5"),
+    };
+    let lower = ["[0]", "[0, 0]", "[0, 0, 0]"][upper.matches(',').count()];
+    format!(
+        "dimension = '{dimension}'
+        {thickness}
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = {lower}, upper = {upper} }} {extra} }}
+        time = {{ end = 1 }}
+        "
+    )
+}
+
+const DAMAGE: &str = "damage.brittle.critical_stretch = { critical_stretch = 0.05 }";
+
+/// Applies a check to a simulation of each dimension.
+macro_rules! in_all_dimensions {
+    ($check:ident) => {
+        simulate(&deck("1d", ""), $check::<1>);
+        simulate(&deck("plane-stress", ""), $check::<2>);
+        simulate(&deck("plane-strain", ""), $check::<2>);
+        simulate(&deck("3d", ""), $check::<3>);
+    };
+}
+
+/// The force density at one per cent of isotropic strain, to measure others by.
+fn force_scale<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
+    displace(simulation, |x| x.map(|x| 1.01 * x));
+    largest_force(simulation)
+}
+
+#[test]
+fn nothing_at_rest_and_under_translation() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        let scale = force_scale(&mut simulation);
+        displace(&mut simulation, |x| x);
+        assert_eq!(largest_force(&simulation), 0.0);
+        // Displacements that are sums of powers of two are exact.
+        displace(&mut simulation, |x| [x[0] + 0.5, x[1] - 4.25, x[2] + 64.0]);
+        assert_eq!(largest_force(&simulation), 0.0);
+        displace(&mut simulation, |x| {
+            [x[0] + 0.1, x[1] - 7.3, x[2] + 1e3 / 3.0]
+        });
+        assert!(largest_force(&simulation) < 1e-9 * scale);
+    }
+    in_all_dimensions!(check);
+}
+
+#[test]
+fn nothing_under_finite_rotation() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        let scale = force_scale(&mut simulation);
+        for angle in [0.3_f64, 1.0, 2.5] {
+            let (sin, cos) = angle.sin_cos();
+            // About z, then about x in 3-D.
+            let turn = |x: [f64; 3]| {
+                let once = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
+                match D {
+                    3 => [
+                        once[0],
+                        cos * once[1] - sin * once[2],
+                        sin * once[1] + cos * once[2],
+                    ],
+                    _ => once,
+                }
+            };
+            displace(&mut simulation, turn);
+            assert!(largest_force(&simulation) < 1e-12 * scale);
+        }
+    }
+    simulate(&deck("plane-stress", ""), check::<2>);
+    simulate(&deck("plane-strain", ""), check::<2>);
+    simulate(&deck("3d", ""), check::<3>);
+}
+
+/// A smooth, uneven map with strains of several per cent.
+fn wave(x: [f64; 3]) -> [f64; 3] {
+    let [a, b, c] = x;
+    [
+        a + 0.1 * (0.7 * a + 0.3 * b).sin() + 0.02 * c * c,
+        b + 0.1 * (0.5 * b - 0.2 * a + 0.4 * c).cos(),
+        c + 0.05 * (0.9 * c + 0.1 * a).sin(),
+    ]
+}
+
+#[test]
+fn forces_are_equal_and_opposite() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        displace(&mut simulation, wave);
+        for d in 0..D {
+            let (mut net, mut gross) = (0.0, 0.0);
+            for (k, response) in simulation.state.responses.iter().enumerate() {
+                net += response.force[d] * simulation.model.volume[k];
+                gross += response.force[d].abs() * simulation.model.volume[k];
+            }
+            assert!(gross > 0.0 && net.abs() < 1e-12 * gross, "{net} of {gross}");
+        }
+    }
+    in_all_dimensions!(check);
+    let breakable = format!("{}{DAMAGE}", deck("3d", ", damage = 'brittle'"));
+    simulate(&breakable, check::<3>);
+    simulate(&two_blocks(), check::<2>);
+}
+
+/// Two blocks of different materials, one of which can break.
+fn two_blocks() -> String {
+    "dimension = 'plane-stress'
+    grid = { spacing = 1, horizon = 3 }
+    material.soft.pmb = { density = 2, youngs_modulus = 5 }
+    material.hard.pmb = { density = 3, youngs_modulus = 50 }
+    damage.brittle.critical_stretch = { critical_stretch = 0.05 }
+    body.left = { material = 'soft', shape.box = { lower = [0, 0], upper = [10, 12] } }
+    body.right = { material = 'hard', damage = 'brittle', shape.box = { lower = [10, 0], upper = [20, 12] } }
+    time = { end = 1 }
+    "
+    .to_owned()
+}
+
+#[test]
+fn the_force_is_the_slope_of_the_energy() {
+    fn energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
+        let stored = simulation
+            .forces
+            .stored(&simulation.model, &simulation.state.displacement);
+        let volumes = &simulation.model.volume;
+        stored
+            .iter()
+            .zip(volumes)
+            .map(|(stored, volume)| stored.energy * volume)
+            .sum()
+    }
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        displace(&mut simulation, wave);
+        let volume = simulation.model.volume[0];
+        for point in [0, 7, 31] {
+            for d in 0..D {
+                let force = simulation.state.responses[point].force[d] * volume;
+                let place = simulation.state.displacement[d][point];
+                let step = 1e-4;
+                simulation.state.displacement[d][point] = place + step;
+                let above = energy(&mut simulation);
+                simulation.state.displacement[d][point] = place - step;
+                let below = energy(&mut simulation);
+                simulation.state.displacement[d][point] = place;
+                let slope = -(above - below) / (2.0 * step);
+                let scale = force.abs().max(1e-3);
+                assert!((force - slope).abs() < 1e-5 * scale, "{force} {slope}");
+            }
+        }
+    }
+    in_all_dimensions!(check);
+    simulate(&two_blocks(), check::<2>);
+}
+
+#[test]
+fn the_mirror_image_has_the_mirrored_forces() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        let upper = simulation.model.reference[0]
+            .iter()
+            .fold(0.0_f64, |a, x| a.max(*x));
+        let mirror = move |x: [f64; 3]| [upper + 0.5 - x[0], x[1], x[2]];
+        displace(&mut simulation, wave);
+        let forces: Vec<_> = simulation.state.responses.iter().map(|r| r.force).collect();
+        displace(&mut simulation, |x| mirror(wave(mirror(x))));
+        let model = &simulation.model;
+        let scale = largest_force(&simulation);
+        for point in 0..model.owned() {
+            let image = mirror(model.position(point));
+            let partner = (0..model.owned())
+                .find(|k| fissure::points::distance_squared(model.position(*k), image) < 1e-6)
+                .expect("the body is symmetric");
+            for d in 0..D {
+                let sign = if d == 0 { -1.0 } else { 1.0 };
+                let mirrored = sign * forces[partner][d];
+                let found = simulation.state.responses[point].force[d];
+                assert!(
+                    (found - mirrored).abs() < 1e-12 * scale,
+                    "{found} {mirrored}"
+                );
+            }
+        }
+    }
+    in_all_dimensions!(check);
+}
+
+#[test]
+fn both_ends_of_a_bond_break_together() {
+    for alpha in [0.0, 0.25] {
+        let damage = format!(
+            "damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = {alpha} }}"
+        );
+        let text = format!("{}{damage}", deck("plane-stress", ", damage = 'brittle'"));
+        let broken = simulate_on::<2, _>(3, &text, |mut simulation| {
+            let before = count_intact(&mut simulation);
+            displace(&mut simulation, wave);
+            assert!(count_intact(&mut simulation) < before, "nothing broke");
+            intact_bonds(&mut simulation)
+        });
+        let mut all: Vec<(u64, u64)> = broken.into_iter().flatten().collect();
+        all.sort_unstable();
+        for (here, there) in &all {
+            assert!(
+                all.binary_search(&(*there, *here)).is_ok(),
+                "{here} {there}"
+            );
+        }
+    }
+}
+
+fn count_intact<const D: usize>(simulation: &mut Simulation<D>) -> u32 {
+    let stored = simulation
+        .forces
+        .stored(&simulation.model, &simulation.state.displacement);
+    stored.iter().map(|stored| stored.neighbours).sum()
+}
+
+/// The ids at both ends of every intact bond of the rank's points.
+fn intact_bonds<const D: usize>(simulation: &mut Simulation<D>) -> Vec<(u64, u64)> {
+    let mut bonds = Vec::new();
+    simulation
+        .forces
+        .for_each_intact(|here, there| bonds.push((here, there)));
+    let id = |local: usize| simulation.model.ids[local];
+    bonds
+        .iter()
+        .map(|(here, there)| (id(*here), id(*there)))
+        .collect()
+}
+
+#[test]
+fn a_bond_breaks_at_the_critical_stretch_and_not_before() {
+    // Two points, one bond: 1-D, α = 0.
+    let text = "dimension = '1d'
+        grid = { spacing = 1, horizon = 1.5 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        damage.brittle.critical_stretch = { critical_stretch = 0.125, alpha = 0 }
+        body.bar = { material = 'rubber', damage = 'brittle', shape.box = { lower = [0], upper = [2] } }
+        time = { end = 1 }
+        ";
+    simulate::<1, _>(text, |mut simulation| {
+        displace(&mut simulation, |x| [x[0] * 1.1249999, 0.0, 0.0]);
+        assert_eq!(count_intact(&mut simulation), 2);
+        let energy = simulation
+            .forces
+            .stored(&simulation.model, &simulation.state.displacement);
+        displace(&mut simulation, |x| [x[0] * 1.125, 0.0, 0.0]);
+        assert_eq!(count_intact(&mut simulation), 0);
+        assert_eq!(largest_force(&simulation), 0.0);
+        // What the bond held has been set free, half of it at each end.
+        let set_free: f64 = simulation.state.responses.iter().map(|r| r.set_free).sum();
+        let held: f64 = energy.iter().map(|stored| stored.energy).sum();
+        assert!((set_free / held - 1.0).abs() < 1e-5);
+        // Broken for good.
+        displace(&mut simulation, |x| x);
+        assert_eq!(count_intact(&mut simulation), 0);
+    });
+}
+
+#[test]
+fn compression_of_a_neighbour_bond_raises_the_threshold() {
+    // Three points in a row; the left bond is compressed to s = −0.2, the right one stretched.
+    let text = |alpha: f64| {
+        format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 1.5 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            damage.brittle.critical_stretch = {{ critical_stretch = 0.1, alpha = {alpha} }}
+            body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [3] }} }}
+            time = {{ end = 1 }}
+            "
+        )
+    };
+    let after = |alpha: f64, stretch: f64| {
+        simulate::<1, _>(&text(alpha), |mut simulation| {
+            displace(&mut simulation, |x| match x[0] {
+                x if x < 1.0 => [x + 0.2, 0.0, 0.0],
+                x if x > 2.0 => [x + stretch, 0.0, 0.0],
+                x => [x, 0.0, 0.0],
+            });
+            count_intact(&mut simulation)
+        })
+    };
+    // The right bond's far end has no compressed bond; it takes the smaller threshold of its ends:
+    // s0 − α·stretch there, which lies below s0.
+    assert_eq!(after(0.0, 0.099), 4);
+    assert_eq!(after(0.0, 0.101), 2);
+    assert_eq!(after(0.25, 0.079), 4);
+    assert_eq!(after(0.25, 0.081), 2);
+}
+
+#[test]
+fn bonds_of_a_no_failure_zone_hold() {
+    let text = format!(
+        "{}set.left.where = 'x < 8'
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.05, no_failure = ['left'] }}",
+        deck("plane-stress", ", damage = 'brittle'")
+    );
+    for ranks in [1, 3] {
+        let parts = simulate_on::<2, _>(ranks, &text, |mut simulation| {
+            displace(&mut simulation, |x| x.map(|x| 2.0 * x));
+            intact_bonds(&mut simulation)
+        });
+        let bonds: Vec<_> = parts.into_iter().flatten().collect();
+        // x = (id mod 22) + ½: exactly the bonds with an end left of 8 are left.
+        let left = |id: u64| id % 22 < 8;
+        assert!(bonds.iter().all(|(a, b)| left(*a) || left(*b)));
+        let corner = bonds.iter().filter(|(a, _)| *a == 0).count();
+        assert_eq!(corner, 10, "a quarter of a family at m = 3");
+    }
+}
+
+#[test]
+fn a_pre_crack_shows_as_damage_and_cuts_forces() {
+    let text = format!(
+        "{}crack.notch.segment = {{ from = [0, 9], to = [11, 9] }}",
+        deck("plane-stress", "")
+    );
+    simulate::<2, _>(&text, |mut simulation| {
+        let snapshot = Snapshot::new(&mut simulation);
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let row = observer.row(&simulation, &snapshot);
+        assert_eq!(
+            row.broken, 0,
+            "bonds that start broken do not count as broken by the run"
+        );
+        let damage = snapshot.field(&simulation, fissure::deck::plan::Field::Damage);
+        for (point, damage) in damage.iter().enumerate() {
+            let [x, y, _] = simulation.model.position(point);
+            match ((y - 9.0).abs(), x) {
+                (height, x) if height < 1.0 && x < 8.0 => {
+                    assert!(*damage > 0.3, "{x} {y} {damage}")
+                }
+                (height, x) if height > 3.0 || x > 15.0 => assert_eq!(*damage, 0.0, "{x} {y}"),
+                _ => {}
+            }
+        }
+        // Opening the crack pulls on no bond across it.
+        displace(&mut simulation, |x| match x {
+            [a, b, c] if b > 9.0 => [a, b + 0.5, c],
+            same => same,
+        });
+        let far_left =
+            (0..simulation.model.owned()).filter(|k| simulation.model.position(*k)[0] < 7.0);
+        let forces: Vec<f64> = far_left
+            .map(|k| simulation.state.responses[k].force[1].abs())
+            .collect();
+        assert!(forces.iter().all(|force| *force == 0.0));
+        assert!(largest_force(&simulation) > 0.0);
+    });
+}

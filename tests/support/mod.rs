@@ -1,0 +1,67 @@
+//! What several test files share.
+
+#![allow(dead_code, reason = "not every test file uses all of it")]
+
+use fissure::comm::{Communicator, threads};
+use fissure::deck::{self, Plan, Source};
+use fissure::solver::Simulation;
+
+/// A validated deck from its text.
+pub fn plan(text: &str) -> Plan {
+    let source = Source {
+        path: "test.toml".into(),
+        text: text.to_owned(),
+    };
+    deck::parse(&source).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Runs `body` on one rank without MPI.
+pub fn simulate<const D: usize, T>(text: &str, body: impl FnOnce(Simulation<D>) -> T) -> T {
+    let plan = plan(text);
+    let comm = threads::alone();
+    body(Simulation::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Runs `body` on several ranks, each a thread.
+pub fn simulate_on<const D: usize, T: Send>(
+    ranks: usize,
+    text: &str,
+    body: impl Fn(Simulation<D>) -> T + Sync,
+) -> Vec<T> {
+    let plan = plan(text);
+    threads::run(ranks, |comm: &dyn Communicator| {
+        body(Simulation::new(&plan, comm).unwrap_or_else(|error| panic!("{error}")))
+    })
+}
+
+/// Sets all displacements, ghosts included, and evaluates the forces there.
+pub fn displace<const D: usize>(
+    simulation: &mut Simulation<D>,
+    map: impl Fn([f64; 3]) -> [f64; 3],
+) {
+    for point in 0..simulation.model.volume.len() {
+        let place = map(simulation.model.position(point));
+        for d in 0..D {
+            simulation.state.displacement[d][point] =
+                place[d] - simulation.model.reference[d][point];
+        }
+    }
+    let mut times = Default::default();
+    simulation.forces.evaluate(
+        simulation.comm,
+        &simulation.model,
+        &mut simulation.state.displacement,
+        &mut simulation.state.responses,
+        &mut times,
+    );
+}
+
+/// The largest force density of any point, N/m³.
+pub fn largest_force<const D: usize>(simulation: &Simulation<D>) -> f64 {
+    let components = simulation
+        .state
+        .responses
+        .iter()
+        .flat_map(|response| response.force);
+    components.fold(0.0, |largest, force| force.abs().max(largest))
+}
