@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use fissure::comm::mpi::World;
-use fissure::comm::{Communicator, agree, scan};
+use fissure::comm::{Communicator, IdOrder, agree};
 use fissure::deck::plan::{Field, Plan};
 use fissure::deck::{self};
 use fissure::error::{Error, Result};
@@ -147,11 +147,17 @@ impl<'a> Job<'a> {
         progress.finish();
         let spent = recorder.spent;
         let (energies, broken) = (recorder.energies, recorder.broken);
+        let cause = recorder.file.no_collective_cause();
         recorder.file.close()?;
         self.write_side_car()?;
         let summary = Summary::new(&simulation, spent, start.elapsed());
         if speaks {
             summary.print(&simulation, self.threads, energies, broken);
+            match cause {
+                0 if self.verbosity == Verbosity::Verbose => println!("all writes were collective"),
+                0 => {}
+                _ => println!("warning: some writes were not collective (HDF5 cause {cause:#x})"),
+            }
             self.say_where();
         }
         Ok(())
@@ -201,6 +207,7 @@ impl<'a> Job<'a> {
 /// Writes result and history when they are due.
 struct Recorder<'a> {
     file: ResultFile<'a>,
+    order: IdOrder,
     fields: Vec<Field>,
     observer: HistoryObserver,
     outputs: Schedule,
@@ -219,24 +226,25 @@ impl<'a> Recorder<'a> {
     ) -> Result<Self> {
         let (plan, model) = (job.plan, &simulation.model);
         let observer = HistoryObserver::new(simulation)?;
-        let (first, total) = scan(job.world, model.owned() as u64);
-        let positions: Vec<[f64; 3]> = (0..model.owned()).map(|k| model.position(k)).collect();
+        let comm: &dyn Communicator = job.world;
+        let owned = model.owned();
+        let order = IdOrder::new(comm, &model.ids[..owned], model.total);
+        let first = order.first();
+        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
+        let places = order.collect(comm, &places, 3);
+        let ids: Vec<u64> = (first..first + order.count() as u64).collect();
         let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
+        let blocks = order.collect(comm, &blocks, 1);
+        let volumes = order.collect(comm, &model.volume[..owned], 1);
         let scalar = |name, unit| FieldDescription {
             name,
             unit,
             components: 1,
         };
         let fixed = [
-            (
-                scalar("id", "1"),
-                FieldData::U64(&model.ids[..model.owned()]),
-            ),
+            (scalar("id", "1"), FieldData::U64(&ids)),
             (scalar("block", "1"), FieldData::U32(&blocks)),
-            (
-                scalar("volume", "m^3"),
-                FieldData::F64(&model.volume[..model.owned()]),
-            ),
+            (scalar("volume", "m^3"), FieldData::F64(&volumes)),
         ];
         let described: Vec<FieldDescription> = plan
             .output
@@ -256,8 +264,11 @@ impl<'a> Recorder<'a> {
                 false => Creation::Exclusive,
             },
             &Contents {
-                piece: Piece { first, total },
-                positions: &positions,
+                piece: Piece {
+                    first,
+                    total: model.total,
+                },
+                positions: bytemuck::cast_slice(&places),
                 fixed: &fixed,
                 moving: &described,
                 metadata: &job.metadata(simulation, hosts),
@@ -267,6 +278,7 @@ impl<'a> Recorder<'a> {
         let schedule = |every| Schedule::new(every, simulation.step, simulation.last);
         Ok(Self {
             file,
+            order,
             fields: plan.output.fields.clone(),
             observer,
             outputs: schedule(plan.output.every),
@@ -316,7 +328,11 @@ impl<'a> Recorder<'a> {
             let values: Vec<Vec<f64>> = self
                 .fields
                 .iter()
-                .map(|field| snapshot.field(simulation, *field))
+                .map(|field| {
+                    let values = snapshot.field(simulation, *field);
+                    self.order
+                        .collect(simulation.comm, &values, field.components())
+                })
                 .collect();
             let data: Vec<FieldData> = values.iter().map(|v| FieldData::F64(v)).collect();
             self.file

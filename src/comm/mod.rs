@@ -5,11 +5,13 @@
 //! [`mpi::World`] for real runs and [`threads`] for one rank without MPI and for ranks that are
 //! threads of one process, in tests.
 
+mod by_id;
 pub mod halo;
 pub mod mpi;
 pub mod sum;
 pub mod threads;
 
+pub use by_id::IdOrder;
 pub use halo::Halo;
 pub use sum::ExactSum;
 

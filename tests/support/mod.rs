@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
+pub mod command;
+
 use fissure::comm::{Communicator, threads};
 use fissure::deck::{self, Plan, Source};
 use fissure::solver::Simulation;

@@ -1,0 +1,186 @@
+//! The same deck on any number of ranks and threads gives the same bits.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use fissure::output::ResultReader;
+use support::command::{Folder, fissure, succeed};
+
+/// A plate of two materials: damage with α, a no-failure zone, supports, loads, a notch, probes.
+const PLATE: &str = "
+dimension = 'plane-strain'
+thickness = 0.01
+[parameters]
+dx = 1e-3
+[grid]
+spacing = 'dx'
+horizon = '3*dx'
+[material]
+glass.pmb = { density = 2440, youngs_modulus = 72e9 }
+steel.pmb = { density = 8000, youngs_modulus = 210e9 }
+[damage.brittle.critical_stretch]
+fracture_energy = 20
+alpha = 0.25
+no_failure = ['top']
+[body.plate]
+material = 'glass'
+damage = 'brittle'
+shape.difference = [
+    { box = { lower = [0, -0.012], upper = [0.04, 0.012] } },
+    { disc = { centre = [0.03, 0.004], radius = 0.003 } },
+]
+[body.rim]
+material = 'steel'
+shape.box = { lower = [0, 0.012], upper = [0.04, 0.016] }
+[crack.notch.segment]
+from = [-1, 0]
+to = [0.012, 0]
+[set]
+top.where = 'y > 0.013'
+bottom.where = 'y < -0.012 + dx'
+[condition]
+pull.set = 'bottom'
+pull.traction = ['2e6*sin(1e6*t)', '-20e6*(1 + x)']
+hold.set = 'rim'
+hold.displacement = ['free', '1e-7*ramp(t, 0, 4e-6)']
+[initial.shake]
+velocity = ['0.1*sin(400*x)', '0.1*cos(300*y)']
+[time]
+end = 12e-6
+[output]
+every_steps = 7
+fields = ['displacement', 'velocity', 'acceleration', 'force_density', 'damage', 'strain_energy_density', 'neighbours']
+[history]
+every_steps = 3
+reactions = ['rim']
+probe.ahead.at = [0.02, 0]
+";
+
+/// A block of scattered points from a file, flying apart.
+const BLOCK: &str = "
+dimension = '3d'
+[grid]
+horizon = 2.2
+[material.rubber.pmb]
+density = 2
+youngs_modulus = 5
+[damage.brittle.critical_stretch]
+critical_stretch = 0.05
+[body.block]
+material = 'rubber'
+damage = 'brittle'
+points.file = 'points.csv'
+[initial.burst]
+velocity = ['0.03*x', '0.02*y', '-0.02*z + 0.005*x']
+[time]
+end = 8
+[output]
+every_steps = 10
+";
+
+/// Fewer points than ranks.
+const FEW: &str = "
+dimension = '1d'
+grid = { spacing = 1, horizon = 1.5 }
+material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [3] } }
+initial.pull.displacement = ['0.01*x']
+time = { end = 5 }
+";
+
+/// Every dataset of a result, rows sorted by id, as bits.
+fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
+    let reader = ResultReader::open(result).unwrap();
+    let ids = reader.ids().unwrap();
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_by_key(|k| ids[*k]);
+    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect();
+    let sorted = |values: &[f64]| {
+        let width = values.len() / ids.len();
+        let row = |k: &usize| values[k * width..(k + 1) * width].to_vec();
+        bits(&order.iter().flat_map(row).collect::<Vec<f64>>())
+    };
+    let mut all = BTreeMap::new();
+    all.insert("times".to_owned(), bits(&reader.times().unwrap()));
+    all.insert(
+        "positions".to_owned(),
+        sorted(reader.positions().unwrap().as_flattened()),
+    );
+    for field in reader.fields().unwrap() {
+        for step in 0..reader.times().unwrap().len() {
+            let values = reader.field(&field.name, step).unwrap();
+            all.insert(format!("{} {step}", field.name), sorted(&values));
+        }
+    }
+    for column in reader.history().unwrap() {
+        all.insert(format!("history {}", column.name), bits(&column.values));
+    }
+    all
+}
+
+/// A cloud with no regularity at all, from a simple generator of pseudo-random numbers.
+fn scattered_points() -> String {
+    let mut state = 12345_u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut text = String::from("x,y,z,volume,block\n");
+    for k in 0..700 {
+        let cell = [k % 10, k / 10 % 10, k / 100].map(f64::from);
+        let place = cell.map(|c| c + 0.6 * random());
+        let volume = 0.8 + 0.4 * random();
+        text += &format!("{},{},{},{volume},1\n", place[0], place[1], place[2]);
+    }
+    text
+}
+
+fn same_everywhere(name: &str, deck: &str, must_break: bool) {
+    let folder = Folder::new(name);
+    folder.write("points.csv", &scattered_points());
+    let deck = folder.write("deck.toml", deck);
+    let mut expected = BTreeMap::new();
+    for ranks in 1..=4 {
+        for threads in ["1", "2"] {
+            let out = folder.join(format!("{ranks}x{threads}"));
+            let mut command = fissure(ranks);
+            command.arg("run").arg(&deck).arg("--output").arg(&out);
+            let printed = succeed(command.args(["--threads", threads, "-v"]));
+            assert!(printed.contains("all writes were collective"), "{printed}");
+            let found = datasets(&out.join("result.vtkhdf"));
+            if expected.is_empty() {
+                let broken = &found["history broken_bonds"];
+                let last = f64::from_bits(*broken.last().unwrap());
+                assert_eq!(last > 0.0, must_break, "{last} bonds broke");
+                expected = found;
+                continue;
+            }
+            assert_eq!(expected.len(), found.len());
+            for (dataset, values) in &expected {
+                assert!(
+                    *values == found[dataset],
+                    "{dataset} differs on {ranks} × {threads}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plate_of_two_materials() {
+    same_everywhere("plate", PLATE, true);
+}
+
+#[test]
+fn scattered_points_from_a_file() {
+    same_everywhere("block", BLOCK, true);
+}
+
+#[test]
+fn fewer_points_than_ranks() {
+    same_everywhere("few", FEW, false);
+}

@@ -1,0 +1,219 @@
+//! What goes wrong on one rank ends all of them, soon, with one message and the right exit code; what
+//! was written before stays readable.
+
+mod support;
+
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use fissure::output::ResultReader;
+use support::command::{Folder, finish, fissure, succeed, text};
+
+/// A bar with the given time table; small enough to be quick, with an output at every step.
+fn bar(time: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.bar = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [60, 12] }} }}
+        initial.pull.displacement = ['0.01*x*sin(x)', 0]
+        output = {{ every_steps = 1 }}
+        time = {{ {time} }}
+        "
+    )
+}
+
+/// Runs the deck and returns exit code and output; the message must be there once.
+fn failing(command: &mut Command, message: &str, code: i32) -> String {
+    let output = finish(command);
+    let printed = text(&output);
+    assert_eq!(output.status.code(), Some(code), "{printed}");
+    assert_eq!(printed.matches(message).count(), 1, "{printed}");
+    assert_eq!(printed.matches("error:").count(), 1, "{printed}");
+    printed
+}
+
+#[test]
+fn a_wrong_row_that_one_rank_reads() {
+    let folder = Folder::new("row");
+    let mut rows: Vec<String> = (0..200).map(|k| format!("{k} 0 1 0")).collect();
+    rows[180] = "180 zero 1 0".to_owned();
+    folder.write("points.txt", &rows.join("\n"));
+    let deck = folder.write(
+        "deck.toml",
+        "dimension = 'plane-stress'
+        grid = { horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.bar = { material = 'rubber', points.file = 'points.txt' }
+        time = { end = 1 }
+        ",
+    );
+    for ranks in [1, 3] {
+        let mut command = fissure(ranks);
+        command
+            .arg("run")
+            .arg(&deck)
+            .arg("--output")
+            .arg(folder.join("out"));
+        let message = "points.txt:181: y must be a number, is `zero`";
+        failing(&mut command, message, 2);
+        assert!(!folder.join("out/result.vtkhdf").exists());
+    }
+}
+
+#[test]
+fn a_value_that_is_not_finite() {
+    let folder = Folder::new("nan");
+    let deck = folder.write("deck.toml", &bar("end = 400, step = 4"));
+    let mut messages = Vec::new();
+    for ranks in [1, 2, 3] {
+        let out = folder.join(format!("out{ranks}"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        let printed = failing(&mut command, "is not finite", 1);
+        messages.push(
+            printed
+                .lines()
+                .find(|line| line.contains("error:"))
+                .unwrap()
+                .to_owned(),
+        );
+        // The last output shows where.
+        let reader = ResultReader::open(&out.join("result.vtkhdf")).unwrap();
+        let last = reader.times().unwrap().len() - 1;
+        let velocity = reader.field("velocity", last).unwrap();
+        assert!(velocity.iter().any(|value| !value.is_finite()));
+    }
+    for part in ["step ", "point ", "body `bar`", "reference position ["] {
+        assert!(messages[0].contains(part), "{}", messages[0]);
+    }
+    messages.dedup();
+    assert_eq!(messages.len(), 1, "the same point on any number of ranks");
+}
+
+#[test]
+fn a_full_disc() {
+    let folder = Folder::new("disc");
+    let disc = folder.join("small");
+    std::fs::create_dir(&disc).unwrap();
+    let mounted = Command::new("mount")
+        .args(["-t", "tmpfs", "-o", "size=2m", "tmpfs"])
+        .arg(&disc)
+        .stderr(Stdio::null())
+        .status();
+    if !mounted.is_ok_and(|status| status.success()) {
+        eprintln!("skipped: only root can mount the small disc that this test fills");
+        return;
+    }
+    let deck = folder.write("deck.toml", &bar("end = 100"));
+    for ranks in [1, 2, 3] {
+        let out = disc.join(format!("out{ranks}"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        let output = finish(&mut command);
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{printed}");
+        assert_eq!(printed.matches("error:").count(), 1, "{printed}");
+        assert!(printed.contains("No space left"), "{printed}");
+        let reader = ResultReader::open(&out.join("result.vtkhdf")).unwrap();
+        assert!(
+            reader.times().unwrap().len() > 3,
+            "complete steps stay readable"
+        );
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+    let unmounted = Command::new("umount").arg(&disc).status();
+    assert!(unmounted.unwrap().success());
+}
+
+#[test]
+fn a_killed_run_leaves_its_complete_steps() {
+    let folder = Folder::new("kill");
+    let deck = folder.write("deck.toml", &bar("end = 1e5"));
+    for ranks in [1, 2] {
+        let out = folder.join(format!("out{ranks}"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = command.spawn().unwrap();
+        let result = out.join("result.vtkhdf");
+        let steps = || ResultReader::open(&result).and_then(|reader| reader.times());
+        while steps().map_or(0, |times| times.len()) < 5 {
+            std::thread::sleep(Duration::from_millis(50));
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "the run ended by itself"
+            );
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        // mpirun's ranks end a moment after it.
+        std::thread::sleep(Duration::from_secs(1));
+        let reader = ResultReader::open(&result).unwrap();
+        let times = reader.times().unwrap();
+        assert!(times.len() >= 5);
+        let displacement = reader.field("displacement", times.len() - 1).unwrap();
+        assert_eq!(displacement.len(), 3 * 720);
+        assert!(displacement.iter().all(|value| value.is_finite()));
+    }
+}
+
+#[test]
+fn a_result_is_never_replaced_without_being_asked_to() {
+    let folder = Folder::new("overwrite");
+    let deck = folder.write("deck.toml", &bar("end = 3"));
+    let out = folder.join("out");
+    let run = |ranks: usize, extra: &[&str]| {
+        let mut command = fissure(ranks);
+        command
+            .arg("run")
+            .arg(&deck)
+            .arg("--output")
+            .arg(&out)
+            .args(extra);
+        command
+    };
+    succeed(&mut run(1, &[]));
+    let first = std::fs::read(out.join("result.vtkhdf")).unwrap();
+    failing(&mut run(2, &[]), "exists already; --overwrite", 2);
+    assert_eq!(std::fs::read(out.join("result.vtkhdf")).unwrap(), first);
+    // A wrong deck is found before anything is replaced.
+    std::fs::write(&deck, bar("end = -3")).unwrap();
+    failing(
+        &mut run(2, &["--overwrite"]),
+        "[time] end: must be above 0",
+        2,
+    );
+    assert_eq!(std::fs::read(out.join("result.vtkhdf")).unwrap(), first);
+    std::fs::write(&deck, bar("end = 2")).unwrap();
+    succeed(&mut run(2, &["--overwrite"]));
+    let times = ResultReader::open(&out.join("result.vtkhdf"))
+        .unwrap()
+        .times()
+        .unwrap();
+    assert_eq!(*times.last().unwrap(), 2.0);
+}
+
+#[test]
+fn wrong_arguments_are_told_once() {
+    let mut command = fissure(3);
+    command.args(["run", "deck.toml", "--thraeds", "2"]);
+    failing(&mut command, "unexpected argument '--thraeds'", 2);
+    let mut command = fissure(3);
+    command.args(["run", "no_such_deck.toml"]);
+    failing(&mut command, "cannot read the deck no_such_deck.toml", 2);
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_made() {
+    let folder = Folder::new("folder");
+    let deck = folder.write("deck.toml", &bar("end = 3"));
+    let file = folder.write("taken", "a file, not a folder");
+    let mut command = fissure(2);
+    command
+        .arg("run")
+        .arg(&deck)
+        .arg("--output")
+        .arg(file.join("out"));
+    failing(&mut command, "cannot create the folder", 1);
+}
