@@ -1,10 +1,13 @@
 //! Initial values, loads and supports of a deck, validated.
 
+use serde_spanned::Spanned;
+
 use super::expression::Expression;
 use super::grammar::{self, Deck};
+use super::number::Vector;
 use super::plan::{self, Action};
 use super::resolve::{ALL_VARIABLES, POSITION, Scope};
-use super::validate::find_set;
+use super::sets::find_set;
 use crate::error::Result;
 
 /// Validates the initial values.
@@ -53,21 +56,16 @@ pub fn conditions(
         .map(|(name, table)| {
             let condition = table.get_ref();
             let key = format!("[condition.{name}]");
+            let vector = |vector: &Option<Vector>| vector.as_ref().map(Spanned::span);
             let given = [
-                condition.displacement.is_some(),
-                condition.velocity.is_some(),
-                condition.body_force.is_some(),
-                condition.traction.is_some(),
-                condition.pressure.is_some(),
-                condition.force.is_some(),
+                ("displacement", vector(&condition.displacement)),
+                ("velocity", vector(&condition.velocity)),
+                ("body_force", vector(&condition.body_force)),
+                ("traction", vector(&condition.traction)),
+                ("pressure", condition.pressure.as_ref().map(Spanned::span)),
+                ("force", vector(&condition.force)),
             ];
-            if given.iter().filter(|given| **given).count() != 1 {
-                let message = format!(
-                    "{key}: give exactly one of `displacement`, `velocity`, `body_force`, \
-                     `traction`, `pressure` and `force`"
-                );
-                return Err(scope.error(table.span(), message));
-            }
+            scope.exactly_one(table.span(), &key, &given)?;
             Ok(plan::Condition {
                 name: name.clone(),
                 set: find_set(scope, &condition.set, sets, &format!("{key} set"))?,

@@ -44,6 +44,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     }
     for material in deck.material.values_mut() {
         let super::grammar::Material::Pmb(elastic) = material.get_mut();
+        let elastic = elastic.get_mut();
         let own = plan.dimension.bond_based_poisson_ratio();
         let without_ratio = [
             &elastic.youngs_modulus,

@@ -4,6 +4,8 @@
 //! Unknown keys are errors. Choices are tables named by the choice (`[material.glass.pmb]`), which
 //! keeps the place of an error.
 
+use std::num::NonZeroU64;
+
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
@@ -33,7 +35,7 @@ pub struct Deck {
     pub cross_section: Option<Number>,
     /// Named numbers for use in expressions; may build on one another.
     #[serde(default)]
-    pub parameters: IndexMap<String, Number>,
+    pub parameters: IndexMap<Text, Number>,
     /// Spacing and horizon.
     pub grid: Spanned<Grid>,
     /// Materials by name.
@@ -105,7 +107,7 @@ pub struct Grid {
 #[serde(rename_all = "snake_case")]
 pub enum Material {
     /// Prototype microelastic (brittle) material, f = c s e.
-    Pmb(Elastic),
+    Pmb(Spanned<Elastic>),
 }
 
 /// Density and one or two elastic constants.
@@ -136,7 +138,7 @@ pub struct Elastic {
 #[serde(rename_all = "snake_case")]
 pub enum Damage {
     /// A bond breaks for good at a critical stretch.
-    CriticalStretch(CriticalStretch),
+    CriticalStretch(Spanned<CriticalStretch>),
 }
 
 /// Critical stretch, from one of three measures of toughness.
@@ -244,9 +246,9 @@ pub enum Shape {
         top: Number,
     },
     /// Whatever lies in one of the shapes.
-    Union(Spanned<Vec<Shape>>),
+    Union(Spanned<Vec<Spanned<Shape>>>),
     /// Whatever lies in the first shape and in none of the others.
-    Difference(Spanned<Vec<Shape>>),
+    Difference(Spanned<Vec<Spanned<Shape>>>),
 }
 
 /// A set of points; exactly one of the keys.
@@ -374,7 +376,7 @@ pub struct Output {
     pub every: Option<Number>,
     /// Steps between outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub every_steps: Option<Spanned<u64>>,
+    pub every_steps: Option<Spanned<NonZeroU64>>,
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
@@ -389,7 +391,7 @@ pub struct History {
     pub every: Option<Number>,
     /// Steps between rows.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub every_steps: Option<Spanned<u64>>,
+    pub every_steps: Option<Spanned<NonZeroU64>>,
     /// Sets whose reaction force is recorded.
     #[serde(default)]
     pub reactions: Vec<Text>,

@@ -1,14 +1,20 @@
 //! Decks: the TOML file that describes a run, from its text to a validated [`Plan`].
 
+mod bodies;
 mod conditions;
 mod explain;
 pub mod expression;
 pub mod grammar;
+mod materials;
 mod number;
+mod outputs;
+mod parameters;
 pub mod plan;
 mod resolve;
+mod sets;
 mod shapes;
 pub mod source;
+mod toml_error;
 mod validate;
 
 use std::path::Path;
@@ -39,5 +45,5 @@ pub fn parse(source: &Source) -> Result<Plan> {
 }
 
 fn grammar(source: &Source) -> Result<grammar::Deck> {
-    toml::from_str(&source.text).map_err(|error| source.toml_error(&error))
+    toml::from_str(&source.text).map_err(|error| toml_error::toml_error(source, &error))
 }

@@ -26,6 +26,15 @@ pub fn default_number(value: f64) -> Number {
     Spanned::new(0..0, Written::Value(value))
 }
 
+/// A value for an error: with an exponent where it would be a long row of digits.
+pub fn shown(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-3..1e6 => value.to_string(),
+        size if size.is_finite() => format!("{value:e}"),
+        _ => value.to_string(),
+    }
+}
+
 impl<'de> Deserialize<'de> for Written {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct WrittenVisitor;
@@ -34,7 +43,7 @@ impl<'de> Deserialize<'de> for Written {
             type Value = Written;
 
             fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-                formatter.write_str("a number or an expression in a string")
+                formatter.write_str("a number or an expression in quotes")
             }
 
             fn visit_i64<E: de::Error>(self, value: i64) -> Result<Written, E> {

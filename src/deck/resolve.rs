@@ -3,9 +3,12 @@
 use std::ops::Range;
 
 use indexmap::IndexMap;
+use serde_spanned::Spanned;
 
 use super::expression::{Expression, Variable};
-use super::number::{Number, Vector, Written};
+use super::grammar::{Tables, Text};
+use super::number::{Number, Vector, Written, shown};
+use super::parameters;
 use super::source::{Source, suggestion};
 use crate::error::{Error, Result};
 
@@ -27,53 +30,14 @@ impl<'a> Scope<'a> {
     pub fn new(
         source: &'a Source,
         dimension: usize,
-        written: &IndexMap<String, Number>,
+        written: &IndexMap<Text, Number>,
     ) -> Result<Self> {
         let mut scope = Self {
             source,
             parameters: IndexMap::new(),
             dimension,
         };
-        for (name, number) in written {
-            let identifier = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-                && !name.starts_with(|c: char| c.is_ascii_digit());
-            if !identifier || RESERVED.contains(&name.as_str()) {
-                let message = format!(
-                    "[parameters] {name}: not a name that an expression can use; letters, digits \
-                     and `_`, but none of {}",
-                    RESERVED.join(", ")
-                );
-                return Err(source.error(number.span(), message));
-            }
-        }
-        // Each round resolves whatever depends on resolved names only.
-        while scope.parameters.len() < written.len() {
-            let before = scope.parameters.len();
-            for (name, number) in written {
-                if scope.parameters.contains_key(name) {
-                    continue;
-                }
-                let needs = match number.get_ref() {
-                    Written::Value(_) => Vec::new(),
-                    Written::Text(text) => Expression::names(text).unwrap_or_default(),
-                };
-                let waits = |need: &String| {
-                    written.contains_key(need) && !scope.parameters.contains_key(need)
-                };
-                if !needs.iter().any(waits) {
-                    let value = scope.number(number, &format!("[parameters] {name}"))?;
-                    scope.parameters.insert(name.clone(), value);
-                }
-            }
-            if scope.parameters.len() == before {
-                let circle = written
-                    .iter()
-                    .find(|(name, _)| !scope.parameters.contains_key(*name));
-                let (name, number) = circle.expect("some parameter is not resolved");
-                let message = format!("[parameters] {name}: depends on itself");
-                return Err(source.error(number.span(), message));
-            }
-        }
+        parameters::evaluate(&mut scope, written)?;
         Ok(scope)
     }
 
@@ -84,15 +48,8 @@ impl<'a> Scope<'a> {
 
     /// A finite number.
     pub fn number(&self, number: &Number, key: &str) -> Result<f64> {
-        let value = self
-            .expression(number, key, &[])?
-            .as_constant()
-            .expect("an expression without variables is a constant");
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err(self.error(number.span(), format!("{key}: must be finite, is {value}")))
-        }
+        let value = self.expression(number, key, &[])?.as_constant();
+        Ok(value.expect("an expression without variables is a constant"))
     }
 
     /// A number above 0.
@@ -112,7 +69,10 @@ impl<'a> Scope<'a> {
         if range.contains(&value) {
             Ok(value)
         } else {
-            Err(self.error(number.span(), format!("{key}: must be {words}, is {value}")))
+            Err(self.error(
+                number.span(),
+                format!("{key}: must be {words}, is {}", shown(value)),
+            ))
         }
     }
 
@@ -124,7 +84,9 @@ impl<'a> Scope<'a> {
         variables: &[Variable],
     ) -> Result<Expression> {
         let text = match number.get_ref() {
-            Written::Value(value) => return Ok(Expression::constant(*value)),
+            Written::Value(value) => {
+                return self.finite(Expression::constant(*value), number, key);
+            }
             Written::Text(text) => text,
         };
         let allowed: Vec<Variable> = variables
@@ -138,19 +100,31 @@ impl<'a> Scope<'a> {
             .collect();
         let names: Vec<&str> = self.parameters.keys().map(String::as_str).collect();
         let lookup = |name: &str| self.parameters.get(name).copied();
-        Expression::parse(text, &lookup, &names, &allowed).map_err(|error| {
+        let parsed = Expression::parse(text, &lookup, &names, &allowed).map_err(|error| {
             let span = number.span();
-            // Offsets in the text are offsets in the file where the string has plain quotes and no
-            // escapes; elsewhere the whole string is marked.
-            let inner = span.start + 1..span.end.saturating_sub(1);
-            let marked = if self.source.text.get(inner.clone()) == Some(text.as_str()) {
-                let end = (inner.start + error.end).max(inner.start + error.start + 1);
-                inner.start + error.start..end
-            } else {
-                span
+            // Where the string has escapes, the whole of it is marked.
+            let raw = self.source.text.get(span.clone()).unwrap_or_default();
+            let marked = match raw.find(text) {
+                Some(offset) if !text.is_empty() => {
+                    let first = span.start + offset;
+                    let end = error.end.max(error.start + 1);
+                    first + error.start..first + end
+                }
+                _ => span,
             };
             self.error(marked, format!("{key}: {}", error.message))
-        })
+        })?;
+        self.finite(parsed, number, key)
+    }
+
+    /// The expression, unless it is a constant that is not finite.
+    fn finite(&self, expression: Expression, number: &Number, key: &str) -> Result<Expression> {
+        match expression.as_constant() {
+            Some(value) if !value.is_finite() => {
+                Err(self.error(number.span(), format!("{key}: must be finite, is {value}")))
+            }
+            _ => Ok(expression),
+        }
     }
 
     fn entries<'v>(&self, vector: &'v Vector, key: &str) -> Result<&'v [Number]> {
@@ -186,6 +160,40 @@ impl<'a> Scope<'a> {
         }
     }
 
+    /// The index of the one key that is given, of several that exclude one another; `place` is the
+    /// table that holds them.
+    pub fn exactly_one(
+        &self,
+        place: Range<usize>,
+        key: &str,
+        keys: &[(&str, Option<Range<usize>>)],
+    ) -> Result<usize> {
+        let names: Vec<String> = keys.iter().map(|(name, _)| format!("`{name}`")).collect();
+        let (last, others) = names.split_last().expect("there are several keys");
+        let others = others.join(", ");
+        let mut given: Vec<(usize, usize)> = keys
+            .iter()
+            .enumerate()
+            .filter_map(|(index, (_, span))| Some((span.as_ref()?.start, index)))
+            .collect();
+        given.sort_unstable();
+        match given[..] {
+            [(_, index)] => Ok(index),
+            [] => {
+                let message = format!("{key}: give one of {others} and {last}");
+                Err(self.error(place, message))
+            }
+            [(_, first), (_, second), ..] => {
+                let (name, span) = &keys[second];
+                let message = format!(
+                    "{key} {name}: {} is given already; give one of {others} and {last}",
+                    names[first]
+                );
+                Err(self.error(span.clone().unwrap_or(place), message))
+            }
+        }
+    }
+
     /// One expression a component.
     pub fn expressions(
         &self,
@@ -195,20 +203,26 @@ impl<'a> Scope<'a> {
     ) -> Result<Vec<Expression>> {
         self.entries(vector, key)?
             .iter()
-            .map(|entry| self.expression(entry, key, variables))
+            .map(|entry| {
+                if is_free(entry) {
+                    let message = format!(
+                        "{key}: only a component of a prescribed motion can be `free`; write 0"
+                    );
+                    return Err(self.error(entry.span(), message));
+                }
+                self.expression(entry, key, variables)
+            })
             .collect()
     }
 
     /// One expression a component, or none where the deck says `"free"`.
     pub fn motion(&self, vector: &Vector, key: &str) -> Result<Vec<Option<Expression>>> {
-        let free = Written::Text("free".to_owned());
         let motion = self
             .entries(vector, key)?
             .iter()
             .map(|entry| {
-                let bound = *entry.get_ref() != free;
                 let parse = || self.expression(entry, key, &ALL_VARIABLES);
-                bound.then(parse).transpose()
+                (!is_free(entry)).then(parse).transpose()
             })
             .collect::<Result<Vec<_>>>()?;
         if motion.iter().all(Option::is_none) {
@@ -219,8 +233,10 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// Words that mean something else in an expression.
-const RESERVED: [&str; 8] = ["x", "y", "z", "t", "pi", "and", "or", "not"];
+/// Whether the deck leaves this component of a motion free.
+fn is_free(entry: &Number) -> bool {
+    matches!(entry.get_ref(), Written::Text(text) if text == "free")
+}
 
 /// Position and time.
 pub const ALL_VARIABLES: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
@@ -231,7 +247,7 @@ pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 /// The index of `name` in `names`, or an error that names the nearest.
 pub fn find<'n>(
     source: &Source,
-    name: &super::grammar::Text,
+    name: &Text,
     names: impl Iterator<Item = &'n str> + Clone,
     key: &str,
 ) -> Result<usize> {
@@ -246,4 +262,15 @@ pub fn find<'n>(
             );
             source.error(name.span(), message)
         })
+}
+
+/// Resolves every table, under its name.
+pub fn resolve_each<T, U>(
+    tables: &Tables<T>,
+    resolve: impl Fn(&str, &Spanned<T>) -> Result<U>,
+) -> Result<IndexMap<String, U>> {
+    tables
+        .iter()
+        .map(|(name, table)| Ok((name.clone(), resolve(name, table)?)))
+        .collect()
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde_spanned::Spanned;
 
 use super::grammar;
-use super::number::Vector;
+use super::number::{Vector, shown};
 use super::plan;
 use super::resolve::Scope;
 use crate::error::Result;
@@ -29,8 +29,13 @@ fn resolve(
         if scope.dimension == dimension {
             return Ok(());
         }
+        let instead = if scope.dimension == 1 {
+            "`box`"
+        } else {
+            instead
+        };
         let message = format!(
-            "{key} {name}: is for {dimension}-D problems, this one is {}-D{instead}",
+            "{key} {name}: is for {dimension}-D problems, this one is {}-D; use {instead}",
             scope.dimension
         );
         Err(scope.error(span.clone(), message))
@@ -39,9 +44,13 @@ fn resolve(
         Shape::Box { lower, upper } => {
             let low = scope.vector(lower, &format!("{key} lower"))?;
             let high = scope.vector(upper, &format!("{key} upper"))?;
-            if (0..scope.dimension).any(|k| low[k] >= high[k]) {
-                let message = format!("{key} upper: must be above `lower` in every component");
-                return Err(scope.error(upper.span(), message));
+            if let Some(k) = (0..scope.dimension).find(|k| low[*k] >= high[*k]) {
+                let message = format!(
+                    "{key} upper: must be above `lower` in every component, but {} is not above {}",
+                    shown(high[k]),
+                    shown(low[k])
+                );
+                return Err(scope.error(upper.get_ref()[k].span(), message));
             }
             Ok(plan::Shape::Box {
                 lower: low,
@@ -49,21 +58,21 @@ fn resolve(
             })
         }
         Shape::Disc { centre, radius } => {
-            only_in(2, "disc", "; in 3-D use `cylinder` or `sphere`")?;
+            only_in(2, "disc", "`cylinder` or `sphere`")?;
             Ok(plan::Shape::Ball {
                 centre: scope.vector(centre, &format!("{key} centre"))?,
                 radius: scope.positive(radius, &format!("{key} radius"))?,
             })
         }
         Shape::Sphere { centre, radius } => {
-            only_in(3, "sphere", "; in 2-D use `disc`")?;
+            only_in(3, "sphere", "`disc`")?;
             Ok(plan::Shape::Ball {
                 centre: scope.vector(centre, &format!("{key} centre"))?,
                 radius: scope.positive(radius, &format!("{key} radius"))?,
             })
         }
         Shape::Cylinder { from, to, radius } => {
-            only_in(3, "cylinder", "; in 2-D use `disc`")?;
+            only_in(3, "cylinder", "`disc`")?;
             let start = scope.vector(from, &format!("{key} from"))?;
             let end = scope.vector(to, &format!("{key} to"))?;
             if start == end {
@@ -77,7 +86,7 @@ fn resolve(
             })
         }
         Shape::Polygon { vertices } => {
-            only_in(2, "polygon", "; in 3-D use `prism`")?;
+            only_in(2, "polygon", "`prism`")?;
             Ok(plan::Shape::Prism {
                 vertices: corners(scope, key, vertices)?,
                 bottom: f64::NEG_INFINITY,
@@ -89,7 +98,7 @@ fn resolve(
             bottom,
             top,
         } => {
-            only_in(3, "prism", "; in 2-D use `polygon`")?;
+            only_in(3, "prism", "`polygon`")?;
             let low = scope.number(bottom, &format!("{key} bottom"))?;
             let high = scope.number(top, &format!("{key} top"))?;
             if low >= high {
@@ -112,7 +121,7 @@ fn resolve(
 fn several(
     scope: &Scope,
     key: &str,
-    parts: &Spanned<Vec<grammar::Shape>>,
+    parts: &Spanned<Vec<Spanned<grammar::Shape>>>,
     name: &str,
 ) -> Result<Vec<plan::Shape>> {
     if parts.get_ref().len() < 2 {
@@ -122,14 +131,14 @@ fn several(
     parts
         .get_ref()
         .iter()
-        .map(|part| resolve(scope, &format!("{key} {name}"), part, parts.span()))
+        .map(|part| shape(scope, &format!("{key} {name}"), part))
         .collect()
 }
 
 fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<Vec<[f64; 2]>> {
     let key = format!("{key} vertices");
     if vertices.get_ref().len() < 3 {
-        let message = format!("{key}: a polygon needs at least three corners");
+        let message = format!("{key}: needs at least three corners");
         return Err(scope.error(vertices.span(), message));
     }
     vertices
@@ -161,15 +170,18 @@ pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Resu
         );
         return Err(scope.error(crack.span(), message));
     }
-    let flat = || scope.error(crack.span(), format!("{key}: has no extent"));
     match crack.get_ref() {
         Crack::Segment { from, to } => {
-            let from = scope.vector(from, &format!("{key} from"))?;
-            let to = scope.vector(to, &format!("{key} to"))?;
-            if from == to {
-                return Err(flat());
+            let start = scope.vector(from, &format!("{key} from"))?;
+            let end = scope.vector(to, &format!("{key} to"))?;
+            if start == end {
+                let message = format!("{key} to: must differ from `from`");
+                return Err(scope.error(to.span(), message));
             }
-            Ok(plan::Crack::Segment { from, to })
+            Ok(plan::Crack::Segment {
+                from: start,
+                to: end,
+            })
         }
         Crack::Rectangle {
             corner,
@@ -185,7 +197,8 @@ pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Resu
                 a[0] * b[1] - a[1] * b[0],
             ];
             if cross == [0.0; 3] {
-                return Err(flat());
+                let message = format!("{key} edge_b: must be neither 0 nor along `edge_a`");
+                return Err(scope.error(edge_b.span(), message));
             }
             Ok(plan::Crack::Rectangle {
                 corner,

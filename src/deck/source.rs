@@ -61,19 +61,16 @@ impl Source {
             message.as_ref(),
         ))
     }
-
-    /// The error of the TOML reader in this form, with the nearest valid name for an unknown one.
-    pub fn toml_error(&self, error: &toml::de::Error) -> Error {
-        let message = nearest_in_message(error.message());
-        self.error(error.span().unwrap_or(0..0), message)
-    }
 }
 
 /// The entry of `known` that is most like `name`, if any is like it at all.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
-        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
+        .map(|candidate| {
+            let likeness = strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase());
+            (likeness, candidate)
+        })
         .filter(|(likeness, _)| *likeness > 0.75)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
@@ -88,25 +85,6 @@ pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> S
         true => format!("{mean} (none is defined)"),
         false => format!("{mean} (known: {})", known.join(", ")),
     }
-}
-
-/// Serde's "unknown field `a`, expected one of `b`, `c`", with the nearest of the expected names.
-fn nearest_in_message(message: &str) -> String {
-    let message = message.trim();
-    let kind = ["unknown field", "unknown variant"]
-        .into_iter()
-        .find(|kind| message.starts_with(kind));
-    let Some(kind) = kind else {
-        return message.to_owned();
-    };
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let name = quoted.next().unwrap_or_default();
-    let what = if kind == "unknown field" {
-        "key"
-    } else {
-        "name"
-    };
-    format!("unknown {what} `{name}`{}", suggestion(name, quoted))
 }
 
 #[cfg(test)]
@@ -128,12 +106,11 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_names_the_nearest() {
-        let message =
-            nearest_in_message("unknown field `horizn`, expected one of `horizon`, `spacing`");
+    fn a_suggestion_names_the_nearest() {
         assert_eq!(
-            message,
-            "unknown key `horizn`; did you mean `horizon`? (known: horizon, spacing)"
+            suggestion("horizn", ["spacing", "horizon"]),
+            "; did you mean `horizon`? (known: spacing, horizon)"
         );
+        assert_eq!(suggestion("a", []), " (none is defined)");
     }
 }

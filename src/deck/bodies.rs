@@ -1,0 +1,141 @@
+//! Bodies of a deck, validated.
+
+use std::ops::Range;
+
+use indexmap::IndexMap;
+use serde_spanned::Spanned;
+
+use super::grammar::{self, Deck};
+use super::plan;
+use super::resolve::{Scope, find, resolve_each};
+use super::shapes;
+use super::validate::checked_spacing;
+use crate::error::Result;
+
+/// Validates the bodies.
+///
+/// # Errors
+/// On an unknown material or damage law, a wrong shape, or anything but one source of points.
+pub fn bodies(
+    scope: &Scope,
+    deck: &Deck,
+    spacing: Option<f64>,
+    materials: &IndexMap<String, plan::Material>,
+    damages: &IndexMap<String, plan::CriticalStretch>,
+) -> Result<Vec<plan::Body>> {
+    if deck.body.is_empty() {
+        let end = scope.source.text.len();
+        return Err(scope.error(end..end, "[body]: the deck needs a body"));
+    }
+    resolve_each(&deck.body, |name, table| {
+        let body = table.get_ref();
+        let key = format!("[body.{name}]");
+        let names = materials.keys().map(String::as_str);
+        let material = find(
+            scope.source,
+            &body.material,
+            names,
+            &format!("{key} material"),
+        )?;
+        let damage = body
+            .damage
+            .as_ref()
+            .map(|damage| {
+                let names = damages.keys().map(String::as_str);
+                let index = find(scope.source, damage, names, &format!("{key} damage"))?;
+                Ok(damages[index].clone())
+            })
+            .transpose()?;
+        Ok(plan::Body {
+            name: name.to_owned(),
+            span: table.span(),
+            material_name: body.material.get_ref().clone(),
+            material: materials[material],
+            damage,
+            points: point_source(scope, deck, &key, table.span(), body, spacing)?,
+        })
+    })
+    .and_then(|bodies| rows_are_taken_once(scope, bodies.into_values().collect()))
+}
+
+/// An error if a body asks for rows of a point file that an earlier one takes.
+fn rows_are_taken_once(scope: &Scope, bodies: Vec<plan::Body>) -> Result<Vec<plan::Body>> {
+    let rows = |body: &plan::Body| match &body.points {
+        plan::PointSource::File { path, block, span } => Some((path.clone(), *block, span.clone())),
+        plan::PointSource::Lattice { .. } => None,
+    };
+    for (index, body) in bodies.iter().enumerate() {
+        let Some((path, block, span)) = rows(body) else {
+            continue;
+        };
+        let taker = bodies[..index].iter().find(|earlier| {
+            rows(earlier).is_some_and(|(other, taken, _)| {
+                other == path && (taken.is_none() || taken == block)
+            })
+        });
+        if let Some(taker) = taker {
+            let message = format!(
+                "[body.{}] points file: [body.{}] takes these rows already; give each body its own \
+                 `block`",
+                body.name, taker.name
+            );
+            return Err(scope.error(span, message));
+        }
+    }
+    Ok(bodies)
+}
+
+fn point_source(
+    scope: &Scope,
+    deck: &Deck,
+    key: &str,
+    span: Range<usize>,
+    body: &grammar::Body,
+    grid_spacing: Option<f64>,
+) -> Result<plan::PointSource> {
+    let given = [
+        ("shape", body.shape.as_ref().map(Spanned::span)),
+        (
+            "points",
+            body.points.as_ref().map(|points| points.file.span()),
+        ),
+    ];
+    scope.exactly_one(span, key, &given)?;
+    match (&body.shape, &body.points) {
+        (Some(shape), _) => {
+            let grid = deck.grid.get_ref();
+            let horizon = scope.number(&grid.horizon, "[grid] horizon")?;
+            let own = body
+                .spacing
+                .as_ref()
+                .map(|number| checked_spacing(scope, number, &format!("{key} spacing"), horizon))
+                .transpose()?;
+            let Some(spacing) = own.or(grid_spacing) else {
+                let message = "[grid]: a body given as a shape needs `spacing` here or in the body";
+                return Err(scope.error(deck.grid.span(), message));
+            };
+            let origin = match &grid.origin {
+                Some(origin) => scope.vector(origin, "[grid] origin")?,
+                None => [0.0; 3],
+            };
+            Ok(plan::PointSource::Lattice {
+                shape: shapes::shape(scope, &format!("{key} shape"), shape)?,
+                spacing,
+                origin,
+            })
+        }
+        (None, points) => {
+            let points = points.as_ref().expect("a body without a shape has points");
+            if let Some(spacing) = &body.spacing {
+                let message = format!("{key} spacing: points from a file have no spacing");
+                return Err(scope.error(spacing.span(), message));
+            }
+            let folder = scope.source.path.parent().unwrap_or("".as_ref());
+            Ok(plan::PointSource::File {
+                path: folder.join(points.file.get_ref()),
+                block: points.block.as_ref().map(|block| *block.get_ref()),
+                span: points.file.span(),
+            })
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! The named numbers of a deck, which may build on one another in any order.
+
+use indexmap::IndexMap;
+
+use super::expression::Expression;
+use super::grammar::Text;
+use super::number::{Number, Written};
+use super::resolve::Scope;
+use crate::error::{Error, Result};
+
+/// Words that mean something else in an expression or in its place.
+const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free"];
+
+/// Evaluates the parameters into the scope.
+///
+/// # Errors
+/// On a name that no expression can use, on an unknown name and on a circle.
+pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<()> {
+    for name in written.keys() {
+        let text = name.get_ref();
+        let identifier = text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && !text.is_empty()
+            && !text.starts_with(|c: char| c.is_ascii_digit());
+        if !identifier || RESERVED.contains(&text.as_str()) {
+            let message = format!(
+                "[parameters] {text}: not a name for a parameter; it must consist of letters, \
+                 digits and `_`, start with no digit, and be none of {}",
+                RESERVED.join(", ")
+            );
+            return Err(scope.error(name.span(), message));
+        }
+    }
+    // Each round resolves whatever depends on resolved names only.
+    while scope.parameters.len() < written.len() {
+        let before = scope.parameters.len();
+        for (name, number) in written {
+            let resolved = scope.parameters.contains_key(name.get_ref());
+            if !resolved && awaited(scope, written, number).is_none() {
+                let value = scope.number(number, &format!("[parameters] {}", name.get_ref()))?;
+                scope.parameters.insert(name.get_ref().clone(), value);
+            }
+        }
+        if scope.parameters.len() == before {
+            return Err(circle(scope, written));
+        }
+    }
+    Ok(())
+}
+
+/// The first parameter that a number needs and that has no value yet.
+fn awaited(scope: &Scope, written: &IndexMap<Text, Number>, number: &Number) -> Option<usize> {
+    let Written::Text(text) = number.get_ref() else {
+        return None;
+    };
+    let needs = Expression::names(text).unwrap_or_default();
+    needs
+        .iter()
+        .filter(|need| !scope.parameters.contains_key(*need))
+        .find_map(|need| written.get_index_of(need.as_str()))
+}
+
+/// The error about parameters that wait for one another.
+fn circle(scope: &Scope, written: &IndexMap<Text, Number>) -> Error {
+    let mut way: Vec<usize> = Vec::new();
+    let mut next = written
+        .values()
+        .find_map(|number| awaited(scope, written, number));
+    // Whatever waits leads to the circle, though it need not be on it.
+    while let Some(index) = next.filter(|index| !way.contains(index)) {
+        way.push(index);
+        next = awaited(scope, written, &written[index]);
+    }
+    let start = way.iter().position(|index| Some(*index) == next);
+    let circle = &mut way[start.unwrap_or(0)..];
+    let first = (0..circle.len()).min_by_key(|k| circle[*k]).unwrap_or(0);
+    circle.rotate_left(first);
+    let name = |index: usize| {
+        written
+            .get_index(index)
+            .map_or("", |(name, _)| name.get_ref())
+    };
+    let names: Vec<&str> = circle
+        .iter()
+        .chain([&circle[0]])
+        .map(|k| name(*k))
+        .collect();
+    let message = format!(
+        "[parameters] {}: depends on itself: {}",
+        names[0],
+        names.join(" → ")
+    );
+    scope.error(written[circle[0]].span(), message)
+}

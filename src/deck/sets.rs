@@ -1,0 +1,102 @@
+//! Sets of a deck, validated.
+
+use serde_spanned::Spanned;
+
+use super::grammar::{self, Deck, Text};
+use super::plan;
+use super::resolve::{POSITION, Scope, find};
+use super::shapes;
+use crate::error::Result;
+
+/// The sets of a plan: `all`, the bodies, those of the deck.
+///
+/// # Errors
+/// On a name that is taken and on a wrong selector.
+pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<plan::Set>> {
+    let mut sets = vec![plan::Set {
+        name: "all".to_owned(),
+        span: 0..0,
+        selector: plan::Selector::All,
+    }];
+    for (index, (name, body)) in deck.body.iter().enumerate() {
+        if name == "all" {
+            let message = "[body.all]: `all` is the set of all points; choose another name";
+            return Err(scope.error(body.span(), message));
+        }
+        sets.push(plan::Set {
+            name: name.clone(),
+            span: body.span(),
+            selector: plan::Selector::Body(index),
+        });
+    }
+    for (name, table) in &deck.set {
+        if sets.iter().any(|set| set.name == *name) {
+            let message = format!(
+                "[set.{name}]: this name is taken; `all` and the names of the bodies are sets \
+                 already"
+            );
+            return Err(scope.error(table.span(), message));
+        }
+        sets.push(plan::Set {
+            name: name.clone(),
+            span: table.span(),
+            selector: selector(scope, name, table)?,
+        });
+    }
+    Ok(sets)
+}
+
+fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<plan::Selector> {
+    let key = format!("[set.{name}]");
+    let set = table.get_ref();
+    let given = [
+        ("where", set.condition.as_ref().map(Spanned::span)),
+        ("shape", set.shape.as_ref().map(Spanned::span)),
+        ("ids", set.ids.as_ref().map(Spanned::span)),
+    ];
+    scope.exactly_one(table.span(), &key, &given)?;
+    if let Some(condition) = &set.condition {
+        scope
+            .expression(condition, &format!("{key} where"), &POSITION)
+            .map(plan::Selector::Where)
+    } else if let Some(shape) = &set.shape {
+        shapes::shape(scope, &format!("{key} shape"), shape).map(plan::Selector::Within)
+    } else {
+        let mut ids = set
+            .ids
+            .as_ref()
+            .map_or(Vec::new(), |ids| ids.get_ref().clone());
+        ids.sort_unstable();
+        ids.dedup();
+        Ok(plan::Selector::Ids(ids))
+    }
+}
+
+/// The index of a set.
+///
+/// # Errors
+/// On an unknown set.
+pub fn find_set(scope: &Scope, name: &Text, sets: &[plan::Set], key: &str) -> Result<usize> {
+    find(
+        scope.source,
+        name,
+        sets.iter().map(|set| set.name.as_str()),
+        key,
+    )
+}
+
+/// The indices of several sets.
+///
+/// # Errors
+/// On an unknown set.
+pub fn find_sets(
+    scope: &Scope,
+    names: &[Text],
+    sets: &[plan::Set],
+    key: &str,
+) -> Result<Vec<usize>> {
+    names
+        .iter()
+        .map(|name| find_set(scope, name, sets, key))
+        .collect()
+}

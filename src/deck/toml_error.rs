@@ -1,0 +1,252 @@
+//! The errors of the TOML reader in a user's words: which key, what it must be and what it is.
+
+use std::ops::Range;
+
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error as NameError, StrDeserializer};
+use toml::de::{DeTable, DeValue};
+
+use super::grammar::{Crack, Damage, DimensionName, Material, Shape};
+use super::source::{Source, suggestion};
+use crate::error::Error;
+
+/// The error that the deck deserves for what the TOML reader found.
+pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
+    let span = error.span().unwrap_or(0..0);
+    let message = error.message().trim();
+    if source.text[span.start..].starts_with("[[") {
+        let message = "a section has single brackets, as in `[body.plate]`";
+        return source.error(span, message);
+    }
+    match DeTable::parse(&source.text) {
+        Ok(tree) => grammar_error(source, tree.get_ref(), span, message),
+        Err(_) => source.error(span.clone(), syntax_message(source, span, message)),
+    }
+}
+
+/// What is wrong in a text that is not TOML.
+fn syntax_message(source: &Source, span: Range<usize>, message: &str) -> String {
+    let marked = source.text.get(span.clone()).unwrap_or_default();
+    let rest = source.text.get(span.end..).unwrap_or_default();
+    if message == "duplicate key" {
+        format!("`{marked}` is given twice")
+    } else if message.starts_with("string values must be quoted") {
+        match marked.trim() {
+            "" => "a value is missing".to_owned(),
+            word => format!("`{word}` is not a value; names and expressions need quotes"),
+        }
+    } else if message.starts_with("unexpected key or value, expected newline") {
+        let decimal = marked == "," || rest.starts_with(',');
+        let advice = if decimal {
+            "; decimals are written with a point"
+        } else {
+            ""
+        };
+        format!("only a comment may follow a value on its line{advice}")
+    } else {
+        message.to_owned()
+    }
+}
+
+/// What is wrong in a text that is TOML but not a deck.
+fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &str) -> Error {
+    let place = find(tree, &span, &mut Vec::new()).unwrap_or_default();
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let first = quoted.next().unwrap_or_default();
+    let error = |path: &[String], words: String| {
+        let key = label(path);
+        let colon = if key.is_empty() { "" } else { ": " };
+        source.error(span.clone(), format!("{key}{colon}{words}"))
+    };
+    if message.starts_with("missing field") {
+        return match (&place.path[..], first) {
+            ([], "dimension") => {
+                let known = kinds::<DimensionName>().join(", ");
+                source.error(
+                    0..0,
+                    format!("the deck needs a `dimension` (one of {known})"),
+                )
+            }
+            ([], section) => {
+                let end = source.text.len();
+                source.error(end..end, format!("the deck needs a section [{section}]"))
+            }
+            (path, _) => error(path, format!("needs `{first}`")),
+        };
+    }
+    if message.starts_with("unknown field") {
+        let words = format!("unknown key `{first}`{}", suggestion(first, quoted));
+        return error(place.parent(), words);
+    }
+    if let Some(rest) = message.strip_prefix("unexpected keys in table: ") {
+        let (unknown, known) = rest.split_once(", available keys: ").unwrap_or((rest, ""));
+        let name = unknown.split(", ").next().unwrap_or_default();
+        let words = format!(
+            "unknown key `{name}`{}",
+            suggestion(name, known.split(", "))
+        );
+        return error(place.parent(), words);
+    }
+    if message.starts_with("unknown variant") {
+        let words = format!("unknown name `{first}`{}", suggestion(first, quoted));
+        let is_value = place.value.is_some_and(DeValue::is_str);
+        return error(
+            if is_value {
+                &place.path
+            } else {
+                place.parent()
+            },
+            words,
+        );
+    }
+    if message.starts_with("wanted exactly 1 element") {
+        let section = place.path.first().map_or("", String::as_str);
+        let kinds = match section {
+            "material" => kinds::<Material>(),
+            "damage" => kinds::<Damage>(),
+            "crack" => kinds::<Crack>(),
+            _ => kinds::<Shape>(),
+        };
+        let words = format!(
+            "must have one key, its kind (one of {}), has {}",
+            kinds.join(", "),
+            keys(place.value),
+        );
+        return error(&place.path, words);
+    }
+    let wrong_value = message.starts_with("invalid type") || message.starts_with("invalid value");
+    match (message.split_once(", expected "), place.value) {
+        (Some((_, expected)), Some(value)) if wrong_value => {
+            let written = source.text.get(span.clone()).unwrap_or_default();
+            let words = format!("must be {}, is {}", wanted(expected), given(value, written));
+            error(&place.path, words)
+        }
+        _ => error(&place.path, message.to_owned()),
+    }
+}
+
+/// A key or value of the deck.
+#[derive(Default)]
+struct Place<'t> {
+    path: Vec<String>,
+    value: Option<&'t DeValue<'t>>,
+}
+
+impl Place<'_> {
+    /// The path of the table that holds the key.
+    fn parent(&self) -> &[String] {
+        self.path.split_last().map_or(&[], |(_, parent)| parent)
+    }
+}
+
+/// The key or value that has this span; `path` leads to the table.
+fn find<'t>(
+    table: &'t DeTable<'t>,
+    span: &Range<usize>,
+    path: &mut Vec<String>,
+) -> Option<Place<'t>> {
+    for (key, value) in table {
+        path.push(key.get_ref().to_string());
+        let found = if key.span() == *span {
+            Some(Place {
+                path: path.clone(),
+                value: Some(value.get_ref()),
+            })
+        } else {
+            find_value(value.get_ref(), value.span(), span, path)
+        };
+        if found.is_some() {
+            return found;
+        }
+        path.pop();
+    }
+    None
+}
+
+fn find_value<'t>(
+    value: &'t DeValue<'t>,
+    own: Range<usize>,
+    span: &Range<usize>,
+    path: &mut Vec<String>,
+) -> Option<Place<'t>> {
+    if own == *span {
+        return Some(Place {
+            path: path.clone(),
+            value: Some(value),
+        });
+    }
+    match value {
+        DeValue::Table(table) => find(table, span, path),
+        DeValue::Array(entries) => entries
+            .iter()
+            .find_map(|entry| find_value(entry.get_ref(), entry.span(), span, path)),
+        _ => None,
+    }
+}
+
+/// A path as the deck's sections have it: `[body.plate] shape box`.
+fn label(path: &[String]) -> String {
+    let section = path.first().map_or("", String::as_str);
+    let count = match section {
+        "material" | "damage" | "crack" => 3,
+        "history" if path.get(1).is_some_and(|key| key == "probe") => 3,
+        "body" | "set" | "initial" | "condition" => 2,
+        "grid" | "time" | "output" | "history" | "parameters" => 1,
+        _ => 0,
+    };
+    let (header, keys) = path.split_at(count.min(path.len()));
+    let header = match header {
+        [] => Vec::new(),
+        _ => vec![format!("[{}]", header.join("."))],
+    };
+    [header, keys.to_vec()].concat().join(" ")
+}
+
+/// The names of the variants of an enumeration of the grammar.
+fn kinds<'de, T: Deserialize<'de>>() -> Vec<String> {
+    let nameless: StrDeserializer<NameError> = "".into_deserializer();
+    let message = T::deserialize(nameless)
+        .err()
+        .map_or(String::new(), |error| error.to_string());
+    let quoted = message.split('`').skip(3).step_by(2);
+    quoted.map(str::to_owned).collect()
+}
+
+/// The keys of a table, for an error.
+fn keys(value: Option<&DeValue>) -> String {
+    let keys: Vec<String> = value
+        .and_then(DeValue::as_table)
+        .into_iter()
+        .flat_map(|table| table.keys().map(|key| format!("`{}`", key.get_ref())))
+        .collect();
+    match keys.is_empty() {
+        true => "none".to_owned(),
+        false => keys.join(", "),
+    }
+}
+
+/// What serde expected, in the words of a deck's user.
+fn wanted(expected: &str) -> &str {
+    match expected {
+        "a sequence" => "a list in brackets",
+        "a string" => "text in quotes",
+        "u32" => "a whole number from 0 to 4294967295",
+        "u64" => "a whole number from 0 on",
+        "a nonzero u64" => "a whole number from 1 on",
+        "a map" | "newtype variant" | "struct variant" => "a table",
+        _ if expected.starts_with("struct ") => "a table",
+        _ => expected,
+    }
+}
+
+/// What stands in the deck, in the words of its user.
+fn given(value: &DeValue, written: &str) -> String {
+    match value {
+        DeValue::Table(_) => "a table".to_owned(),
+        DeValue::Array(_) => "a list".to_owned(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::String(_) => format!("the text {written}"),
+        DeValue::Integer(_) | DeValue::Float(_) | DeValue::Boolean(_) => written.to_owned(),
+    }
+}

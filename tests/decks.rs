@@ -1,0 +1,318 @@
+//! Decks: wrong ones get the message that stands beside their mistake, right ones run and can be
+//! written out, and no text makes the reader panic.
+//!
+//! In a wrong deck the line below the mistake repeats what the error shows: carets below what is
+//! marked, then the message. Where the error stands elsewhere (at the end of the deck, in a point
+//! file, nowhere), a line that starts with `#!` has the whole first line of the error.
+
+use std::path::{Path, PathBuf};
+
+use fissure::comm::threads;
+use fissure::deck::{self, Plan, Source};
+use fissure::error::{ErrorKind, Result};
+use fissure::solver::Simulation;
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+/// The decks of a folder, in the order of their names.
+fn decks(folder: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|name| name == "toml"))
+        .collect();
+    paths.sort();
+    paths
+}
+
+/// All decks that are right.
+fn right_decks() -> Vec<Source> {
+    let paths = [decks("tests/decks/good"), decks("inputs")].concat();
+    let mut sources: Vec<Source> = paths
+        .iter()
+        .map(|path| Source::read(path).unwrap())
+        .collect();
+    sources.push(Source {
+        path: "example.toml".into(),
+        text: deck::EXAMPLE.to_owned(),
+    });
+    sources
+}
+
+/// Number of points, step (s) and number of steps of the run that a plan makes.
+fn prepare(plan: &Plan) -> Result<(u64, f64, u64)> {
+    fn of<const D: usize>(plan: &Plan) -> Result<(u64, f64, u64)> {
+        let comm = threads::alone();
+        let simulation = Simulation::<D>::new(plan, &comm)?;
+        Ok((simulation.model.total, simulation.step, simulation.last))
+    }
+    match plan.dimension.count() {
+        1 => of::<1>(plan),
+        2 => of::<2>(plan),
+        _ => of::<3>(plan),
+    }
+}
+
+/// What a wrong deck says its error must be.
+fn expected(path: &Path, text: &str) -> String {
+    let mut before = "";
+    for (line, number) in text.lines().zip(0..) {
+        if let Some(first_line) = line.strip_prefix("#! ") {
+            return first_line.to_owned();
+        }
+        let marks = line.strip_prefix('#').map(str::trim_start);
+        if let Some(marks) = marks.filter(|marks| marks.starts_with('^')) {
+            let message = marks.trim_start_matches('^').trim_start();
+            let place = &line[..line.len() - marks.len()];
+            let carets = &marks[..marks.len() - marks.trim_start_matches('^').len()];
+            let column = place.chars().count() + 1;
+            let gutter = " ".repeat(number.to_string().len());
+            let place = place.replacen('#', " ", 1);
+            return format!(
+                "{}:{number}:{column}: {message}\n{gutter} |\n{number} | {before}\n\
+                 {gutter} | {place}{carets}",
+                path.display()
+            );
+        }
+        before = line;
+    }
+    panic!("{}: says nowhere what is wrong", path.display());
+}
+
+#[test]
+fn a_wrong_deck_gets_the_message_beside_its_mistake() {
+    let paths = decks("tests/decks/bad");
+    assert!(paths.len() >= 100, "{} wrong decks", paths.len());
+    let mut failures = Vec::new();
+    for path in &paths {
+        let source = Source::read(path).unwrap();
+        let expected = expected(path, &source.text);
+        match deck::parse(&source).and_then(|plan| prepare(&plan)) {
+            Ok(_) => failures.push(format!("{}: no error", path.display())),
+            Err(error) => {
+                assert_eq!(error.kind, ErrorKind::Input, "{}", path.display());
+                let matches = error.message == expected
+                    || error.message.lines().next() == Some(expected.as_str());
+                if !matches {
+                    failures.push(format!("expected\n{expected}\nfound\n{error}"));
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+#[test]
+fn a_right_deck_makes_a_run() {
+    for source in right_decks() {
+        let plan = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
+        let (points, _, steps) = prepare(&plan).unwrap_or_else(|error| panic!("{error}"));
+        assert!(points > 0 && steps > 0, "{}", source.path.display());
+    }
+}
+
+#[test]
+fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
+    for source in right_decks() {
+        let explained = Source {
+            path: source.path.clone(),
+            text: deck::explain(&source).unwrap(),
+        };
+        let again = deck::explain(&explained).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(explained.text, again, "{}", source.path.display());
+        let run = |source| prepare(&deck::parse(source).unwrap()).unwrap();
+        assert_eq!(run(&source), run(&explained), "{}", source.path.display());
+    }
+}
+
+/// One change of a deck's text; places are shares of the text.
+#[derive(Debug, Clone)]
+enum Change {
+    DeleteLine(Index),
+    DuplicateLine(Index, Index),
+    SwapLines(Index, Index),
+    ReplaceToken(Index, Token),
+    Truncate(Index),
+    Insert(Index, String),
+}
+
+/// What a token is replaced by.
+#[derive(Debug, Clone)]
+enum Token {
+    /// Another token of the deck.
+    Other(Index),
+    Text(String),
+}
+
+/// Numbers at the borders of what numbers can be, and openings of everything.
+const ODD: &[&str] = &[
+    "0",
+    "-1",
+    "-0.0",
+    "1e308",
+    "1e-320",
+    "1e999",
+    "inf",
+    "-inf",
+    "nan",
+    "1_0",
+    "0x10",
+    "2.5",
+    "9223372036854775807",
+    "9223372036854775808",
+    "1979-05-27",
+    "true",
+    "[]",
+    "{}",
+    "\"\"",
+    "\"",
+    "'",
+    "\"\"\"",
+    "'''",
+    "[[",
+    "]]",
+    "[",
+    "]",
+    "{",
+    "}",
+    "=",
+    ".",
+    ",",
+    "#",
+    "\\",
+    "\"1/0\"",
+    "\"0/0\"",
+    "\"t\"",
+    "\"x\"",
+    "\"free\"",
+    "\"all\"",
+    "\"(\"",
+    "\"-\"",
+    "é",
+    "\u{feff}",
+    "\r",
+    "\u{0}",
+    "\t",
+    "\n",
+    "😀",
+];
+
+fn change() -> impl Strategy<Value = Change> {
+    let text = prop_oneof![
+        6 => prop::sample::select(ODD).prop_map(str::to_owned),
+        2 => any::<f64>().prop_map(|number| format!("{number:e}")),
+        2 => any::<i64>().prop_map(|number| number.to_string()),
+        1 => "\\PC{0,8}",
+        1 => (prop::sample::select(&["[", "{a=", "\"(", "\"-", "'2^", "a."][..]), 100..5000_usize)
+            .prop_map(|(opening, times)| {
+                let (quote, opening) = match opening.strip_prefix(['"', '\'']) {
+                    Some(rest) => (&opening[..1], rest),
+                    None => ("", opening),
+                };
+                format!("{quote}{}1{quote}", opening.repeat(times))
+            }),
+    ]
+    .boxed();
+    let token = prop_oneof![
+        any::<Index>().prop_map(Token::Other),
+        text.clone().prop_map(Token::Text),
+    ];
+    let at = any::<Index>;
+    prop_oneof![
+        2 => at().prop_map(Change::DeleteLine),
+        1 => (at(), at()).prop_map(|(line, to)| Change::DuplicateLine(line, to)),
+        1 => (at(), at()).prop_map(|(a, b)| Change::SwapLines(a, b)),
+        6 => (at(), token).prop_map(|(at, token)| Change::ReplaceToken(at, token)),
+        1 => at().prop_map(Change::Truncate),
+        2 => (at(), text).prop_map(|(at, text)| Change::Insert(at, text)),
+    ]
+}
+
+/// The byte ranges of words, numbers and single symbols.
+fn tokens(text: &str) -> Vec<std::ops::Range<usize>> {
+    let is_word = |c: char| c.is_alphanumeric() || "_-+.".contains(c);
+    let mut tokens: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut in_word = false;
+    for (at, c) in text.char_indices().filter(|(_, c)| !c.is_control()) {
+        let end = at + c.len_utf8();
+        match tokens.last_mut() {
+            Some(last) if in_word && is_word(c) && last.end == at => last.end = end,
+            _ if c == ' ' => {}
+            _ => tokens.push(at..end),
+        }
+        in_word = is_word(c);
+    }
+    tokens
+}
+
+fn apply(text: &mut String, change: &Change) {
+    let mut lines: Vec<&str> = text.split('\n').collect();
+    match change {
+        Change::DeleteLine(at) => {
+            lines.remove(at.index(lines.len()));
+        }
+        Change::DuplicateLine(from, to) => {
+            let line = lines[from.index(lines.len())];
+            lines.insert(to.index(lines.len()), line);
+        }
+        Change::SwapLines(a, b) => {
+            let (a, b) = (a.index(lines.len()), b.index(lines.len()));
+            lines.swap(a, b);
+        }
+        Change::ReplaceToken(at, with) => {
+            let tokens = tokens(text);
+            if tokens.is_empty() {
+                return;
+            }
+            let new = match with {
+                Token::Other(other) => text[tokens[other.index(tokens.len())].clone()].to_owned(),
+                Token::Text(new) => new.clone(),
+            };
+            text.replace_range(tokens[at.index(tokens.len())].clone(), &new);
+            return;
+        }
+        Change::Truncate(at) => {
+            text.truncate(border(text, at));
+            return;
+        }
+        Change::Insert(at, new) => {
+            text.insert_str(border(text, at), new);
+            return;
+        }
+    }
+    *text = lines.join("\n");
+}
+
+/// A place between two characters.
+fn border(text: &str, at: &Index) -> usize {
+    text.floor_char_boundary(at.index(text.len() + 1))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #[test]
+    fn a_mutated_deck_is_an_error_or_a_deck_but_never_a_panic(
+        which in any::<Index>(),
+        changes in prop::collection::vec(change(), 1..4),
+    ) {
+        let decks = right_decks();
+        let mut source = decks[which.index(decks.len())].clone();
+        for change in &changes {
+            apply(&mut source.text, change);
+        }
+        let explained = deck::explain(&source);
+        match deck::parse(&source) {
+            Err(error) => {
+                let place = format!("{}:", source.path.display());
+                let message = error.message.strip_prefix(&place);
+                prop_assert!(message.is_some_and(|rest| rest.len() > 8), "{}", error);
+                prop_assert!(explained.is_err());
+            }
+            Ok(_) => {
+                let text = explained.unwrap();
+                let again = deck::explain(&Source { text: text.clone(), ..source });
+                prop_assert_eq!(again.map_err(|error| error.message), Ok(text));
+            }
+        }
+    }
+}
