@@ -3,10 +3,9 @@
 mod support;
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use fissure::output::ResultReader;
 use support::command::{Folder, fissure, succeed};
+use support::datasets::{datasets, difference};
 
 /// A plate of two materials: damage with α, a no-failure zone, supports, loads, a notch, probes.
 const PLATE: &str = "
@@ -90,36 +89,6 @@ initial.pull.displacement = ['0.01*x']
 time = { end = 5 }
 ";
 
-/// Every dataset of a result, rows sorted by id, as bits.
-fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
-    let reader = ResultReader::open(result).unwrap();
-    let ids = reader.ids().unwrap();
-    let mut order: Vec<usize> = (0..ids.len()).collect();
-    order.sort_by_key(|k| ids[*k]);
-    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect();
-    let sorted = |values: &[f64]| {
-        let width = values.len() / ids.len();
-        let row = |k: &usize| values[k * width..(k + 1) * width].to_vec();
-        bits(&order.iter().flat_map(row).collect::<Vec<f64>>())
-    };
-    let mut all = BTreeMap::new();
-    all.insert("times".to_owned(), bits(&reader.times().unwrap()));
-    all.insert(
-        "positions".to_owned(),
-        sorted(reader.positions().unwrap().as_flattened()),
-    );
-    for field in reader.fields().unwrap() {
-        for step in 0..reader.times().unwrap().len() {
-            let values = reader.field(&field.name, step).unwrap();
-            all.insert(format!("{} {step}", field.name), sorted(&values));
-        }
-    }
-    for column in reader.history().unwrap() {
-        all.insert(format!("history {}", column.name), bits(&column.values));
-    }
-    all
-}
-
 /// A cloud with no regularity at all, from a simple generator of pseudo-random numbers.
 fn scattered_points() -> String {
     let mut state = 12345_u64;
@@ -159,13 +128,11 @@ fn same_everywhere(name: &str, deck: &str, must_break: bool) {
                 expected = found;
                 continue;
             }
-            assert_eq!(expected.len(), found.len());
-            for (dataset, values) in &expected {
-                assert!(
-                    *values == found[dataset],
-                    "{dataset} differs on {ranks} × {threads}"
-                );
-            }
+            assert_eq!(
+                difference(&expected, &found),
+                None,
+                "on {ranks} × {threads}"
+            );
         }
     }
 }

@@ -19,7 +19,7 @@ const FEW_NEIGHBOURS: [u32; 3] = [2, 6, 16];
 /// # Errors
 /// When the deck is wrong.
 pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
-    let plan = deck::load(&arguments.deck)?;
+    let plan = deck::read(&arguments.deck, &arguments.set)?.plan()?;
     launch::start_threads(launch::threads(None))?;
     match plan.dimension.count() {
         1 => report::<1>(&plan, arguments, verbosity),

@@ -1,6 +1,6 @@
 //! `fissure explain`: a deck with every default filled in.
 
-use fissure::deck::{self, Source};
+use fissure::deck;
 use fissure::error::Result;
 
 use super::DeckArguments;
@@ -10,6 +10,9 @@ use super::DeckArguments;
 /// # Errors
 /// When the deck is wrong.
 pub fn explain(arguments: &DeckArguments) -> Result<()> {
-    print!("{}", deck::explain(&Source::read(&arguments.deck)?)?);
+    print!(
+        "{}",
+        deck::read(&arguments.deck, &arguments.set)?.explain()?
+    );
     Ok(())
 }

@@ -2,16 +2,21 @@
 
 mod check;
 mod explain;
+mod files;
 mod format;
 mod init;
 mod launch;
 mod plot;
 mod progress;
+mod recorder;
+mod restart;
 mod run;
 mod summary;
+mod watch;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 use fissure::error::{Error, Result};
@@ -30,7 +35,8 @@ Examples:
   mpirun -n 4 fissure run plate.toml            the same on 4 ranks
   fissure plot out/plate/result.vtkhdf          a picture of the damage at the end
 
-Exit codes: 0 done, 1 the run failed, 2 the deck or the arguments are wrong.")]
+Exit codes: 0 done, 1 the run failed, 2 the deck or the arguments are wrong, 75 the run was
+stopped by a signal or the wall-clock limit and can be continued with --restart.")]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -64,8 +70,13 @@ Examples:
   fissure run plate.toml --threads 8 --output /scratch/plate
   mpirun -n 2 --bind-to none fissure run plate.toml --threads 4
   srun fissure run plate.toml                   in a Slurm job, see slurm/
+  fissure run plate.toml --restart              go on from the last checkpoint
+  fissure run plate.toml --set tension=20e6     another value of a parameter of the deck
 
-Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.")]
+Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
+
+SIGTERM, SIGINT or SIGUSR1 to any rank: all finish the step, write a checkpoint and leave with exit
+code 75; a second signal ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
 struct RunArguments {
     /// The deck.
     deck: PathBuf,
@@ -81,6 +92,30 @@ struct RunArguments {
     /// Replace a result that is already there.
     #[arg(long)]
     overwrite: bool,
+
+    /// Go on from the newest checkpoint in the output folder, on any number of ranks.
+    #[arg(long, conflicts_with = "overwrite")]
+    restart: bool,
+
+    /// Write a checkpoint and stop in time before this limit [default: the end of the Slurm job].
+    #[arg(long, value_name = "HH:MM[:SS]", value_parser = watch::wall_time)]
+    wall_time: Option<Duration>,
+
+    /// Give a parameter of the deck another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    set: Vec<(String, String)>,
+}
+
+/// Splits `NAME=VALUE`.
+fn assignment(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err(format!(
+            "`{text}` must be NAME=VALUE, with a name of [parameters]"
+        )),
+    }
 }
 
 /// Validate a deck and show what it would do, without running it.
@@ -94,6 +129,10 @@ Examples:
 struct CheckArguments {
     /// The deck.
     deck: PathBuf,
+
+    /// Give a parameter of the deck another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    set: Vec<(String, String)>,
 
     /// Estimate the memory for this many ranks.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
@@ -151,6 +190,10 @@ Example:
 struct DeckArguments {
     /// The deck.
     deck: PathBuf,
+
+    /// Give a parameter of the deck another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    set: Vec<(String, String)>,
 }
 
 /// Write a commented example deck.

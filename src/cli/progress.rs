@@ -22,8 +22,10 @@ pub enum Progress {
     Bar(ProgressBar),
     /// A line now and then.
     Lines {
-        /// Start of the run.
+        /// When the display began.
         start: Instant,
+        /// Number of the step that it began after.
+        first: u64,
         /// Number of the last step.
         last: u64,
         /// Lines printed.
@@ -32,19 +34,21 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// A display for a run of `last` steps.
-    pub fn new(shown: bool, last: u64) -> Self {
+    /// A display for a run from step `first` to step `last`.
+    pub fn new(shown: bool, first: u64, last: u64) -> Self {
         if !shown {
             return Self::Silent;
         }
         if !std::io::stderr().is_terminal() {
             return Self::Lines {
                 start: Instant::now(),
+                first,
                 last,
-                printed: 0,
+                printed: first * LINES / last,
             };
         }
-        let bar = ProgressBar::new(last);
+        let bar = ProgressBar::new(last).with_position(first);
+        bar.reset_eta();
         let template = "{bar:30} {percent:>3} %  step {pos}/{len}  {msg}  {per_sec}  eta {eta}";
         let style =
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -62,13 +66,16 @@ impl Progress {
             }
             Self::Lines {
                 start,
+                first,
                 last,
                 printed,
             } => {
                 if step * LINES / *last > *printed {
                     *printed = step * LINES / *last;
                     let full = (step as usize * WIDTH) / *last as usize;
-                    let left = start.elapsed().mul_f64((*last - step) as f64 / step as f64);
+                    let left = start
+                        .elapsed()
+                        .mul_f64((*last - step) as f64 / (step - *first) as f64);
                     eprintln!(
                         "[{}{}] {:>3} %  step {step}/{last}  t = {}  eta {:.0} s",
                         "█".repeat(full),
@@ -82,10 +89,12 @@ impl Progress {
         }
     }
 
-    /// Ends the display.
-    pub fn finish(&self) {
-        if let Self::Bar(bar) = self {
-            bar.finish();
+    /// Ends the display, of a run that came to its end or not.
+    pub fn finish(&self, complete: bool) {
+        match self {
+            Self::Bar(bar) if complete => bar.finish(),
+            Self::Bar(bar) => bar.abandon(),
+            Self::Silent | Self::Lines { .. } => {}
         }
     }
 }

@@ -1,30 +1,35 @@
 //! `fissure run`: from a deck to a result.
 
-use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use fissure::comm::mpi::World;
-use fissure::comm::{Communicator, IdOrder, agree};
-use fissure::deck::plan::{Field, Plan};
-use fissure::deck::{self};
-use fissure::error::{Error, Result};
-use fissure::output::{self, Contents, Creation, FieldData, FieldDescription, Piece, ResultFile};
+use fissure::comm::{Communicator, agree};
+use fissure::deck::{self, Plan};
+use fissure::error::Result;
+use fissure::output::{self, Creation};
 use fissure::solver::Simulation;
-use fissure::solver::observe::{Energies, HistoryObserver, HistoryRow, Snapshot};
-use fissure::solver::schedule::Schedule;
 
+use super::files::Files;
+use super::format::si;
 use super::progress::Progress;
+use super::recorder::{Recorder, Start, can_continue};
+use super::restart::{Keeper, Restart, restart};
 use super::summary::Summary;
+use super::watch::{Reason, STOPPED, Watch};
 use super::{RunArguments, Verbosity, finish, launch};
 
-/// History rows that are held back before they are written.
-const ROWS_HELD: usize = 256;
+/// How a run ended.
+enum Ending {
+    Complete,
+    Stopped,
+}
 
 /// Runs a deck on all ranks and ends MPI.
 pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
+    let start = Instant::now();
     output::initialise();
     let world = match World::start() {
         Ok(world) => world,
@@ -32,13 +37,26 @@ pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
     };
     let speaks = world.rank() == 0;
     // A panic on one rank would leave the others waiting; its message has been printed.
-    let outcome = catch_unwind(AssertUnwindSafe(|| run_deck(&world, arguments, verbosity)))
-        .unwrap_or_else(|_| world.abort(1));
-    finish(outcome, speaks)
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        run_deck(&world, arguments, verbosity, start)
+    }))
+    .unwrap_or_else(|_| world.abort(1));
+    match outcome {
+        Ok(Ending::Stopped) => ExitCode::from(STOPPED),
+        Ok(Ending::Complete) => ExitCode::SUCCESS,
+        Err(error) => finish(Err(error), speaks),
+    }
 }
 
-fn run_deck(world: &World, arguments: &RunArguments, verbosity: Verbosity) -> Result<()> {
-    let plan = agree(world, deck::load(&arguments.deck))?;
+fn run_deck(
+    world: &World,
+    arguments: &RunArguments,
+    verbosity: Verbosity,
+    start: Instant,
+) -> Result<Ending> {
+    let deck = agree(world, deck::read(&arguments.deck, &arguments.set))?;
+    let plan = agree(world, deck.plan())?;
+    let explained = agree(world, deck.explain())?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;
     if let (Some(warning), true, true) = (
@@ -49,23 +67,22 @@ fn run_deck(world: &World, arguments: &RunArguments, verbosity: Verbosity) -> Re
         eprintln!("warning: {warning}");
     }
     let stem = arguments.deck.file_stem().unwrap_or_default();
-    let folder = arguments
-        .output
-        .clone()
-        .unwrap_or_else(|| Path::new("out").join(stem));
-    let files = Files::new(folder);
+    let folder = arguments.output.clone();
+    let files = Files::new(folder.unwrap_or_else(|| Path::new("out").join(stem)));
     let prepared = match world.rank() {
-        0 => files.prepare(arguments.overwrite),
+        0 if !arguments.restart => files.prepare(arguments.overwrite),
         _ => Ok(()),
     };
     agree(world, prepared)?;
     let job = Job {
         world,
         plan: &plan,
+        explained,
         files: &files,
         threads,
-        overwrite: arguments.overwrite,
+        arguments,
         verbosity,
+        start,
     };
     match plan.dimension.count() {
         1 => job.run::<1>(),
@@ -74,85 +91,86 @@ fn run_deck(world: &World, arguments: &RunArguments, verbosity: Verbosity) -> Re
     }
 }
 
-/// Where a run writes to.
-struct Files {
-    folder: PathBuf,
-    result: PathBuf,
-    history: PathBuf,
-}
-
-impl Files {
-    fn new(folder: PathBuf) -> Self {
-        Self {
-            result: folder.join("result.vtkhdf"),
-            history: folder.join("history.csv"),
-            folder,
-        }
-    }
-
-    /// Makes the folder; an error if a result is there that must not be replaced.
-    fn prepare(&self, overwrite: bool) -> Result<()> {
-        let existing = [&self.result, &self.history]
-            .into_iter()
-            .find(|file| file.exists());
-        if let (Some(file), false) = (existing, overwrite) {
-            return Err(Error::input(format!(
-                "{} exists already; --overwrite replaces it, --output DIR writes elsewhere",
-                file.display()
-            )));
-        }
-        fs::create_dir_all(&self.folder)
-            .map_err(|error| super::file_error(&self.folder, "create the folder", &error))
-    }
-}
-
 /// Everything that a run needs beside the points.
 struct Job<'a> {
     world: &'a World,
     plan: &'a Plan,
+    explained: String,
     files: &'a Files,
     threads: usize,
-    overwrite: bool,
+    arguments: &'a RunArguments,
     verbosity: Verbosity,
+    start: Instant,
 }
 
 impl<'a> Job<'a> {
-    fn run<const D: usize>(&self) -> Result<()> {
-        let start = Instant::now();
-        let speaks = self.world.rank() == 0 && self.verbosity > Verbosity::Quiet;
+    fn speaks(&self) -> bool {
+        self.world.rank() == 0 && self.verbosity > Verbosity::Quiet
+    }
+
+    fn run<const D: usize>(&self) -> Result<Ending> {
         let hosts = self.world.hosts();
-        if speaks {
+        if self.speaks() {
             let (ranks, threads) = (self.world.size(), self.threads);
             println!("{}", self.plan.title);
             println!("{ranks} ranks × {threads} threads on {hosts} host(s)");
         }
         let mut simulation = Simulation::<D>::new(self.plan, self.world)?;
-        let mut recorder = Recorder::new(self, &simulation, hosts)?;
-        let mut progress = Progress::new(speaks, simulation.last);
-        recorder.record(&mut simulation)?;
+        simulation.check()?;
+        let (mut keeper, mut recorder) = match self.arguments.restart {
+            true => self.continue_run(&mut simulation, hosts)?,
+            false => self.begin_run(&mut simulation, hosts)?,
+        };
+        let mut watch = Watch::new(
+            self.plan.checkpoint,
+            self.arguments.wall_time,
+            self.start,
+            simulation.step,
+            simulation.number,
+            simulation.last,
+        )?;
+        let first = simulation.number;
+        let mut progress = Progress::new(self.speaks(), first, simulation.last);
+        let mut stopped = None;
         while simulation.number < simulation.last {
             simulation.advance();
-            if simulation.check_is_due()
-                && let Err(error) = simulation.check()
-            {
-                // The reader of the result should see where it went wrong.
-                recorder.write(&mut simulation, true, true)?;
-                recorder.file.close()?;
-                self.write_side_car()?;
-                return Err(error);
+            let complete = simulation.number == simulation.last;
+            if complete || watch.is_due(simulation.number) {
+                if let Err(error) = simulation.check() {
+                    // The reader of the result should see where it went wrong.
+                    recorder.write(&mut simulation, true, true)?;
+                    recorder.file.close()?;
+                    self.write_side_car()?;
+                    return Err(error);
+                }
+                recorder.record(&mut simulation)?;
+                let decision = watch.look(self.world, simulation.number);
+                if complete || decision.checkpoint || decision.stop.is_some() {
+                    watch.wrote_checkpoint(keeper.write(&simulation, &mut recorder)?);
+                }
+                progress.show(simulation.number, simulation.time());
+                if decision.stop.is_some() && !complete {
+                    stopped = decision.stop;
+                    break;
+                }
+            } else {
+                recorder.record(&mut simulation)?;
+                progress.show(simulation.number, simulation.time());
             }
-            recorder.record(&mut simulation)?;
-            progress.show(simulation.number, simulation.time());
         }
-        progress.finish();
-        let spent = recorder.spent;
-        let (energies, broken) = (recorder.energies, recorder.broken);
+        progress.finish(stopped.is_none());
         let cause = recorder.file.no_collective_cause();
+        let steps = simulation.number - first;
+        let record = (recorder.energies, recorder.broken);
+        let (output, checkpoints) = (recorder.spent, (keeper.written, keeper.spent));
         recorder.file.close()?;
         self.write_side_car()?;
-        let summary = Summary::new(&simulation, spent, start.elapsed());
-        if speaks {
-            summary.print(&simulation, self.threads, energies, broken);
+        let spent = (output, checkpoints.1, self.start.elapsed());
+        let summary = Summary::new(&simulation, steps, checkpoints.0, spent);
+        if self.speaks() {
+            if steps > 0 {
+                summary.print(&simulation, self.threads, record.0, record.1);
+            }
             match cause {
                 0 if self.verbosity == Verbosity::Verbose => println!("all writes were collective"),
                 0 => {}
@@ -160,7 +178,67 @@ impl<'a> Job<'a> {
             }
             self.say_where();
         }
-        Ok(())
+        match stopped {
+            None => Ok(Ending::Complete),
+            Some(reason) => {
+                self.say_stopped(&simulation, reason);
+                Ok(Ending::Stopped)
+            }
+        }
+    }
+
+    fn begin_run<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'a, D>,
+        hosts: usize,
+    ) -> Result<(Keeper, Recorder<'a>)> {
+        let creation = match self.arguments.overwrite {
+            true => Creation::Truncate,
+            false => Creation::Exclusive,
+        };
+        let keeper = Keeper::new(simulation, self.files, self.explained.clone())?;
+        let metadata = self.metadata(simulation, hosts);
+        let mut recorder = Recorder::new(simulation, self.files, Start::New(creation), &metadata)?;
+        recorder.record(simulation)?;
+        Ok((keeper, recorder))
+    }
+
+    fn continue_run<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'a, D>,
+        hosts: usize,
+    ) -> Result<(Keeper, Recorder<'a>)> {
+        let Restart { mut keeper, header } =
+            restart(simulation, self.files, self.explained.clone())?;
+        if self.speaks() {
+            let time = si(simulation.time(), "s");
+            println!("continued after step {} (t = {time})", simulation.number);
+            if simulation.number >= simulation.last {
+                println!("the run was complete already");
+            }
+        }
+        let metadata = self.metadata(simulation, hosts);
+        if can_continue(simulation, self.files)? {
+            let start = Start::After(header.outputs, header.rows);
+            let mut recorder = Recorder::new(simulation, self.files, start, &metadata)?;
+            recorder.observer.continue_from(header.start);
+            return Ok((keeper, recorder));
+        }
+        let aside = match self.world.rank() {
+            0 => self.files.set_aside(simulation.number).map(Some),
+            _ => Ok(None),
+        };
+        if let (Some(aside), true) = (agree(self.world, aside)?, self.speaks()) {
+            let aside = aside.display();
+            println!("other outputs are asked for, or the result is gone: it is kept as {aside}");
+        }
+        let start = Start::New(Creation::Exclusive);
+        let mut recorder = Recorder::new(simulation, self.files, start, &metadata)?;
+        recorder.observer.continue_from(header.start);
+        recorder.write(simulation, true, true)?;
+        // The checkpoint counts the outputs of the file that was set aside.
+        keeper.write(simulation, &mut recorder)?;
+        Ok((keeper, recorder))
     }
 
     /// The description of the result for older versions of ParaView.
@@ -179,21 +257,35 @@ impl<'a> Job<'a> {
         println!("picture  fissure plot {result}");
     }
 
+    fn say_stopped<const D: usize>(&self, simulation: &Simulation<'_, D>, reason: Reason) {
+        if self.world.rank() == 0 {
+            let because = match reason {
+                Reason::Signal => "by a signal",
+                Reason::WallTime => "as the wall-clock limit is near",
+            };
+            let (number, last) = (simulation.number, simulation.last);
+            let time = si(simulation.time(), "s");
+            eprintln!(
+                "stopped {because} after step {number} of {last} (t = {time}); a checkpoint is \
+                 written, --restart continues"
+            );
+        }
+    }
+
     /// Attributes of the result: how it was made.
     fn metadata<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
         hosts: usize,
     ) -> Vec<(&'static str, String)> {
+        let command_line: Vec<String> = std::env::args().collect();
         vec![
             ("title", self.plan.title.clone()),
             ("deck", self.plan.source.text.clone()),
+            ("deck_in_full", self.explained.clone()),
             ("deck_path", self.plan.source.path.display().to_string()),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            (
-                "command_line",
-                std::env::args().collect::<Vec<_>>().join(" "),
-            ),
+            ("command_line", command_line.join(" ")),
             ("ranks", self.world.size().to_string()),
             ("threads", self.threads.to_string()),
             ("hosts", hosts.to_string()),
@@ -201,144 +293,5 @@ impl<'a> Job<'a> {
             ("section", self.plan.dimension.section().to_string()),
             ("time_step", simulation.step.to_string()),
         ]
-    }
-}
-
-/// Writes result and history when they are due.
-struct Recorder<'a> {
-    file: ResultFile<'a>,
-    order: IdOrder,
-    fields: Vec<Field>,
-    observer: HistoryObserver,
-    outputs: Schedule,
-    rows: Schedule,
-    held: Vec<Vec<f64>>,
-    energies: Energies,
-    broken: u64,
-    spent: Duration,
-}
-
-impl<'a> Recorder<'a> {
-    fn new<const D: usize>(
-        job: &'a Job<'a>,
-        simulation: &Simulation<'_, D>,
-        hosts: usize,
-    ) -> Result<Self> {
-        let (plan, model) = (job.plan, &simulation.model);
-        let observer = HistoryObserver::new(simulation)?;
-        let comm: &dyn Communicator = job.world;
-        let owned = model.owned();
-        let order = IdOrder::new(comm, &model.ids[..owned], model.total);
-        let first = order.first();
-        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
-        let places = order.collect(comm, &places, 3);
-        let ids: Vec<u64> = (first..first + order.count() as u64).collect();
-        let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
-        let blocks = order.collect(comm, &blocks, 1);
-        let volumes = order.collect(comm, &model.volume[..owned], 1);
-        let scalar = |name, unit| FieldDescription {
-            name,
-            unit,
-            components: 1,
-        };
-        let fixed = [
-            (scalar("id", "1"), FieldData::U64(&ids)),
-            (scalar("block", "1"), FieldData::U32(&blocks)),
-            (scalar("volume", "m^3"), FieldData::F64(&volumes)),
-        ];
-        let described: Vec<FieldDescription> = plan
-            .output
-            .fields
-            .iter()
-            .map(|field| FieldDescription {
-                name: field.name(),
-                unit: field.unit(),
-                components: field.components(),
-            })
-            .collect();
-        let mut file = ResultFile::create(
-            &job.files.result,
-            job.world,
-            match job.overwrite {
-                true => Creation::Truncate,
-                false => Creation::Exclusive,
-            },
-            &Contents {
-                piece: Piece {
-                    first,
-                    total: model.total,
-                },
-                positions: bytemuck::cast_slice(&places),
-                fixed: &fixed,
-                moving: &described,
-                metadata: &job.metadata(simulation, hosts),
-            },
-        )?;
-        file.create_history(observer.columns(), &job.files.history)?;
-        let schedule = |every| Schedule::new(every, simulation.step, simulation.last);
-        Ok(Self {
-            file,
-            order,
-            fields: plan.output.fields.clone(),
-            observer,
-            outputs: schedule(plan.output.every),
-            rows: schedule(plan.history.every),
-            held: Vec::new(),
-            energies: Energies::default(),
-            broken: 0,
-            spent: Duration::ZERO,
-        })
-    }
-
-    /// Writes what is due after the present step.
-    fn record<const D: usize>(&mut self, simulation: &mut Simulation<'_, D>) -> Result<()> {
-        let number = simulation.number;
-        self.write(
-            simulation,
-            self.outputs.is_due(number),
-            self.rows.is_due(number),
-        )
-    }
-
-    fn write<const D: usize>(
-        &mut self,
-        simulation: &mut Simulation<'_, D>,
-        output: bool,
-        row: bool,
-    ) -> Result<()> {
-        if !output && !row {
-            return Ok(());
-        }
-        let start = Instant::now();
-        let snapshot = Snapshot::new(simulation);
-        if row {
-            let HistoryRow {
-                values,
-                energies,
-                broken,
-            } = self.observer.row(simulation, &snapshot);
-            self.held.push(values);
-            (self.energies, self.broken) = (energies, broken);
-        }
-        if output || self.held.len() >= ROWS_HELD {
-            self.file.append_history(&self.held)?;
-            self.held.clear();
-        }
-        if output {
-            let values: Vec<Vec<f64>> = self
-                .fields
-                .iter()
-                .map(|field| {
-                    let values = snapshot.field(simulation, *field);
-                    self.order
-                        .collect(simulation.comm, &values, field.components())
-                })
-                .collect();
-            let data: Vec<FieldData> = values.iter().map(|v| FieldData::F64(v)).collect();
-            self.file
-                .write_step(simulation.time(), simulation.number, &data)?;
-        }
-        self.spent += start.elapsed();
-        Ok(())
     }
 }

@@ -12,18 +12,30 @@ use super::format::{count, si};
 pub struct Summary {
     points: u64,
     bonds: u64,
-    seconds: [f64; 6],
+    steps: u64,
+    checkpoints: u64,
+    seconds: [f64; 7],
 }
 
 /// The phases, in the order of [`Summary::seconds`].
-const PHASES: [&str; 6] = ["set-up", "bonds", "halo", "motion", "output", "whole run"];
+const PHASES: [&str; 7] = [
+    "set-up",
+    "bonds",
+    "halo",
+    "motion",
+    "output",
+    "checkpoints",
+    "whole run",
+];
 
 impl Summary {
-    /// Gathers the figures: times are those of the slowest rank. Collective.
+    /// Gathers the figures of `steps` steps with so many checkpoints; `spent` is the time of output,
+    /// of checkpoints and in all. Times are those of the slowest rank. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
-        output: Duration,
-        whole: Duration,
+        steps: u64,
+        checkpoints: u64,
+        spent: (Duration, Duration, Duration),
     ) -> Self {
         let times = &simulation.times;
         let phases = [
@@ -31,14 +43,17 @@ impl Summary {
             times.forces.bonds,
             times.forces.halo,
             times.motion,
-            output,
-            whole,
+            spent.0,
+            spent.1,
+            spent.2,
         ];
         let mut seconds = phases.map(|phase| phase.as_secs_f64());
         simulation.comm.max(&mut seconds);
         Self {
             points: simulation.model.total,
             bonds: comm::total(simulation.comm, simulation.forces.directed_bonds()),
+            steps,
+            checkpoints,
             seconds,
         }
     }
@@ -57,7 +72,7 @@ impl Summary {
         line("points", count(self.points));
         line("bonds", count(self.bonds / 2));
         line("broken bonds", count(broken));
-        line("steps", count(simulation.number));
+        line("steps", count(self.steps));
         let step = si(simulation.step, "s");
         let share = simulation.step / simulation.stable_step;
         line(
@@ -65,13 +80,14 @@ impl Summary {
             format!("{step} ({share:.2} of the stable one)"),
         );
         line("ranks × threads", format!("{} × {threads}", comm.size()));
-        let [_, bonds, halo, motion, _, _] = self.seconds;
+        line("checkpoints", count(self.checkpoints));
+        let [_, bonds, halo, motion, ..] = self.seconds;
         let loop_seconds = bonds + halo + motion;
-        let updates = self.bonds as f64 * simulation.number as f64 / loop_seconds;
+        let updates = self.bonds as f64 * self.steps as f64 / loop_seconds;
         line("bond updates", si(updates, "/s"));
         println!("time by phase");
         for (name, seconds) in PHASES.iter().zip(self.seconds) {
-            let share = 100.0 * seconds / self.seconds[5];
+            let share = 100.0 * seconds / self.seconds[6];
             println!("  {name:<17}{seconds:8.3} s {share:5.1} %");
         }
         println!("energy");

@@ -2,6 +2,8 @@
 //!
 //! Files hold points in this order, so that they do not depend on the number of ranks.
 
+use std::ops::Range;
+
 use bytemuck::Pod;
 
 use super::Communicator;
@@ -68,39 +70,93 @@ impl IdOrder {
     /// From values of the owned points, `width` a point, to those of this rank's block of ids.
     /// Collective.
     pub fn collect<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
-        let size = self.count * width;
-        transfer(comm, (&self.owned, values), (&self.rows, size), width)
+        let row = |row: usize| row * width..(row + 1) * width;
+        let from = (&self.owned[..], values, row);
+        transfer(comm, from, (&self.rows[..], self.count * width, row))
     }
 
     /// From values of this rank's block of ids, `width` an id, to those of the owned points.
     /// Collective.
     pub fn spread<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
-        let size = width * self.owned.iter().map(Vec::len).sum::<usize>();
-        transfer(comm, (&self.rows, values), (&self.owned, size), width)
+        let row = |row: usize| row * width..(row + 1) * width;
+        let from = (&self.rows[..], values, row);
+        let owned = self.owned.iter().map(Vec::len).sum::<usize>();
+        transfer(comm, from, (&self.owned[..], owned * width, row))
+    }
+
+    /// As [`Self::collect`] for rows of different lengths: `owned` and `block` are the lengths of the
+    /// rows of the owned points and of this rank's block.
+    pub fn collect_ragged<T: Pod>(
+        &self,
+        comm: &dyn Communicator,
+        values: &[T],
+        owned: &[u32],
+        block: &[u32],
+    ) -> Vec<T> {
+        let (from, to) = (offsets(owned), offsets(block));
+        let from_row = |row: usize| from[row]..from[row + 1];
+        let to_row = |row: usize| to[row]..to[row + 1];
+        let size = to[block.len()];
+        transfer(
+            comm,
+            (&self.owned[..], values, from_row),
+            (&self.rows[..], size, to_row),
+        )
+    }
+
+    /// As [`Self::spread`] for rows of different lengths; see [`Self::collect_ragged`].
+    pub fn spread_ragged<T: Pod>(
+        &self,
+        comm: &dyn Communicator,
+        values: &[T],
+        owned: &[u32],
+        block: &[u32],
+    ) -> Vec<T> {
+        let (from, to) = (offsets(block), offsets(owned));
+        let from_row = |row: usize| from[row]..from[row + 1];
+        let to_row = |row: usize| to[row]..to[row + 1];
+        let size = to[owned.len()];
+        transfer(
+            comm,
+            (&self.rows[..], values, from_row),
+            (&self.owned[..], size, to_row),
+        )
     }
 }
 
-/// Sends the listed rows of `from` to each rank, and puts what comes into the listed rows of a new
-/// array.
+/// Where each row starts, and where the last one ends.
+fn offsets(lengths: &[u32]) -> Vec<usize> {
+    let ends = lengths.iter().scan(0, |end, length| {
+        *end += *length as usize;
+        Some(*end)
+    });
+    std::iter::once(0).chain(ends).collect()
+}
+
+/// Sends the listed rows of an array to each rank, and puts what comes into the listed rows of a new
+/// array of the size given; the functions tell where a row stands.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
-    from: (&[Vec<u32>], &[T]),
-    to: (&[Vec<u32>], usize),
-    width: usize,
+    (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),
+    (to_rows, size, to): (&[Vec<u32>], usize, impl Fn(usize) -> Range<usize>),
 ) -> Vec<T> {
-    let place = |row: u32| row as usize * width..(row as usize + 1) * width;
     let pack = |rows: &Vec<u32>| {
-        let values = rows.iter().flat_map(|row| &from.1[place(*row)]);
-        values
-            .flat_map(|value| bytemuck::bytes_of(value).iter().copied())
-            .collect()
+        let mut bytes = Vec::new();
+        for row in rows {
+            bytes.extend_from_slice(bytemuck::cast_slice(&values[from(*row as usize)]));
+        }
+        bytes
     };
-    let incoming = comm.all_to_all(from.0.iter().map(pack).collect());
-    let mut result = vec![T::zeroed(); to.1];
-    for (rows, bytes) in to.0.iter().zip(incoming) {
+    let incoming = comm.all_to_all(from_rows.iter().map(pack).collect());
+    let mut result = vec![T::zeroed(); size];
+    for (rows, bytes) in to_rows.iter().zip(incoming) {
         let values: Vec<T> = bytemuck::pod_collect_to_vec(&bytes);
-        for (row, value) in rows.iter().zip(values.chunks_exact(width.max(1))) {
-            result[place(*row)].copy_from_slice(value);
+        let mut rest = &values[..];
+        for row in rows {
+            let place = to(*row as usize);
+            let (own, more) = rest.split_at(place.len());
+            result[place].copy_from_slice(own);
+            rest = more;
         }
     }
     result
@@ -129,6 +185,17 @@ mod tests {
                 let block = order.collect(comm, &values, 2);
                 assert_eq!(order.spread(comm, &block, 2), values);
                 assert_eq!(block.len(), 2 * order.count());
+                // Rows of id mod 3 entries.
+                let length = |id: u64| (id % 3) as u32;
+                let lengths: Vec<u32> = ids.iter().map(|id| length(*id)).collect();
+                let block_ids = order.first()..order.first() + order.count() as u64;
+                let block_lengths: Vec<u32> = block_ids.clone().map(length).collect();
+                let row = |id: u64| vec![id as u8; length(id) as usize];
+                let ragged: Vec<u8> = ids.iter().flat_map(|id| row(*id)).collect();
+                let by_id = order.collect_ragged(comm, &ragged, &lengths, &block_lengths);
+                assert_eq!(by_id, block_ids.flat_map(row).collect::<Vec<u8>>());
+                let back = order.spread_ragged(comm, &by_id, &lengths, &block_lengths);
+                assert_eq!(back, ragged);
                 (order.first(), block)
             });
             let expected: Vec<f64> = (0..total).flat_map(|id| [id as f64, -1.0]).collect();

@@ -12,6 +12,9 @@ use super::shapes;
 use super::validate::checked_spacing;
 use crate::error::Result;
 
+/// The square of this number of bond lists is looked through in every step.
+const MOST_BODIES: usize = 256;
+
 /// Validates the bodies.
 ///
 /// # Errors
@@ -23,6 +26,14 @@ pub fn bodies(
     materials: &IndexMap<String, plan::Material>,
     damages: &IndexMap<String, plan::CriticalStretch>,
 ) -> Result<Vec<plan::Body>> {
+    if deck.body.len() > MOST_BODIES {
+        let message = format!(
+            "[body]: the deck has {} bodies; {MOST_BODIES} at most, each a block with its own \
+             material (a union of shapes is one body)",
+            deck.body.len()
+        );
+        return Err(scope.error(deck.body[MOST_BODIES].span(), message));
+    }
     if deck.body.is_empty() {
         let end = scope.source.text.len();
         return Err(scope.error(end..end, "[body]: the deck needs a body"));

@@ -2,20 +2,18 @@
 
 use super::grammar::Deck;
 use super::number::{Number, default_number};
-use super::plan::{Interval, Plan};
-use super::source::Source;
-use super::validate::validate;
+use super::plan::{CheckpointRule, Interval, Plan};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
+use serde_spanned::Spanned;
 
 /// The deck as TOML with every default written out.
 ///
 /// # Errors
-/// When the deck is wrong.
-pub fn explain(source: &Source) -> Result<String> {
-    let mut deck = super::grammar(source)?;
-    let plan = validate(source, &deck)?;
-    fill(&mut deck, &plan);
+/// When it cannot be written.
+pub fn explain(deck: &Deck, plan: &Plan) -> Result<String> {
+    let mut deck = deck.clone();
+    fill(&mut deck, plan);
     toml::to_string(&deck).map_err(|error| Error::run(format!("cannot write the deck: {error}")))
 }
 
@@ -33,10 +31,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     }
     let grid = deck.grid.get_mut();
     let zeros = vec![default_number(0.0); plan.dimension.count()];
-    grid.origin = grid
-        .origin
-        .take()
-        .or(Some(serde_spanned::Spanned::new(0..0, zeros)));
+    grid.origin = grid.origin.take().or(Some(Spanned::new(0..0, zeros)));
     for body in deck.body.values_mut().map(|body| body.get_mut()) {
         if body.shape.is_some() {
             body.spacing = body.spacing.take().or(grid.spacing.clone());
@@ -75,9 +70,14 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     output.fields.get_or_insert_with(|| {
         let names = plan.output.fields.iter().map(|field| field.name());
         names
-            .map(|name| serde_spanned::Spanned::new(0..0, name.to_owned()))
+            .map(|name| Spanned::new(0..0, name.to_owned()))
             .collect()
     });
+    let checkpoint = deck.checkpoint.get_mut();
+    if let CheckpointRule::WallClock(seconds) = plan.checkpoint {
+        let text = || Spanned::new(0..0, format!("{seconds} s"));
+        checkpoint.every.get_or_insert_with(text);
+    }
     let history = deck.history.get_mut();
     fill_interval(
         &mut history.every,

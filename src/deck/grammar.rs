@@ -65,6 +65,9 @@ pub struct Deck {
     /// What is written to the history, and how often.
     #[serde(default = "nowhere")]
     pub history: Spanned<History>,
+    /// How often the run can be continued from.
+    #[serde(default = "nowhere")]
+    pub checkpoint: Spanned<Checkpoint>,
 }
 
 fn nowhere<T: Default>() -> Spanned<T> {
@@ -401,6 +404,22 @@ pub struct History {
     /// Places whose nearest point is followed, by name.
     #[serde(default)]
     pub probe: Tables<Probe>,
+}
+
+/// Checkpoints; at most one of the keys.
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Checkpoint {
+    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if
+    /// nothing is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Text>,
+    /// Steps between checkpoints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<Spanned<NonZeroU64>>,
+    /// Simulated time between checkpoints in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_time: Option<Number>,
 }
 
 /// A place to watch.

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod conditions;
+mod difference;
 mod explain;
 pub mod expression;
 pub mod grammar;
@@ -19,7 +20,7 @@ mod validate;
 
 use std::path::Path;
 
-pub use explain::explain;
+pub use difference::differences;
 pub use plan::Plan;
 pub use source::Source;
 
@@ -28,22 +29,64 @@ use crate::error::Result;
 /// The commented deck that `fissure init` writes.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
-/// Reads and validates a deck.
+/// A deck whose text follows the grammar, not yet validated.
+pub struct Deck {
+    source: Source,
+    grammar: grammar::Deck,
+}
+
+/// Reads a deck; `set` gives parameters, by name, other values or expressions.
 ///
 /// # Errors
 /// An input error that names file, line, column and key and says what would be right.
-pub fn load(path: &Path) -> Result<Plan> {
-    parse(&Source::read(path)?)
+pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
+    let mut deck = Deck::new(Source::read(path)?)?;
+    for (name, value) in set {
+        parameters::set(&deck.source, &mut deck.grammar.parameters, name, value)?;
+    }
+    Ok(deck)
+}
+
+impl Deck {
+    /// From a text.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn new(source: Source) -> Result<Self> {
+        let grammar = toml::from_str(&source.text)
+            .map_err(|error| toml_error::toml_error(&source, &error))?;
+        Ok(Self { source, grammar })
+    }
+
+    /// The validated deck.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn plan(&self) -> Result<Plan> {
+        validate::validate(&self.source, &self.grammar)
+    }
+
+    /// The deck as TOML with every default written out.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn explain(&self) -> Result<String> {
+        explain::explain(&self.grammar, &self.plan()?)
+    }
 }
 
 /// Validates a deck's text.
 ///
 /// # Errors
-/// As [`load`].
+/// As [`read`].
 pub fn parse(source: &Source) -> Result<Plan> {
-    validate::validate(source, &grammar(source)?)
+    Deck::new(source.clone())?.plan()
 }
 
-fn grammar(source: &Source) -> Result<grammar::Deck> {
-    toml::from_str(&source.text).map_err(|error| toml_error::toml_error(source, &error))
+/// A deck's text with every default written out.
+///
+/// # Errors
+/// As [`read`].
+pub fn explain(source: &Source) -> Result<String> {
+    Deck::new(source.clone())?.explain()
 }

@@ -108,3 +108,51 @@ pub fn history(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Resu
         probes: probes.into_iter().collect(),
     })
 }
+
+/// Wall-clock time between checkpoints if the deck does not say, s.
+const DEFAULT_CHECKPOINT: f64 = 600.0;
+
+/// Validates when checkpoints are written.
+///
+/// # Errors
+/// On a wrong interval or more than one.
+pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<plan::CheckpointRule> {
+    use plan::{CheckpointRule, Interval};
+    let table = deck.checkpoint.get_ref();
+    match (&table.every, &table.every_steps, &table.every_time) {
+        (None, None, None) => Ok(CheckpointRule::WallClock(DEFAULT_CHECKPOINT)),
+        (Some(every), None, None) => match duration(every.get_ref()) {
+            Some(seconds) => Ok(CheckpointRule::WallClock(seconds)),
+            None => {
+                let message = format!(
+                    "[checkpoint] every: must be a wall-clock time such as \"10 min\", \"90 s\" or \
+                     \"2 h\", is \"{}\"",
+                    every.get_ref()
+                );
+                Err(scope.error(every.span(), message))
+            }
+        },
+        (None, Some(steps), None) => {
+            let interval = Interval::Steps(steps.get_ref().get());
+            Ok(CheckpointRule::Simulation(interval))
+        }
+        (None, None, Some(time)) => {
+            let seconds = scope.positive(time, "[checkpoint] every_time")?;
+            Ok(CheckpointRule::Simulation(Interval::Seconds(seconds)))
+        }
+        _ => {
+            let message = "[checkpoint]: give only one of `every`, `every_steps` and `every_time`";
+            Err(scope.error(deck.checkpoint.span(), message))
+        }
+    }
+}
+
+/// Seconds of a number with one of the units s, min, h; `None` for anything else.
+fn duration(text: &str) -> Option<f64> {
+    let units = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
+    let (number, factor) = units
+        .into_iter()
+        .find_map(|(unit, factor)| Some((text.trim().strip_suffix(unit)?, factor)))?;
+    let seconds = factor * number.trim().parse::<f64>().ok()?;
+    (seconds > 0.0 && seconds.is_finite()).then_some(seconds)
+}

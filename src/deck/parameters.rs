@@ -1,11 +1,13 @@
 //! The named numbers of a deck, which may build on one another in any order.
 
 use indexmap::IndexMap;
+use serde_spanned::Spanned;
 
 use super::expression::Expression;
 use super::grammar::Text;
 use super::number::{Number, Written};
 use super::resolve::Scope;
+use super::source::{Source, suggestion};
 use crate::error::{Error, Result};
 
 /// Words that mean something else in an expression or in its place.
@@ -44,6 +46,43 @@ pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<(
             return Err(circle(scope, written));
         }
     }
+    Ok(())
+}
+
+/// Gives a parameter another value or expression.
+///
+/// # Errors
+/// When the deck has no such parameter or the value is no expression.
+pub fn set(
+    source: &Source,
+    parameters: &mut IndexMap<Text, Number>,
+    name: &str,
+    value: &str,
+) -> Result<()> {
+    let known: Vec<String> = parameters
+        .keys()
+        .map(|name| name.get_ref().clone())
+        .collect();
+    let found = parameters
+        .iter_mut()
+        .find(|(known, _)| known.get_ref() == name);
+    let Some((_, number)) = found else {
+        let names = known.iter().map(String::as_str);
+        return Err(Error::input(format!(
+            "--set {name}={value}: [parameters] of {} has no `{name}`{}",
+            source.path.display(),
+            suggestion(name, names)
+        )));
+    };
+    let written = match value.parse::<f64>() {
+        Ok(value) => Written::Value(value),
+        Err(_) => Written::Text(value.to_owned()),
+    };
+    if let Written::Text(text) = &written {
+        Expression::names(text)
+            .map_err(|error| Error::input(format!("--set {name}={value}: {}", error.message)))?;
+    }
+    *number = Spanned::new(number.span(), written);
     Ok(())
 }
 

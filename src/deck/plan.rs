@@ -37,6 +37,8 @@ pub struct Plan {
     pub output: Output,
     /// The history.
     pub history: History,
+    /// When checkpoints are written.
+    pub checkpoint: CheckpointRule,
 }
 
 /// A body, which is a block with its own material and damage.
@@ -282,6 +284,15 @@ pub enum Interval {
     Seconds(f64),
     /// Time steps.
     Steps(u64),
+}
+
+/// When checkpoints are written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CheckpointRule {
+    /// So many seconds of wall-clock time apart.
+    WallClock(f64),
+    /// So many steps or so much simulated time apart.
+    Simulation(Interval),
 }
 
 /// The result file.

@@ -6,7 +6,7 @@ use indexmap::IndexMap;
 use serde_spanned::Spanned;
 
 use super::expression::{Expression, Variable};
-use super::grammar::{Tables, Text};
+use super::grammar::{Deck, DimensionName, Tables, Text};
 use super::number::{Number, Vector, Written, shown};
 use super::parameters;
 use super::source::{Source, suggestion};
@@ -27,17 +27,17 @@ impl<'a> Scope<'a> {
     ///
     /// # Errors
     /// On a name that hides a variable, on an unknown name and on a circle.
-    pub fn new(
-        source: &'a Source,
-        dimension: usize,
-        written: &IndexMap<Text, Number>,
-    ) -> Result<Self> {
+    pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {
             source,
             parameters: IndexMap::new(),
-            dimension,
+            dimension: match deck.dimension.get_ref() {
+                DimensionName::Line => 1,
+                DimensionName::PlaneStress | DimensionName::PlaneStrain => 2,
+                DimensionName::Space => 3,
+            },
         };
-        parameters::evaluate(&mut scope, written)?;
+        parameters::evaluate(&mut scope, &deck.parameters)?;
         Ok(scope)
     }
 

@@ -14,12 +14,7 @@ use crate::error::Result;
 /// # Errors
 /// The first mistake, with its place in the deck, the key and what would be right.
 pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
-    let count = match deck.dimension.get_ref() {
-        DimensionName::Line => 1,
-        DimensionName::PlaneStress | DimensionName::PlaneStrain => 2,
-        DimensionName::Space => 3,
-    };
-    let scope = Scope::new(source, count, &deck.parameters)?;
+    let scope = Scope::of(source, deck)?;
     let dimension = dimension(&scope, deck)?;
     let horizon = scope.positive(&deck.grid.get_ref().horizon, "[grid] horizon")?;
     let spacing = spacing(&scope, deck, horizon)?;
@@ -46,6 +41,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         conditions: conditions::conditions(&scope, deck, &sets, spacing)?,
         output: outputs::output(&scope, deck, time.end)?,
         history: outputs::history(&scope, deck, &sets, time.end)?,
+        checkpoint: outputs::checkpoint(&scope, deck)?,
         sets,
         time,
     })

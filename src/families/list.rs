@@ -137,6 +137,23 @@ impl BondList {
         }
     }
 
+    /// Each row's point with the bits of its bonds, which are the same on any number of ranks.
+    pub fn intact_rows(&self) -> impl Iterator<Item = (usize, &[u8])> {
+        let row = |row: usize| &self.intact[self.starts[row]..self.starts[row + 1]];
+        (0..self.points.len()).map(move |k| (self.points[k] as usize, row(k)))
+    }
+
+    /// As [`Self::intact_rows`], to put back what was stored.
+    pub fn intact_rows_mut(&mut self) -> impl Iterator<Item = (usize, &mut [u8])> {
+        let mut rest = &mut self.intact[..];
+        let lengths = self.starts.windows(2).map(|pair| pair[1] - pair[0]);
+        self.points.iter().zip(lengths).map(move |(point, length)| {
+            let (row, more) = std::mem::take(&mut rest).split_at_mut(length);
+            rest = more;
+            (*point as usize, row)
+        })
+    }
+
     /// Memory that the list takes, bytes.
     pub fn bytes(&self) -> usize {
         let groups = self.neighbours.len();

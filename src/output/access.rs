@@ -18,12 +18,31 @@ pub enum Creation {
     Truncate,
 }
 
+/// Opens a file that exists, to read it.
+pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
+    // Ranks whose caches differ, as they do after reading different rows, wait for one another in
+    // vain when they read metadata together (HDF5 1.10.8). A file that is being created has all of it
+    // in memory, one that is read is read by each rank for itself; none is ever changed again.
+    options(raw, false)?.open(path)
+}
+
 /// Creates a file for one process or, with a communicator, for all ranks together.
 pub(super) fn create(
     path: &Path,
     raw: Option<RawCommunicator>,
     creation: Creation,
 ) -> hdf5::Result<hdf5::File> {
+    let builder = options(raw, true)?;
+    match creation {
+        Creation::Exclusive => builder.create_excl(path),
+        Creation::Truncate => builder.create(path),
+    }
+}
+
+fn options(
+    raw: Option<RawCommunicator>,
+    collective_reads: bool,
+) -> hdf5::Result<hdf5::FileBuilder> {
     let mut builder = hdf5::File::with_options();
     let access = builder.fapl();
     access.fclose_degree(FileCloseDegree::Strong);
@@ -40,10 +59,7 @@ pub(super) fn create(
         access
             .mpio(raw, None)
             .coll_metadata_write(true)
-            .all_coll_metadata_ops(true);
+            .all_coll_metadata_ops(collective_reads);
     }
-    match creation {
-        Creation::Exclusive => builder.create_excl(path),
-        Creation::Truncate => builder.create(path),
-    }
+    Ok(builder)
 }

@@ -8,6 +8,7 @@ use super::transfer::{self, Transfer};
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
+use hdf5_metno::types::VarLenUnicode;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
@@ -66,16 +67,38 @@ impl<'a> CollectiveFile<'a> {
         let exists = creation == Creation::Exclusive && comm.rank() == 0 && path.exists();
         let text = || Error::input(format!("{}: the file exists already", path.display()));
         agree(comm, if exists { Err(text()) } else { Ok(()) })?;
-        let created = access::create(path, raw, creation)
-            .and_then(|file| Ok((ManuallyDrop::new(file), Transfer::new(raw.is_some())?)))
-            .map_err(|error| failure(path, "cannot create the file", &error));
-        let (inner, transfer) = agree(comm, created)?;
-        let reservation = if raw.is_some() && comm.rank() == 0 {
+        Self::begin(path, comm, true, || access::create(path, raw, creation))
+            .map_err(|error| Error::run(format!("cannot create {error}")))
+    }
+
+    /// Opens a file that exists, together with the other ranks, to read it.
+    ///
+    /// # Errors
+    /// There is no such file, it is no HDF5 file, or it may not be read.
+    pub fn open(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
+        let raw = comm.raw();
+        Self::begin(path, comm, false, || access::open(path, raw))
+            .map_err(|error| Error::run(format!("cannot open {error}")))
+    }
+
+    fn begin(
+        path: &Path,
+        comm: &'a dyn Communicator,
+        grows: bool,
+        open: impl FnOnce() -> hdf5::Result<hdf5::File>,
+    ) -> Result<Self> {
+        let collective = comm.raw().is_some();
+        let opened = open()
+            .and_then(|file| Ok((ManuallyDrop::new(file), Transfer::new(collective)?)))
+            .map_err(|error| Error::run(format!("{}: {}", path.display(), innermost(&error))));
+        let (inner, transfer) = agree(comm, opened)?;
+        let reservation = if collective && grows && comm.rank() == 0 {
             Reservation::new(path).map(Some)
         } else {
             Ok(None)
         };
         let reservation = agree(comm, reservation)?;
+        let length = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
         Ok(Self {
             inner,
             transfer,
@@ -83,7 +106,7 @@ impl<'a> CollectiveFile<'a> {
             comm,
             no_collective_cause: 0,
             usable: true,
-            size: OBJECT_BYTES,
+            size: length + OBJECT_BYTES,
             reserved: 0,
             reservation,
         })
@@ -92,6 +115,21 @@ impl<'a> CollectiveFile<'a> {
     /// The ranks that write the file.
     pub fn communicator(&self) -> &'a dyn Communicator {
         self.comm
+    }
+
+    /// Gives the open file another name, in the place of any that has it. Collective.
+    ///
+    /// # Errors
+    /// When it cannot be renamed.
+    pub fn rename(&mut self, path: &Path) -> Result<()> {
+        let renamed = match self.comm.rank() {
+            0 => std::fs::rename(&self.path, path)
+                .map_err(|error| Error::run(format!("{}: {error}", path.display()))),
+            _ => Ok(()),
+        };
+        agree(self.comm, renamed)?;
+        self.path = path.to_path_buf();
+        Ok(())
     }
 
     /// Why writes so far were not collective: bits of HDF5's `H5D_MPIO_…` causes of any rank and
@@ -158,19 +196,84 @@ impl<'a> CollectiveFile<'a> {
         Ok(dataset)
     }
 
+    /// Opens a dataset that exists.
+    ///
+    /// # Errors
+    /// There is no such dataset.
+    pub fn open_dataset(&mut self, path: &str) -> Result<Dataset> {
+        self.together(&format!("cannot open the dataset {path}"), |file| {
+            Dataset::open(&file.inner, path)
+        })
+    }
+
     /// Adds rows at the end of an extensible dataset, the same number on every rank.
     ///
     /// # Errors
     /// The dataset is not extensible or the disc is full.
     pub fn extend(&mut self, dataset: &mut Dataset, additional: u64) -> Result<()> {
-        let rows = dataset.rows + additional;
+        self.resize(dataset, dataset.rows + additional)
+    }
+
+    /// Gives an extensible dataset so many rows, the same number on every rank; rows that are added
+    /// hold arbitrary values.
+    ///
+    /// # Errors
+    /// The dataset is not extensible or the disc is full.
+    pub fn resize(&mut self, dataset: &mut Dataset, rows: u64) -> Result<()> {
         let shape = dataset.shape(rows).iter().map(|&n| n as usize).collect();
-        self.together(&format!("cannot extend {}", dataset.path), |_| {
+        self.together(&format!("cannot resize {}", dataset.path), |_| {
             dataset.inner.resize::<Vec<usize>>(shape)
         })?;
-        self.size += dataset.bytes(rows) - dataset.bytes(dataset.rows);
+        self.size += dataset
+            .bytes(rows)
+            .saturating_sub(dataset.bytes(dataset.rows));
         dataset.rows = rows;
         Ok(())
+    }
+
+    /// Reads rows of a dataset, `count` from `first_row` on on this rank, in one collective transfer.
+    ///
+    /// # Errors
+    /// The dataset has no such rows or numbers of another type, or it cannot be read.
+    pub fn read_rows<T: hdf5::H5Type + Clone + Default>(
+        &mut self,
+        dataset: &Dataset,
+        first_row: u64,
+        count: usize,
+    ) -> Result<Vec<T>> {
+        self.together(&format!("cannot read {}", dataset.path), |file| {
+            if first_row + count as u64 > dataset.rows {
+                return Err("it has too few rows".into());
+            }
+            let mut values = vec![T::default(); count * dataset.columns.unwrap_or(1)];
+            file.transfer.read(&dataset.inner, first_row, &mut values)?;
+            Ok(values)
+        })
+    }
+
+    /// The text of an attribute of a group (`/` for the file's root).
+    ///
+    /// # Errors
+    /// There is no such text.
+    pub fn text_attribute(&mut self, group: &str, name: &str) -> Result<String> {
+        self.together(
+            &format!("cannot read the attribute {name} of {group}"),
+            |file| {
+                let attribute = file.inner.group(group)?.attr(name)?;
+                Ok(attribute.read_scalar::<VarLenUnicode>()?.to_string())
+            },
+        )
+    }
+
+    /// The integers of an attribute of a group (`/` for the file's root).
+    ///
+    /// # Errors
+    /// There are no such integers.
+    pub fn integers_attribute(&mut self, group: &str, name: &str) -> Result<Vec<i64>> {
+        self.together(
+            &format!("cannot read the attribute {name} of {group}"),
+            |file| file.inner.group(group)?.attr(name)?.read_raw::<i64>(),
+        )
     }
 
     /// Writes this rank's rows from `first_row` on, in one collective transfer; `values` is
@@ -278,8 +381,12 @@ impl Drop for CollectiveFile<'_> {
 }
 
 fn failure(path: &Path, doing: &str, error: &hdf5::Error) -> Error {
+    Error::run(format!("{}: {doing}: {}", path.display(), innermost(error)))
+}
+
+/// HDF5's own account of what went wrong first.
+fn innermost(error: &hdf5::Error) -> String {
     let stack = error.stack();
-    let innermost = stack.as_ref().and_then(|frames| frames.last());
-    let cause = innermost.map_or_else(|| error.to_string(), |frame| frame.desc().to_owned());
-    Error::run(format!("{}: {doing}: {cause}", path.display()))
+    let frame = stack.as_ref().and_then(|frames| frames.last());
+    frame.map_or_else(|| error.to_string(), |frame| frame.desc().to_owned())
 }

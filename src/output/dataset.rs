@@ -43,6 +43,11 @@ impl Dataset {
         self.rows
     }
 
+    /// The numbers of a row.
+    pub fn columns(&self) -> usize {
+        self.columns.unwrap_or(1)
+    }
+
     pub(super) fn shape(&self, rows: u64) -> Vec<u64> {
         let columns = self.columns.map(|columns| columns as u64);
         std::iter::once(rows).chain(columns).collect()
@@ -83,6 +88,22 @@ impl Dataset {
             rows: count,
             row_bytes,
             rows_per_chunk,
+        })
+    }
+
+    /// Opens a dataset that exists.
+    pub(super) fn open(file: &hdf5::File, path: &str) -> hdf5::Result<Self> {
+        let inner = file.dataset(path)?;
+        let shape = inner.shape();
+        let columns = shape.get(1).copied();
+        let number = inner.dtype()?.size();
+        Ok(Self {
+            rows_per_chunk: inner.chunk().map_or(0, |chunk| chunk[0] as u64),
+            row_bytes: (columns.unwrap_or(1) * number) as u64,
+            rows: shape.first().map_or(0, |rows| *rows as u64),
+            inner: ManuallyDrop::new(inner),
+            path: path.to_owned(),
+            columns,
         })
     }
 

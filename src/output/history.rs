@@ -4,6 +4,7 @@
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
+use super::vtkhdf::LEAST_ROWS;
 use crate::comm::agree;
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
@@ -14,8 +15,16 @@ use std::path::{Path, PathBuf};
 /// The group of the columns.
 pub(super) const HISTORY: &str = "/history";
 
-/// A chunk of a column holds this many rows.
-const ROWS_PER_CHUNK: u64 = 512;
+/// What a history holds from the start.
+#[derive(Debug, Clone, Copy)]
+pub struct HistoryContents<'a> {
+    /// Name and unit of each column.
+    pub columns: &'a [(String, &'static str)],
+    /// Where the CSV file goes.
+    pub csv: &'a Path,
+    /// Number of rows that are expected; there may be more.
+    pub rows: u64,
+}
 
 /// A table of f64 columns that grows by rows.
 pub struct History {
@@ -31,16 +40,13 @@ impl History {
     ///
     /// # Errors
     /// There is a history already, two columns have one name, or the files cannot be written.
-    pub fn create(
-        file: &mut CollectiveFile<'_>,
-        columns: &[(String, &str)],
-        csv: &Path,
-    ) -> Result<Self> {
+    pub fn create(file: &mut CollectiveFile<'_>, contents: &HistoryContents) -> Result<Self> {
+        let HistoryContents { columns, csv, rows } = *contents;
         file.create_group(HISTORY)?;
         let mut datasets = Vec::new();
         for (position, (name, unit)) in columns.iter().enumerate() {
             let rows = Rows::Extensible {
-                per_append: ROWS_PER_CHUNK,
+                per_append: rows.max(LEAST_ROWS),
             };
             let column = file.create_dataset::<f64>(&format!("{HISTORY}/{name}"), rows, None)?;
             file.set_dataset_attribute(&column, "unit", Attribute::Text(unit))?;
@@ -58,6 +64,31 @@ impl History {
             csv: csv.to_path_buf(),
             writer: agree(comm, writer)?,
         })
+    }
+
+    /// Collective. The first `count` rows of the history in a file, the same on all ranks.
+    ///
+    /// # Errors
+    /// A column is missing or too short.
+    pub fn read(
+        file: &mut CollectiveFile<'_>,
+        columns: &[(String, &str)],
+        count: u64,
+    ) -> Result<Vec<Vec<f64>>> {
+        let mut rows = vec![Vec::with_capacity(columns.len()); count as usize];
+        for (name, _) in columns {
+            let column = file.open_dataset(&format!("{HISTORY}/{name}"))?;
+            let values: Vec<f64> = file.read_rows(&column, 0, count as usize)?;
+            for (row, value) in rows.iter_mut().zip(values) {
+                row.push(value);
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Number of rows written.
+    pub fn rows(&self) -> u64 {
+        self.columns.first().map_or(0, Dataset::rows)
     }
 
     /// Collective. Adds rows to both files; all ranks pass the same, rank 0 writes them.

@@ -3,12 +3,14 @@
 
 mod access;
 mod attribute;
+pub mod checkpoint;
 mod collective;
 mod dataset;
 mod field;
 mod history;
 mod read;
 mod reserve;
+mod seal;
 #[cfg(test)]
 mod tests;
 mod transfer;
@@ -17,6 +19,8 @@ pub mod xdmf;
 
 pub use access::Creation;
 pub use field::{FieldData, FieldDescription};
+pub use history::HistoryContents;
 pub use read::{Number, ResultReader, StoredColumn, StoredField};
+pub use seal::mix;
 pub use transfer::initialise;
 pub use vtkhdf::{Contents, Piece, ResultFile};

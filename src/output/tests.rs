@@ -3,6 +3,7 @@
 use super::access::Creation;
 use super::collective::CollectiveFile;
 use super::field::{FieldData, FieldDescription};
+use super::history::HistoryContents;
 use super::read::ResultReader;
 use super::vtkhdf::{Contents, Piece, ResultFile};
 use crate::comm::threads;
@@ -32,18 +33,26 @@ fn what_is_written_reads_back() -> Result<()> {
         fixed: &fixed,
         moving: &moving,
         metadata: &metadata,
+        steps: 2,
     };
     let create = || ResultFile::create(&path, &comm, Creation::Exclusive, &contents);
     let mut file = create()?;
     let columns = [("time".into(), "s"), ("a".into(), "")];
-    file.create_history(&columns, &path.with_extension("csv"))?;
+    let csv = path.with_extension("csv");
+    let history = HistoryContents {
+        columns: &columns,
+        csv: &csv,
+        rows: 2,
+    };
+    file.create_history(&history)?;
     for step in [0, 1] {
         file.append_history(&[vec![step as f64, 4.5]])?;
         let velocity = [1.0, 2.0, 3.0, 4.0].map(|value| value + 10.0 * step as f64);
-        let fields = [FieldData::F64(&velocity), FieldData::U8(&[step as u8, 9])];
+        let damage = [step as f64, 9.0];
+        let fields = [&velocity[..], &damage[..]];
         file.write_step(0.5 * step as f64, 100 * step, &fields)?;
     }
-    let error = file.write_step(1.0, 2, &[FieldData::F64(&[0.0]), FieldData::U8(&[0, 0])]);
+    let error = file.write_step(1.0, 2, &[&[0.0], &[0.0, 0.0]]);
     assert!(error.unwrap_err().message.contains("velocity has 1 values"));
     file.close()?;
 

@@ -65,26 +65,91 @@ impl Transfer {
         first_row: u64,
         values: &[T],
     ) -> hdf5::Result<u32> {
+        let selection = Selection::new(dataset, first_row, values.len())?;
+        let number = hdf5::Datatype::from_type::<T>()?;
+        sync(|| {
+            // SAFETY: all handles are alive, and the selection has as many elements as `values`.
+            unsafe {
+                hdf5::h5check(h5d::H5Dwrite(
+                    dataset.id(),
+                    number.id(),
+                    selection.memory.id(),
+                    selection.file.id(),
+                    self.list.id(),
+                    values.as_ptr().cast(),
+                ))?;
+            }
+            self.causes()
+        })
+    }
+
+    /// Reads whole rows from `first_row` on into `values`, none where that is empty. Returns the
+    /// causes that kept the transfer from being collective.
+    pub(super) fn read<T: hdf5::H5Type>(
+        &self,
+        dataset: &hdf5::Dataset,
+        first_row: u64,
+        values: &mut [T],
+    ) -> hdf5::Result<u32> {
+        let selection = Selection::new(dataset, first_row, values.len())?;
+        let number = hdf5::Datatype::from_type::<T>()?;
+        sync(|| {
+            // SAFETY: all handles are alive, and the selection has as many elements as `values`.
+            unsafe {
+                hdf5::h5check(h5d::H5Dread(
+                    dataset.id(),
+                    number.id(),
+                    selection.memory.id(),
+                    selection.file.id(),
+                    self.list.id(),
+                    values.as_mut_ptr().cast(),
+                ))?;
+            }
+            self.causes()
+        })
+    }
+
+    /// Why the last transfer was not collective, on any rank; 0 if it was.
+    fn causes(&self) -> hdf5::Result<u32> {
+        let (mut local, mut global) = (0, 0);
+        if self.collective {
+            let list = self.list.id();
+            // SAFETY: the list is alive, and the pointers are to locals.
+            hdf5::h5check(unsafe {
+                H5Pget_mpio_no_collective_cause(list, &mut local, &mut global)
+            })?;
+        }
+        Ok(local | global)
+    }
+}
+
+/// Consecutive rows of a dataset, and their place in memory.
+struct Selection {
+    memory: hdf5::Dataspace,
+    file: hdf5::Dataspace,
+}
+
+impl Selection {
+    /// The rows from `first_row` on that hold `numbers` numbers; nothing if that is 0.
+    fn new(dataset: &hdf5::Dataset, first_row: u64, numbers: usize) -> hdf5::Result<Self> {
         let mut count: Vec<u64> = dataset.shape().iter().map(|&n| n as u64).collect();
         let mut start = vec![0; count.len()];
         start[0] = first_row;
-        count[0] = values.len() as u64 / count[1..].iter().product::<u64>();
-        let rows = count[0];
+        count[0] = numbers as u64 / count[1..].iter().product::<u64>();
         let lengths: Vec<usize> = count.iter().map(|&n| n.max(1) as usize).collect();
-        let memory = hdf5::Dataspace::try_new(lengths)?;
-        let file = dataset.space()?;
-        let number = hdf5::Datatype::from_type::<T>()?;
-        let (mut local, mut global) = (0, 0);
+        let selection = Self {
+            memory: hdf5::Dataspace::try_new(lengths)?,
+            file: dataset.space()?,
+        };
         sync(|| {
-            // SAFETY: all handles are alive, the slices as long as the spaces have dimensions, and
-            // the selection has as many elements as `values`.
+            // SAFETY: the handles are alive, the slices as long as the spaces have dimensions.
             unsafe {
-                if rows == 0 {
-                    hdf5::h5check(h5s::H5Sselect_none(memory.id()))?;
-                    hdf5::h5check(h5s::H5Sselect_none(file.id()))?;
+                if count[0] == 0 {
+                    hdf5::h5check(h5s::H5Sselect_none(selection.memory.id()))?;
+                    hdf5::h5check(h5s::H5Sselect_none(selection.file.id()))?;
                 } else {
                     hdf5::h5check(h5s::H5Sselect_hyperslab(
-                        file.id(),
+                        selection.file.id(),
                         h5s::H5S_seloper_t::H5S_SELECT_SET,
                         start.as_ptr(),
                         ptr::null(),
@@ -92,24 +157,8 @@ impl Transfer {
                         ptr::null(),
                     ))?;
                 }
-                hdf5::h5check(h5d::H5Dwrite(
-                    dataset.id(),
-                    number.id(),
-                    memory.id(),
-                    file.id(),
-                    self.list.id(),
-                    values.as_ptr().cast(),
-                ))?;
-                if self.collective {
-                    let list = self.list.id();
-                    hdf5::h5check(H5Pget_mpio_no_collective_cause(
-                        list,
-                        &mut local,
-                        &mut global,
-                    ))?;
-                }
             }
-            Ok(local | global)
+            Ok(selection)
         })
     }
 }

@@ -17,7 +17,7 @@ use super::attribute::Attribute;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
 use super::field::{FieldData, FieldDescription, POINT_DATA, check, create_field, write_field};
-use super::history::History;
+use super::history::{History, HistoryContents};
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use hdf5_metno::H5Type;
@@ -29,8 +29,8 @@ const VTK_VERTEX: u8 = 1;
 /// The group of the time steps.
 pub(super) const STEPS: &str = "/VTKHDF/Steps";
 
-/// What each step has one number of besides its time and number, and how many columns VTK wants.
-const STEP_TABLES: [(&str, Option<usize>, u64); 5] = [
+/// What each step has one number of besides its time and number: the same in every step.
+const STEP_TABLES: [(&str, Option<usize>, i64); 5] = [
     ("PartOffsets", None, 0),
     ("NumberOfParts", None, 1),
     ("PointOffsets", None, 0),
@@ -48,25 +48,28 @@ pub struct Piece {
 }
 
 /// A result file being written. All methods are collective, see [`CollectiveFile`].
+///
+/// Room for all expected steps is made in advance, so that to add a step changes little besides the
+/// data themselves: a run that is killed meanwhile leaves a sound file.
 pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
     points: usize,
     steps: u64,
-    tables: Vec<(Dataset, u64)>,
+    /// Steps that there is room for.
+    capacity: u64,
+    tables: Vec<Table>,
     numbers: Dataset,
     times: Dataset,
-    static_offsets: Vec<Dataset>,
-    fields: Vec<Field>,
+    fields: Vec<(FieldDescription, Dataset)>,
     history: Option<History>,
 }
 
-/// A field that changes with time; its dataset is made when the first step tells its type.
-#[derive(Debug)]
-struct Field {
-    description: FieldDescription,
-    offsets: Dataset,
-    values: Option<Dataset>,
+/// Numbers of the steps that are known in advance: `start + stride · k` for the step with index k.
+struct Table {
+    dataset: Dataset,
+    start: i64,
+    stride: i64,
 }
 
 /// What a result file holds from the start.
@@ -82,6 +85,8 @@ pub struct Contents<'a> {
     pub moving: &'a [FieldDescription],
     /// Attributes of the file: name and text.
     pub metadata: &'a [(&'a str, String)],
+    /// Number of steps that are expected; there may be more.
+    pub steps: u64,
 }
 
 impl<'a> ResultFile<'a> {
@@ -102,6 +107,7 @@ impl<'a> ResultFile<'a> {
             fixed,
             moving,
             metadata,
+            steps,
         } = *contents;
         let points = positions.len();
         let mut checked = fixed
@@ -132,104 +138,204 @@ impl<'a> ResultFile<'a> {
         file.set_attribute(STEPS, "NSteps", Attribute::Integer(0))?;
         write_geometry(&mut file, piece, positions)?;
 
-        let mut static_offsets = Vec::new();
-        for (field, data) in fixed {
-            let rows = Rows::Fixed(piece.total);
-            let dataset = create_field(&mut file, field, data, rows)?;
-            write_field(&mut file, &dataset, piece.first, field, data)?;
-            static_offsets.push(create_offsets(&mut file, field)?);
-        }
-        let mut fields = Vec::new();
-        for field in moving {
-            fields.push(Field {
-                description: *field,
-                offsets: create_offsets(&mut file, field)?,
-                values: None,
-            });
-        }
-        let one = Rows::Extensible { per_append: 1 };
-        let mut tables = Vec::new();
-        for (name, columns, value) in STEP_TABLES {
-            let table = file.create_dataset::<i64>(&format!("{STEPS}/{name}"), one, columns)?;
-            tables.push((table, value));
-        }
-        let times = file.create_dataset::<f64>(&format!("{STEPS}/Values"), one, None)?;
-        file.set_dataset_attribute(&times, "unit", Attribute::Text("s"))?;
-        let numbers = file.create_dataset::<u64>(&format!("{STEPS}/Step"), one, None)?;
-        file.flush()?;
-        Ok(Self {
+        let mut result = Self {
+            times: growing::<f64>(&mut file, "Values", steps)?,
+            numbers: growing::<u64>(&mut file, "Step", steps)?,
             file,
             piece,
             points,
             steps: 0,
-            tables,
-            numbers,
-            times,
-            static_offsets,
-            fields,
+            capacity: 0,
+            tables: Vec::new(),
+            fields: Vec::new(),
             history: None,
-        })
+        };
+        for (field, data) in fixed {
+            let rows = Rows::Fixed(piece.total);
+            let dataset = create_field(&mut result.file, field, data, rows)?;
+            write_field(&mut result.file, &dataset, piece.first, field, data)?;
+            result.create_table(&offsets_path(field), None, steps, (0, 0))?;
+        }
+        for field in moving {
+            let per_append = piece.total;
+            let rows = Rows::Extensible { per_append };
+            let dataset = create_field(&mut result.file, field, &FieldData::F64(&[]), rows)?;
+            result.fields.push((*field, dataset));
+            let offsets = (0, piece.total as i64);
+            result.create_table(&offsets_path(field), None, steps, offsets)?;
+        }
+        for (name, columns, value) in STEP_TABLES {
+            result.create_table(&format!("{STEPS}/{name}"), columns, steps, (value, 0))?;
+        }
+        let file = &mut result.file;
+        file.set_dataset_attribute(&result.times, "unit", Attribute::Text("s"))?;
+        result.make_room(steps.max(1))?;
+        result.file.flush()?;
+        Ok(result)
     }
 
-    /// Adds one step: its time in s, its number and this rank's values of the dynamic fields, in
-    /// the order they were described. A field keeps the number type of its first step. When this
-    /// returns, the step survives the end of the process.
+    /// Goes on with a result after its first `kept` steps and so many rows of its history; later ones
+    /// are dropped. What is kept is copied to a new file, which then takes the place of the old one:
+    /// whenever the process is killed, one of them is there.
+    ///
+    /// # Errors
+    /// The old file cannot be read, holds less, or other points or fields; the disc is full.
+    pub fn resume(
+        path: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        history: &HistoryContents,
+        (kept, kept_rows): (u64, u64),
+    ) -> Result<Self> {
+        let piece = contents.piece;
+        let mut old = CollectiveFile::open(path, comm)?;
+        let times = old.open_dataset(&format!("{STEPS}/Values"))?;
+        let numbers = old.open_dataset(&format!("{STEPS}/Step"))?;
+        let points = old.open_dataset("/VTKHDF/Points")?;
+        let found = times.rows().min(numbers.rows());
+        let fits = if points.rows() != piece.total {
+            Err(Error::run(format!("{}: has other points", path.display())))
+        } else if found < kept {
+            let text = format!("has {found} of the first {kept} outputs");
+            Err(Error::run(format!("{}: {text}", path.display())))
+        } else {
+            Ok(())
+        };
+        agree(comm, fits)?;
+        let times: Vec<f64> = old.read_rows(&times, 0, kept as usize)?;
+        let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept as usize)?;
+
+        let part = path.with_extension("vtkhdf.part");
+        let mut result = Self::create(&part, comm, Creation::Truncate, contents)?;
+        result.make_room(kept)?;
+        for (field, values) in &result.fields {
+            let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
+            for step in 0..kept {
+                let first = step * piece.total + piece.first;
+                let rows: Vec<f64> = old.read_rows(&stored, first, result.points)?;
+                result.file.write_rows(values, first, &rows)?;
+            }
+        }
+        for (time, number) in times.into_iter().zip(numbers) {
+            append_one(&mut result.file, &mut result.numbers, number)?;
+            append_one(&mut result.file, &mut result.times, time)?;
+        }
+        result.steps = kept;
+        result
+            .file
+            .set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
+        let rows = History::read(&mut old, history.columns, kept_rows)?;
+        old.close()?;
+        result.create_history(history)?;
+        result.append_history(&rows)?;
+        result.file.flush()?;
+        result.file.rename(path)?;
+        Ok(result)
+    }
+
+    /// Adds one step: its time in s, its number and this rank's values of the moving fields, in the
+    /// order they were described. When this returns, the step survives the end of the process.
     ///
     /// # Errors
     /// A field's length is wrong, or the disc is full.
-    pub fn write_step(&mut self, time: f64, step: u64, fields: &[FieldData]) -> Result<()> {
+    pub fn write_step(&mut self, time: f64, step: u64, fields: &[&[f64]]) -> Result<()> {
         let checked = if fields.len() == self.fields.len() {
             let mut pairs = self.fields.iter().zip(fields);
-            pairs.try_for_each(|(field, data)| check(&field.description, data, self.points))
+            pairs
+                .try_for_each(|((field, _), data)| check(field, &FieldData::F64(data), self.points))
         } else {
             let (given, described) = (fields.len(), self.fields.len());
             let text = format!("a step has {given} fields, but {described} were described");
             Err(Error::run(text))
         };
         agree(self.file.communicator(), checked)?;
-
-        let file = &mut self.file;
-        let first = self.steps * self.piece.total;
-        for (field, data) in self.fields.iter_mut().zip(fields) {
-            let description = &field.description;
-            let mut values = match field.values.take() {
-                Some(values) => values,
-                None => {
-                    let per_append = self.piece.total;
-                    create_field(file, description, data, Rows::Extensible { per_append })?
-                }
-            };
-            file.extend(&mut values, self.piece.total)?;
-            write_field(file, &values, first + self.piece.first, description, data)?;
-            field.values = Some(values);
+        if self.steps == self.capacity {
+            self.make_room(self.capacity + 1)?;
         }
-        file.flush()?;
-        // Only when the data are safe may the file say that it has them; and as VTK trusts the
-        // tables to be NSteps long, tables and NSteps go out in one flush.
-        for field in &mut self.fields {
-            append_one(file, &mut field.offsets, first as i64)?;
+        let first = self.steps * self.piece.total + self.piece.first;
+        for ((description, dataset), data) in self.fields.iter().zip(fields) {
+            write_field(
+                &mut self.file,
+                dataset,
+                first,
+                description,
+                &FieldData::F64(data),
+            )?;
         }
-        for offsets in &mut self.static_offsets {
-            append_one(file, offsets, 0_i64)?;
-        }
-        for (table, value) in &mut self.tables {
-            append_one(file, table, *value as i64)?;
-        }
-        append_one(file, &mut self.numbers, step)?;
-        append_one(file, &mut self.times, time)?;
+        // Only when the data are safe may the file say that it has them.
+        self.file.flush()?;
+        append_one(&mut self.file, &mut self.numbers, step)?;
+        append_one(&mut self.file, &mut self.times, time)?;
         self.steps += 1;
-        file.set_attribute(STEPS, "NSteps", Attribute::Integer(self.steps as i64))?;
-        file.flush()
+        let steps = Attribute::Integer(self.steps as i64);
+        self.file.set_attribute(STEPS, "NSteps", steps)?;
+        self.file.flush()
     }
 
-    /// Starts the history: a table of numbers with the given (name, unit) columns, in the file and
-    /// in a CSV file.
+    /// Number of steps written.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Makes what has been written so far safe, history rows included.
     ///
     /// # Errors
-    /// As [`History::create`]; or there is a history already.
-    pub fn create_history(&mut self, columns: &[(String, &str)], csv: &Path) -> Result<()> {
-        self.history = Some(History::create(&mut self.file, columns, csv)?);
+    /// The disc is full.
+    pub fn flush(&mut self) -> Result<()> {
+        self.file.flush()
+    }
+
+    fn create_table(
+        &mut self,
+        path: &str,
+        columns: Option<usize>,
+        steps: u64,
+        (start, stride): (i64, i64),
+    ) -> Result<()> {
+        let rows = Rows::Extensible {
+            per_append: steps.max(LEAST_ROWS),
+        };
+        let dataset = self.file.create_dataset::<i64>(path, rows, columns)?;
+        self.tables.push(Table {
+            dataset,
+            start,
+            stride,
+        });
         Ok(())
+    }
+
+    /// Makes room for so many steps in all, and fills in the tables.
+    fn make_room(&mut self, steps: u64) -> Result<()> {
+        if steps <= self.capacity {
+            return Ok(());
+        }
+        let file = &mut self.file;
+        for (_, dataset) in &mut self.fields {
+            file.resize(dataset, steps * self.piece.total)?;
+        }
+        let root = file.communicator().rank() == 0;
+        for table in &mut self.tables {
+            file.resize(&mut table.dataset, steps)?;
+            let value = |k: u64| table.start + table.stride * k as i64;
+            let values: Vec<i64> = (0..steps).map(value).collect();
+            file.write_rows(&table.dataset, 0, if root { &values } else { &[] })?;
+        }
+        self.capacity = steps;
+        Ok(())
+    }
+
+    /// Starts the history: a table of numbers, in the file and in a CSV file.
+    ///
+    /// # Errors
+    /// As [`History::create`].
+    pub fn create_history(&mut self, contents: &HistoryContents) -> Result<()> {
+        self.history = Some(History::create(&mut self.file, contents)?);
+        self.file.flush()
+    }
+
+    /// Number of history rows written.
+    pub fn history_rows(&self) -> u64 {
+        self.history.as_ref().map_or(0, History::rows)
     }
 
     /// Adds rows to the history, the same on all ranks. In the result file they are safe once
@@ -249,13 +355,37 @@ impl<'a> ResultFile<'a> {
         self.file.no_collective_cause()
     }
 
-    /// Closes the file.
+    /// Gives back the room that was not used, and closes the file.
     ///
     /// # Errors
     /// The disc is full, or an earlier operation failed.
-    pub fn close(self) -> Result<()> {
+    pub fn close(mut self) -> Result<()> {
+        let file = &mut self.file;
+        for (_, dataset) in &mut self.fields {
+            file.resize(dataset, self.steps * self.piece.total)?;
+        }
+        for table in &mut self.tables {
+            file.resize(&mut table.dataset, self.steps)?;
+        }
         self.file.close()
     }
+}
+
+/// A chunk of a table of steps or of the history has at least so many rows.
+pub(super) const LEAST_ROWS: u64 = 512;
+
+/// A table that has one row more after each step.
+fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> Result<Dataset> {
+    let per_append = steps.max(LEAST_ROWS);
+    file.create_dataset::<T>(
+        &format!("{STEPS}/{name}"),
+        Rows::Extensible { per_append },
+        None,
+    )
+}
+
+fn offsets_path(field: &FieldDescription) -> String {
+    format!("{STEPS}/PointDataOffsets/{}", field.name)
 }
 
 fn write_geometry(
@@ -287,11 +417,6 @@ fn write_geometry(
     let begin = if root { first } else { first + 1 };
     let ends: Vec<i64> = (begin..first + count + 1).collect();
     file.write_rows(&dataset, begin as u64, &ends)
-}
-
-fn create_offsets(file: &mut CollectiveFile<'_>, field: &FieldDescription) -> Result<Dataset> {
-    let path = format!("{STEPS}/PointDataOffsets/{}", field.name);
-    file.create_dataset::<i64>(&path, Rows::Extensible { per_append: 1 }, None)
 }
 
 fn append_one<T: H5Type>(

@@ -9,6 +9,9 @@ use super::{Point, shape};
 /// The share of a cell's edge by which a point may lie outside a shape and still count as within.
 const TOLERANCE: f64 = 1e-9;
 
+/// Binary logarithm of the cells that one rank goes through; some minutes' worth.
+const CELLS_A_RANK: u32 = 33;
+
 /// The cells that a shape can touch: the first cell's index and the number of cells, by direction.
 struct Range {
     first: [i64; 3],
@@ -63,7 +66,7 @@ pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result
     };
     let dimension = plan.dimension.count();
     let cells = Range::new(region, *spacing, *origin, dimension);
-    let most = (comm.size() as u64) << 36;
+    let most = (comm.size() as u64) << CELLS_A_RANK;
     let (Some(cells), Some(total)) = (&cells, cells.as_ref().and_then(Range::total)) else {
         return agree(comm, Err(too_many(plan, body)));
     };

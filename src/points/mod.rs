@@ -98,11 +98,13 @@ fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Resu
         None => Ok(()),
         Some(empty) => {
             let body = &plan.bodies[empty];
-            let message = format!(
-                "[body.{}]: has no points; is its shape smaller than the spacing, or covered by a \
-                 later body?",
-                body.name
-            );
+            let why = match &body.points {
+                PointSource::Lattice { .. } => {
+                    "is its shape smaller than the spacing, or covered by a later body?"
+                }
+                PointSource::File { .. } => "no row of its file is its own",
+            };
+            let message = format!("[body.{}]: has no points; {why}", body.name);
             Err(plan.source.error(body.span.clone(), message))
         }
     }

@@ -51,8 +51,6 @@ struct Load<const D: usize> {
     force: Vec<[f64; D]>,
     before: Vec<[f64; D]>,
     moved_from: Vec<[f64; D]>,
-    /// Work done on each point so far, J.
-    work: Vec<f64>,
 }
 
 /// What a support prescribes.
@@ -73,14 +71,14 @@ struct Support {
     reaction: Vec<f64>,
     before: Vec<f64>,
     moved_from: Vec<f64>,
-    /// Work done on each point so far, J.
-    work: Vec<f64>,
 }
 
 /// All loads and supports of this rank's points.
 pub struct Conditions<const D: usize> {
     loads: Vec<Load<D>>,
     supports: Vec<Support>,
+    /// Work done on each owned point so far, J; empty if nothing acts.
+    work: Vec<f64>,
 }
 
 /// Local indices of the owned points of a set, by index.
@@ -185,7 +183,6 @@ impl<const D: usize> Conditions<D> {
                         reaction: Vec::new(),
                         before: Vec::new(),
                         moved_from: Vec::new(),
-                        work: Vec::new(),
                     });
                 }
             };
@@ -213,9 +210,13 @@ impl<const D: usize> Conditions<D> {
             support.reaction = vec![0.0; count];
             support.before = vec![0.0; count];
             support.moved_from = vec![0.0; count];
-            support.work = vec![0.0; count];
         }
-        Ok(Self { loads, supports })
+        let acts = !plan.conditions.is_empty();
+        Ok(Self {
+            loads,
+            supports,
+            work: vec![0.0; if acts { model.owned() } else { 0 }],
+        })
     }
 
     /// Before the points move: remembers forces and places, for the work of the coming step.
@@ -260,13 +261,8 @@ impl<const D: usize> Conditions<D> {
     /// Adds the loads at time `time` (s) to the force densities.
     pub fn add_loads(&mut self, time: f64, responses: &mut [Response<D>]) {
         for load in &mut self.loads {
-            for d in 0..D {
-                if load.values[d].changes || time == 0.0 {
-                    let (force, factor) = (&mut load.force, load.factors[d]);
-                    load.values[d].at(&load.positions, time, |k, value| {
-                        force[k][d] = factor * value;
-                    });
-                }
+            if time == 0.0 || load.values.iter().any(|values| values.changes) {
+                load.update(time);
             }
             for (force, point) in load.force.iter().zip(&load.points) {
                 let total = &mut responses[*point as usize].force;
@@ -318,33 +314,66 @@ impl<const D: usize> Conditions<D> {
     /// After forces and reactions are known at the new place: adds up the work of the step, by the
     /// trapezoid rule.
     pub fn after_moving(&mut self, model: &Model<D>, state: &State<D>) {
-        for load in &mut self.loads {
+        for load in &self.loads {
             for (k, point) in load.points.iter().enumerate() {
                 let volume = model.volume[*point as usize];
                 for d in 0..D {
                     let moved = state.displacement[d][*point as usize] - load.moved_from[k][d];
                     let force = 0.5 * (load.before[k][d] + load.force[k][d]);
-                    load.work[k] += force * moved * volume;
+                    self.work[*point as usize] += force * moved * volume;
                 }
             }
         }
-        for support in &mut self.supports {
+        for support in &self.supports {
             let field = &state.displacement[support.component];
             for (k, point) in support.points.iter().enumerate() {
                 let moved = field[*point as usize] - support.moved_from[k];
                 let force = 0.5 * (support.before[k] + support.reaction[k]);
-                support.work[k] += force * moved * model.volume[*point as usize];
+                self.work[*point as usize] += force * moved * model.volume[*point as usize];
             }
         }
     }
 
     /// Work done so far on this rank's points, J.
     pub fn work(&self) -> ExactSum {
-        let loads = self.loads.iter().flat_map(|load| &load.work);
-        let supports = self.supports.iter().flat_map(|support| &support.work);
         let mut sum = ExactSum::default();
-        loads.chain(supports).for_each(|work| sum.add(*work));
+        self.work.iter().for_each(|work| sum.add(*work));
         sum
+    }
+
+    /// Whether nothing acts on any point of any rank.
+    pub fn are_none(&self) -> bool {
+        self.work.is_empty()
+    }
+
+    /// What a checkpoint must hold: the work done on each owned point (J), then the force density of
+    /// the supports on it by component (N/m³).
+    pub fn save(&self) -> Vec<f64> {
+        let width = 1 + D;
+        let mut values = vec![0.0; width * self.work.len()];
+        for (row, work) in values.chunks_exact_mut(width).zip(&self.work) {
+            row[0] = *work;
+        }
+        for (point, component, reaction) in self.reactions() {
+            values[width * point + 1 + component] = reaction;
+        }
+        values
+    }
+
+    /// Puts back what [`Self::save`] gave, at time `time` (s).
+    pub fn restore(&mut self, values: &[f64], time: f64) {
+        let width = 1 + D;
+        for (work, row) in self.work.iter_mut().zip(values.chunks_exact(width)) {
+            *work = row[0];
+        }
+        for support in &mut self.supports {
+            for (reaction, point) in support.reaction.iter_mut().zip(&support.points) {
+                *reaction = values[width * *point as usize + 1 + support.component];
+            }
+        }
+        for load in &mut self.loads {
+            load.update(time);
+        }
     }
 
     /// Sums the force of the supports on a set's points by component, N. `members` is sorted.
@@ -389,8 +418,17 @@ impl<const D: usize> Load<D> {
             force: vec![[0.0; D]; points.len()],
             before: vec![[0.0; D]; points.len()],
             moved_from: vec![[0.0; D]; points.len()],
-            work: vec![0.0; points.len()],
             points,
+        }
+    }
+
+    /// Evaluates the force density at a time (s).
+    fn update(&mut self, time: f64) {
+        for d in 0..D {
+            let (force, factor) = (&mut self.force, self.factors[d]);
+            self.values[d].at(&self.positions, time, |k, value| {
+                force[k][d] = factor * value;
+            });
         }
     }
 }

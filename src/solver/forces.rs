@@ -84,6 +84,44 @@ impl<const D: usize> Forces<D> {
         }
     }
 
+    /// How many bytes of bits the bonds of each owned point take.
+    pub fn intact_lengths(&self, owned: usize) -> Vec<u32> {
+        let mut lengths = vec![0; owned];
+        for (point, row) in self.bonds.iter().flat_map(|bonds| bonds.list.intact_rows()) {
+            lengths[point] += row.len() as u32;
+        }
+        lengths
+    }
+
+    /// The bits of the bonds of all owned points, one after the other.
+    pub fn intact(&self, lengths: &[u32]) -> Vec<u8> {
+        let (mut next, total) = starts(lengths);
+        let mut bytes = vec![0; total];
+        for (point, row) in self.bonds.iter().flat_map(|bonds| bonds.list.intact_rows()) {
+            bytes[next[point]..next[point] + row.len()].copy_from_slice(row);
+            next[point] += row.len();
+        }
+        bytes
+    }
+
+    /// Puts back what [`Self::intact`] gave.
+    pub fn set_intact(&mut self, lengths: &[u32], bytes: &[u8]) {
+        let (mut next, _) = starts(lengths);
+        for bonds in &mut self.bonds {
+            for (point, row) in bonds.list.intact_rows_mut() {
+                row.copy_from_slice(&bytes[next[point]..next[point] + row.len()]);
+                next[point] += row.len();
+            }
+        }
+    }
+
+    /// Brings the ghosts' displacements up to date.
+    pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
+        self.halo.pack(&components(displacement));
+        self.halo.exchange(comm, &mut || {});
+        self.halo.unpack(&mut components_mut(displacement));
+    }
+
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
     /// brought from their owners.
     pub fn protect(&mut self, comm: &dyn Communicator, protected: &mut [f64]) {
@@ -192,6 +230,19 @@ impl<const D: usize> Forces<D> {
         }
         stiffness
     }
+}
+
+/// Where each point's bytes start, and how many there are in all.
+fn starts(lengths: &[u32]) -> (Vec<usize>, usize) {
+    let mut end = 0;
+    let starts = lengths
+        .iter()
+        .map(|length| {
+            end += *length as usize;
+            end - *length as usize
+        })
+        .collect();
+    (starts, end)
 }
 
 fn components<const D: usize>(field: &[Vec<f64>; D]) -> [&[f64]; D] {

@@ -5,6 +5,7 @@ pub mod forces;
 pub mod kernels;
 pub mod model;
 pub mod observe;
+mod saved;
 pub mod schedule;
 pub mod simulation;
 pub mod stable_step;
@@ -12,4 +13,5 @@ pub mod state;
 mod sweep;
 mod verlet;
 
+pub use saved::Saved;
 pub use simulation::Simulation;

@@ -97,8 +97,8 @@ pub struct HistoryObserver {
     columns: Vec<(String, &'static str)>,
     reactions: Vec<Vec<u32>>,
     probes: Vec<Probe>,
-    first_energy: Option<f64>,
-    intact_at_first: u64,
+    /// Energy (J) and intact bonds in the first row.
+    start: Option<(f64, u64)>,
 }
 
 /// Energies of the whole body at one moment, J.
@@ -170,14 +170,23 @@ impl HistoryObserver {
             columns,
             reactions,
             probes,
-            first_energy: None,
-            intact_at_first: 0,
+            start: None,
         })
     }
 
     /// Name and unit of each column.
     pub fn columns(&self) -> &[(String, &'static str)] {
         &self.columns
+    }
+
+    /// Energy (J) and intact bonds in the first row, which later ones refer to.
+    pub fn start(&self) -> Option<(f64, u64)> {
+        self.start
+    }
+
+    /// Goes on with a history whose first row had this energy (J) and so many intact bonds.
+    pub fn continue_from(&mut self, start: (f64, u64)) {
+        self.start = Some(start);
     }
 
     /// The present row; collective.
@@ -208,18 +217,15 @@ impl HistoryObserver {
         let (lower, upper) = cracked.extent(comm);
 
         let energy = own[0] + own[1] + own[2] - work;
-        if self.first_energy.is_none() {
-            self.first_energy = Some(energy);
-            self.intact_at_first = intact;
-        }
+        let (first_energy, first_intact) = *self.start.get_or_insert((energy, intact));
         let energies = Energies {
             kinetic: own[0],
             strain: own[1],
             fracture: own[2],
             work,
-            error: energy - self.first_energy.unwrap_or(energy),
+            error: energy - first_energy,
         };
-        let broken = (self.intact_at_first - intact) / 2;
+        let broken = (first_intact - intact) / 2;
         let mut values = vec![
             simulation.time(),
             simulation.number as f64,

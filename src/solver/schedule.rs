@@ -28,11 +28,34 @@ impl Schedule {
         }
         match self.interval {
             Interval::Steps(steps) => number.is_multiple_of(steps),
-            Interval::Seconds(seconds) => {
-                let reached = |number: u64| (number as f64 * self.step / seconds + 1e-9).floor();
-                reached(number) > reached(number - 1)
-            }
+            Interval::Seconds(_) => self.reaches(number),
         }
+    }
+
+    /// Whether a multiple of the seconds is reached in this step.
+    fn reaches(&self, number: u64) -> bool {
+        let Interval::Seconds(seconds) = self.interval else {
+            return false;
+        };
+        let multiple = |number: u64| (number as f64 * self.step / seconds + 1e-9).floor();
+        multiple(number) > multiple(number - 1)
+    }
+
+    /// How many times something is due.
+    pub fn count(&self) -> u64 {
+        let times = match self.interval {
+            Interval::Steps(steps) => self.last / steps,
+            Interval::Seconds(seconds) => {
+                let whole = (self.last as f64 * self.step / seconds + 1e-9).floor();
+                (whole as u64).min(self.last)
+            }
+        };
+        // Before the last step as often as that, or once less if the last one is a multiple itself.
+        let last_is_extra = match self.interval {
+            Interval::Steps(steps) => !self.last.is_multiple_of(steps),
+            Interval::Seconds(_) => !self.reaches(self.last),
+        };
+        1 + times + u64::from(last_is_extra)
     }
 }
 
@@ -42,9 +65,11 @@ mod tests {
 
     fn due(interval: Interval, step: f64, last: u64) -> Vec<u64> {
         let schedule = Schedule::new(interval, step, last);
-        (0..=last)
+        let due: Vec<u64> = (0..=last)
             .filter(|number| schedule.is_due(*number))
-            .collect()
+            .collect();
+        assert_eq!(schedule.count(), due.len() as u64);
+        due
     }
 
     #[test]

@@ -15,9 +15,6 @@ use super::stable_step::stable_step;
 use super::state::State;
 use super::verlet;
 
-/// Steps between two looks of all ranks at whether any has met a value that is not finite.
-const CHECK_EVERY: u64 = 10;
-
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
     /// The validated deck.
@@ -117,6 +114,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         };
         simulation.conditions.place(&mut simulation.state, 0.0, 0.0);
         simulation.act(None);
+        simulation.bad = simulation.first_bad();
         simulation.times = Times {
             set_up: start.elapsed(),
             ..Times::default()
@@ -167,14 +165,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.motion += start.elapsed();
     }
 
-    /// The point with the smallest id among those with a velocity that is not finite.
+    /// The point with the smallest id among those with a motion or force that is not finite.
     fn first_bad(&self) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
-                self.state
-                    .velocity
-                    .iter()
-                    .any(|velocity| !velocity[*k].is_finite())
+                let motion = self.state.velocity.iter().chain(&self.state.displacement);
+                let force = self.state.responses[*k].force;
+                let mut values = motion.map(|field| field[*k]).chain(force);
+                values.any(|value| !value.is_finite())
             })
             .min_by_key(|k| self.model.ids[*k])
             .map(|index| BadPoint {
@@ -182,11 +180,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 id: self.model.ids[index],
                 index,
             })
-    }
-
-    /// Whether [`Self::check`] is due after the present step.
-    pub fn check_is_due(&self) -> bool {
-        self.number.is_multiple_of(CHECK_EVERY) || self.number == self.last
     }
 
     /// Looks on all ranks whether every value is still finite.
@@ -206,15 +199,19 @@ impl<'a, const D: usize> Simulation<'a, D> {
             None => Ok(()),
             Some(bad) => {
                 let block = usize::from(self.model.block[bad.index]);
+                let hint = match bad.step {
+                    0 => "An expression without a value there, or points moved onto one another?",
+                    _ => "A time step beyond the stable one, or a load that grows without bound?",
+                };
                 Err(Error::run(format!(
-                    "step {} (t = {:.6e} s): the velocity of point {} of body `{}` is not finite; \
-                     reference position {:?} m. A time step beyond the stable {:.3e} s, or a load \
-                     that grows without bound?",
+                    "step {} (t = {:.6e} s): the motion of point {} of body `{}` is not finite; \
+                     reference position {:?} m. {hint} (time step {:.3e} s, stable {:.3e} s)",
                     bad.step,
                     bad.step as f64 * self.step,
                     bad.id,
                     self.plan.bodies[block].name,
                     &self.model.position(bad.index)[..D],
+                    self.step,
                     self.stable_step,
                 )))
             }

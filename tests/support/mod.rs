@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "not every test file uses all of it")]
 
 pub mod command;
+pub mod datasets;
 
 use fissure::comm::{Communicator, threads};
 use fissure::deck::{self, Plan, Source};

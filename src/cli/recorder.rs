@@ -1,0 +1,299 @@
+//! Writing result and history when they are due.
+
+use std::time::{Duration, Instant};
+
+use fissure::comm::{Communicator, IdOrder};
+use fissure::deck::Plan;
+use fissure::deck::plan::Field;
+use fissure::error::Result;
+use fissure::output::{
+    Contents, Creation, FieldData, FieldDescription, HistoryContents, Piece, ResultFile,
+    ResultReader,
+};
+use fissure::solver::Simulation;
+use fissure::solver::observe::{Energies, HistoryObserver, HistoryRow, Snapshot};
+use fissure::solver::schedule::Schedule;
+
+use super::files::Files;
+
+/// History rows that are held back before they are written.
+const ROWS_HELD: usize = 256;
+
+/// The open result and history of a run.
+pub struct Recorder<'a> {
+    /// The result file.
+    pub file: ResultFile<'a>,
+    /// What the history is made of.
+    pub observer: HistoryObserver,
+    /// The way from points to the rows of files.
+    pub order: IdOrder,
+    /// Energies in the last row of the history.
+    pub energies: Energies,
+    /// Broken bonds in the last row of the history.
+    pub broken: u64,
+    /// Time spent here.
+    pub spent: Duration,
+    fields: Vec<Field>,
+    outputs: Schedule,
+    rows: Schedule,
+    held: Vec<Vec<f64>>,
+}
+
+/// How a recorder starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// With new files; older ones may be replaced or not.
+    New(Creation),
+    /// After so many outputs and history rows of files that are there.
+    After(u64, u64),
+}
+
+/// What a result consists of, whether it is new or continued.
+struct Layout<'a> {
+    places: Vec<f64>,
+    ids: Vec<u64>,
+    blocks: Vec<u32>,
+    volumes: Vec<f64>,
+    moving: Vec<FieldDescription>,
+    metadata: &'a [(&'static str, String)],
+    piece: Piece,
+    steps: u64,
+}
+
+impl<'a> Recorder<'a> {
+    /// Creates or reopens the files. Collective.
+    ///
+    /// # Errors
+    /// When they cannot be written, or a set of the history is empty.
+    pub fn new<const D: usize>(
+        simulation: &Simulation<'a, D>,
+        files: &Files,
+        start: Start,
+        metadata: &[(&'static str, String)],
+    ) -> Result<Self> {
+        let (plan, comm) = (simulation.plan, simulation.comm);
+        let observer = HistoryObserver::new(simulation)?;
+        let order = id_order(simulation);
+        let schedule = |every| Schedule::new(every, simulation.step, simulation.last);
+        let (outputs, rows) = (schedule(plan.output.every), schedule(plan.history.every));
+        let layout = Layout::new(simulation, &order, outputs.count(), metadata);
+        let fixed = layout.fixed();
+        let contents = layout.contents(&fixed);
+        let history = HistoryContents {
+            columns: observer.columns(),
+            csv: &files.history,
+            rows: rows.count(),
+        };
+        let file = match start {
+            Start::New(creation) => {
+                let made = ResultFile::create(&files.result, comm, creation, &contents).and_then(
+                    |mut file| {
+                        file.create_history(&history)?;
+                        Ok(file)
+                    },
+                );
+                if made.is_err() && comm.rank() == 0 {
+                    // Without its first output it is of no use; that it cannot be removed either
+                    // changes nothing.
+                    let _ = std::fs::remove_file(&files.result);
+                }
+                made?
+            }
+            Start::After(outputs, rows) => {
+                let kept = (outputs, rows);
+                ResultFile::resume(&files.result, comm, &contents, &history, kept)?
+            }
+        };
+        Ok(Self {
+            file,
+            observer,
+            order,
+            energies: Energies::default(),
+            broken: 0,
+            spent: Duration::ZERO,
+            fields: plan.output.fields.clone(),
+            outputs,
+            rows,
+            held: Vec::new(),
+        })
+    }
+
+    /// Writes what is due after the present step. Collective.
+    ///
+    /// # Errors
+    /// When the disc is full.
+    pub fn record<const D: usize>(&mut self, simulation: &mut Simulation<'_, D>) -> Result<()> {
+        let number = simulation.number;
+        let (output, row) = (self.outputs.is_due(number), self.rows.is_due(number));
+        self.write(simulation, output, row)
+    }
+
+    /// Writes an output, a history row or both. Collective.
+    ///
+    /// # Errors
+    /// When the disc is full.
+    pub fn write<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        output: bool,
+        row: bool,
+    ) -> Result<()> {
+        if !output && !row {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let snapshot = Snapshot::new(simulation);
+        if row {
+            let HistoryRow {
+                values,
+                energies,
+                broken,
+            } = self.observer.row(simulation, &snapshot);
+            self.held.push(values);
+            (self.energies, self.broken) = (energies, broken);
+        }
+        if output || self.held.len() >= ROWS_HELD {
+            self.write_rows()?;
+        }
+        if output {
+            let values: Vec<Vec<f64>> = self
+                .fields
+                .iter()
+                .map(|field| {
+                    let values = snapshot.field(simulation, *field);
+                    self.order
+                        .collect(simulation.comm, &values, field.components())
+                })
+                .collect();
+            let data: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+            self.file
+                .write_step(simulation.time(), simulation.number, &data)?;
+        }
+        self.spent += start.elapsed();
+        Ok(())
+    }
+
+    /// Makes all that has been recorded safe on the disc. Collective.
+    ///
+    /// # Errors
+    /// When the disc is full.
+    pub fn flush(&mut self) -> Result<()> {
+        self.write_rows()?;
+        self.file.flush()
+    }
+
+    fn write_rows(&mut self) -> Result<()> {
+        if !self.held.is_empty() {
+            self.file.append_history(&self.held)?;
+            self.held.clear();
+        }
+        Ok(())
+    }
+}
+
+/// The way between a simulation's points and the order of their ids. Collective.
+pub fn id_order<const D: usize>(simulation: &Simulation<'_, D>) -> IdOrder {
+    let model = &simulation.model;
+    IdOrder::new(simulation.comm, &model.ids[..model.owned()], model.total)
+}
+
+/// Whether a result that is there has the fields and columns that the plan asks for, so that it can be
+/// continued. Collective.
+///
+/// # Errors
+/// When a set of the history is empty.
+pub fn can_continue<const D: usize>(simulation: &Simulation<'_, D>, files: &Files) -> Result<bool> {
+    let comm: &dyn Communicator = simulation.comm;
+    let observer = HistoryObserver::new(simulation)?;
+    let same = || -> Result<bool> {
+        let reader = ResultReader::open(&files.result)?;
+        let fields = reader.fields()?;
+        let found: Vec<&str> = fields
+            .iter()
+            .filter(|f| f.dynamic)
+            .map(|f| &f.name[..])
+            .collect();
+        let mut wanted: Vec<&str> = wanted_fields(simulation.plan);
+        wanted.sort_unstable();
+        let columns = reader.history()?;
+        let columns = columns.iter().map(|column| &column.name);
+        let expected = observer.columns().iter().map(|(name, _)| name);
+        Ok(found == wanted && columns.eq(expected))
+    };
+    let mut answer = match comm.rank() {
+        0 => vec![u8::from(same().unwrap_or(false))],
+        _ => Vec::new(),
+    };
+    comm.broadcast(0, &mut answer);
+    Ok(answer == [1])
+}
+
+fn wanted_fields(plan: &Plan) -> Vec<&'static str> {
+    plan.output
+        .fields
+        .iter()
+        .map(|field| field.name())
+        .collect()
+}
+
+impl<'a> Layout<'a> {
+    fn new<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        order: &IdOrder,
+        steps: u64,
+        metadata: &'a [(&'static str, String)],
+    ) -> Self {
+        let (comm, model) = (simulation.comm, &simulation.model);
+        let owned = model.owned();
+        let first = order.first();
+        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
+        let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
+        Self {
+            places: order.collect(comm, &places, 3),
+            ids: (first..first + order.count() as u64).collect(),
+            blocks: order.collect(comm, &blocks, 1),
+            volumes: order.collect(comm, &model.volume[..owned], 1),
+            moving: simulation
+                .plan
+                .output
+                .fields
+                .iter()
+                .map(|field| FieldDescription {
+                    name: field.name(),
+                    unit: field.unit(),
+                    components: field.components(),
+                })
+                .collect(),
+            metadata,
+            piece: Piece {
+                first,
+                total: model.total,
+            },
+            steps,
+        }
+    }
+
+    fn fixed(&self) -> [(FieldDescription, FieldData<'_>); 3] {
+        let scalar = |name, unit| FieldDescription {
+            name,
+            unit,
+            components: 1,
+        };
+        [
+            (scalar("id", "1"), FieldData::U64(&self.ids)),
+            (scalar("block", "1"), FieldData::U32(&self.blocks)),
+            (scalar("volume", "m^3"), FieldData::F64(&self.volumes)),
+        ]
+    }
+
+    fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
+        Contents {
+            piece: self.piece,
+            positions: bytemuck::cast_slice(&self.places),
+            fixed,
+            moving: &self.moving,
+            metadata: self.metadata,
+            steps: self.steps,
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Whether two decks describe the same physics: what a restart must not change.
+
+use serde_spanned::Spanned;
+use toml::{Table, Value};
+
+use super::Deck;
+use super::expression::Expression;
+use super::number::Written;
+use super::resolve::{ALL_VARIABLES, Scope};
+use super::source::Source;
+use crate::error::{Error, Result};
+
+/// Sections that a restart may change. Parameters count where they are used.
+const FREE: [&str; 5] = ["title", "parameters", "output", "history", "checkpoint"];
+
+/// Keys within sections that a restart may change.
+const FREE_KEYS: [&str; 1] = ["time.end"];
+
+/// What differs in the physics of two decks, both with every default filled in: a line for each key
+/// with its old and its new value.
+///
+/// # Errors
+/// When a deck cannot be parsed.
+pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
+    let decks = (Deck::new(old.clone())?, Deck::new(new.clone())?);
+    let old_scope = Scope::of(old, &decks.0.grammar)?;
+    let new_scope = Scope::of(new, &decks.1.grammar)?;
+    let table = |source: &Source| {
+        let parsed = source.text.parse::<Table>();
+        parsed
+            .map(Value::Table)
+            .map_err(|error| Error::input(error.to_string()))
+    };
+    let mut comparison = Comparison {
+        scopes: [&old_scope, &new_scope],
+        lines: Vec::new(),
+    };
+    comparison.compare("", Some(&table(old)?), Some(&table(new)?));
+    Ok(comparison.lines)
+}
+
+struct Comparison<'a> {
+    scopes: [&'a Scope<'a>; 2],
+    lines: Vec<String>,
+}
+
+impl Comparison<'_> {
+    fn compare(&mut self, key: &str, old: Option<&Value>, new: Option<&Value>) {
+        if FREE.contains(&key) || FREE_KEYS.contains(&key) {
+            return;
+        }
+        match (old, new) {
+            (Some(Value::Table(old)), Some(Value::Table(new))) => {
+                let added = new.keys().filter(|name| !old.contains_key(*name));
+                for name in old.keys().chain(added) {
+                    let inner = if key.is_empty() {
+                        name.clone()
+                    } else {
+                        format!("{key}.{name}")
+                    };
+                    self.compare(&inner, old.get(name), new.get(name));
+                }
+            }
+            (Some(Value::Array(old)), Some(Value::Array(new))) if old.len() == new.len() => {
+                for (k, (old, new)) in old.iter().zip(new).enumerate() {
+                    self.compare(&format!("{key}[{k}]"), Some(old), Some(new));
+                }
+            }
+            (old, new) => {
+                let values = [self.expression(0, old), self.expression(1, new)];
+                let same = match &values {
+                    [Some(old), Some(new)] => old == new,
+                    _ => old == new,
+                };
+                if !same {
+                    let old = shown(old, values[0].as_ref());
+                    let new = shown(new, values[1].as_ref());
+                    self.lines.push(format!("{key}: was {old}, is {new}"));
+                }
+            }
+        }
+    }
+
+    /// A value as an expression of position and time, with its deck's parameters put in.
+    fn expression(&self, deck: usize, value: Option<&Value>) -> Option<Expression> {
+        let written = match value? {
+            Value::Integer(value) => Written::Value(*value as f64),
+            Value::Float(value) => Written::Value(*value),
+            Value::String(text) => Written::Text(text.clone()),
+            _ => return None,
+        };
+        let number = Spanned::new(0..0, written);
+        self.scopes[deck]
+            .expression(&number, "", &ALL_VARIABLES)
+            .ok()
+    }
+}
+
+/// A value for people: as written, and what it comes to.
+fn shown(value: Option<&Value>, expression: Option<&Expression>) -> String {
+    let Some(value) = value else {
+        return "not there".to_owned();
+    };
+    match (value, expression.and_then(Expression::as_constant)) {
+        (Value::String(text), Some(number)) => format!("`{text}` = {number}"),
+        _ => format!("{value}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(text: &str) -> Source {
+        Source {
+            path: "deck.toml".into(),
+            text: text.to_owned(),
+        }
+    }
+
+    const DECK: &str = "
+        dimension = '1d'
+        parameters = { dx = 0.5, load = 3, late = 8 }
+        grid = { spacing = 'dx', horizon = '3*dx' }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [9] } }
+        condition.pull = { set = 'bar', body_force = ['load*x*t'] }
+        time = { end = 'late' }
+        ";
+
+    fn against(replace: &str, by: &str) -> Vec<String> {
+        assert!(DECK.contains(replace));
+        differences(&source(DECK), &source(&DECK.replace(replace, by))).unwrap()
+    }
+
+    #[test]
+    fn what_a_restart_may_change() {
+        assert!(against("late = 8", "late = 9, unused = 1").is_empty());
+        assert!(against("'late'", "12").is_empty());
+        assert!(against("'3*dx'", "1.5").is_empty());
+        assert!(
+            against(
+                "dimension",
+                "title = 'x'\n output.every_steps = 3\n dimension"
+            )
+            .is_empty()
+        );
+    }
+
+    #[test]
+    fn what_it_must_not() {
+        let lines = against("load = 3", "load = 4");
+        assert_eq!(
+            lines,
+            ["condition.pull.body_force[0]: was \"load*x*t\", is \"load*x*t\""]
+        );
+        let lines = against("dx = 0.5", "dx = 0.25");
+        assert_eq!(lines.len(), 2);
+        assert_eq!(lines[0], "grid.spacing: was `dx` = 0.5, is `dx` = 0.25");
+        let lines = against("density = 2", "density = 3");
+        assert_eq!(lines, ["material.rubber.pmb.density: was 2, is 3"]);
+        let lines = against("time", "initial.push.velocity = ['x']\n time");
+        assert!(lines[0].starts_with("initial: was not there"), "{lines:?}");
+    }
+}

@@ -1,0 +1,252 @@
+//! Checkpoints: two files of which one is always complete, readable on any number of ranks.
+//!
+//! A checkpoint is written beside the two, sealed with a checksum, and then takes the place of the
+//! older one by a rename: a kill at any moment leaves at least one that is good.
+
+use std::path::{Path, PathBuf};
+
+use crate::comm::{Communicator, IdOrder, agree};
+use crate::error::{Error, Result};
+use crate::solver::Saved;
+
+use super::access::Creation;
+use super::attribute::Attribute;
+use super::collective::CollectiveFile;
+use super::dataset::Rows;
+use super::seal;
+
+/// The two files.
+const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
+
+/// What is being written.
+const PART: &str = "checkpoint.part";
+
+/// Changes with the layout.
+const VERSION: i64 = 1;
+
+/// A checkpoint but for the state of the points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Number of the step.
+    pub number: u64,
+    /// Time step, s.
+    pub step: f64,
+    /// Number of points over all ranks.
+    pub points: u64,
+    /// A sum over the points that is the same only for the same points.
+    pub fingerprint: u64,
+    /// Outputs in the result file.
+    pub outputs: u64,
+    /// Rows in the history.
+    pub rows: u64,
+    /// Energy (J) and intact bonds at the start, which the history refers to.
+    pub start: (f64, u64),
+    /// The deck with every default filled in.
+    pub deck: String,
+}
+
+/// The two checkpoints of a folder.
+pub struct Checkpoints {
+    folder: PathBuf,
+    /// Which of the two is written next.
+    next: usize,
+}
+
+impl Checkpoints {
+    /// For a run that starts anew: earlier checkpoints in the folder will be replaced.
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            next: 0,
+        }
+    }
+
+    /// The files of the two in a folder.
+    pub fn paths(folder: &Path) -> impl Iterator<Item = PathBuf> {
+        let folder = folder.to_owned();
+        NAMES.into_iter().map(move |name| folder.join(name))
+    }
+
+    /// Removes earlier checkpoints, so that none can be taken for one of a new run. For rank 0.
+    ///
+    /// # Errors
+    /// When one cannot be removed.
+    pub fn remove(&self) -> Result<()> {
+        for name in NAMES.iter().chain([&PART]) {
+            let path = self.folder.join(name);
+            match std::fs::remove_file(&path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    let path = path.display();
+                    return Err(Error::run(format!("cannot remove {path}: {error}")));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a checkpoint in the place of the older one. Collective.
+    ///
+    /// # Errors
+    /// When the disc is full; the checkpoints that were there stay.
+    pub fn write(
+        &mut self,
+        comm: &dyn Communicator,
+        order: &IdOrder,
+        header: &Header,
+        saved: &Saved,
+    ) -> Result<()> {
+        let part = self.folder.join(PART);
+        let written = write_file(comm, &part, order, header, saved)
+            .and_then(|()| seal::seal(comm, &part, header.number));
+        if written.is_err() && comm.rank() == 0 {
+            // It only takes up space; that it cannot be removed either changes nothing.
+            let _ = std::fs::remove_file(&part);
+        }
+        written?;
+        let place = self.folder.join(NAMES[self.next]);
+        let moved = match comm.rank() {
+            0 => std::fs::rename(&part, &place)
+                .and_then(|()| std::fs::File::open(&self.folder)?.sync_all())
+                .map_err(|error| Error::run(format!("{}: {error}", place.display()))),
+            _ => Ok(()),
+        };
+        agree(comm, moved)?;
+        self.next = 1 - self.next;
+        Ok(())
+    }
+
+    /// Opens the newest checkpoint of the folder that is intact; `warn` is told of those that are
+    /// not. Collective.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn open(
+        comm: &dyn Communicator,
+        folder: &Path,
+        warn: &dyn Fn(String),
+    ) -> Result<(Self, PathBuf)> {
+        // Rank 0's view counts: a file system may show the others something older.
+        let mut packed = Vec::new();
+        if comm.rank() == 0 {
+            let mut found: Vec<(Option<u64>, u8)> = (0..)
+                .zip(NAMES)
+                .filter(|(_, name)| folder.join(name).exists())
+                .map(|(slot, name)| (seal::number(&folder.join(name)), slot))
+                .collect();
+            // One that is not even sealed may have been the newest.
+            found.sort_by_key(|(number, _)| (number.is_some(), std::cmp::Reverse(*number)));
+            packed = found.into_iter().map(|(_, slot)| slot).collect();
+        }
+        comm.broadcast(0, &mut packed);
+        for slot in packed {
+            let path = folder.join(NAMES[usize::from(slot)]);
+            if seal::is_intact(comm, &path)? {
+                let checkpoints = Self {
+                    folder: folder.to_owned(),
+                    next: 1 - usize::from(slot),
+                };
+                return Ok((checkpoints, path));
+            }
+            warn(format!("{} is damaged and not used", path.display()));
+        }
+        Err(Error::input(format!(
+            "there is no usable checkpoint in {}; start without --restart",
+            folder.display()
+        )))
+    }
+}
+
+/// Reads a checkpoint's header. Collective.
+///
+/// # Errors
+/// When the file is none that this version of Fissure has written.
+pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
+    let mut file = CollectiveFile::open(path, comm)?;
+    let numbers = file.integers_attribute("/", "numbers")?;
+    let deck = file.text_attribute("/", "deck")?;
+    file.close()?;
+    match numbers[..] {
+        [
+            VERSION,
+            number,
+            step,
+            points,
+            fingerprint,
+            outputs,
+            rows,
+            energy,
+            intact,
+        ] => Ok(Header {
+            number: number as u64,
+            step: f64::from_bits(step as u64),
+            points: points as u64,
+            fingerprint: fingerprint as u64,
+            outputs: outputs as u64,
+            rows: rows as u64,
+            start: (f64::from_bits(energy as u64), intact as u64),
+            deck,
+        }),
+        _ => Err(Error::input(format!(
+            "{} was written by another version of Fissure",
+            path.display()
+        ))),
+    }
+}
+
+/// Reads the state of this rank's block of ids. Collective.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Result<Saved> {
+    let mut file = CollectiveFile::open(path, comm)?;
+    let values = file.open_dataset("/values")?;
+    let lengths = file.open_dataset("/bond_bytes")?;
+    let bonds = file.open_dataset("/bonds")?;
+    let (first, count) = (order.first(), order.count());
+    let width = values.columns();
+    let values = file.read_rows(&values, first, count)?;
+    let lengths: Vec<u32> = file.read_rows(&lengths, first, count)?;
+    let own = lengths.iter().map(|length| u64::from(*length)).sum();
+    let (start, _) = crate::comm::scan(comm, own);
+    let bonds = file.read_rows(&bonds, start, own as usize)?;
+    file.close()?;
+    Ok(Saved {
+        width,
+        values,
+        lengths,
+        bonds,
+    })
+}
+
+fn write_file(
+    comm: &dyn Communicator,
+    path: &Path,
+    order: &IdOrder,
+    header: &Header,
+    saved: &Saved,
+) -> Result<()> {
+    let mut file = CollectiveFile::create(path, comm, Creation::Truncate)?;
+    let numbers = [
+        VERSION,
+        header.number as i64,
+        header.step.to_bits() as i64,
+        header.points as i64,
+        header.fingerprint as i64,
+        header.outputs as i64,
+        header.rows as i64,
+        header.start.0.to_bits() as i64,
+        header.start.1 as i64,
+    ];
+    file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
+    file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
+    let points = Rows::Fixed(header.points);
+    let (start, total) = crate::comm::scan(comm, saved.bonds.len() as u64);
+    let values = file.create_dataset::<f64>("/values", points, Some(saved.width))?;
+    file.write_rows(&values, order.first(), &saved.values)?;
+    let lengths = file.create_dataset::<u32>("/bond_bytes", points, None)?;
+    file.write_rows(&lengths, order.first(), &saved.lengths)?;
+    let bonds = file.create_dataset::<u8>("/bonds", Rows::Fixed(total), None)?;
+    file.write_rows(&bonds, start, &saved.bonds)?;
+    file.close()
+}

@@ -1,0 +1,156 @@
+//! A checksum at the end of a file, so that a truncated or altered one is recognised before anybody
+//! trusts it.
+//!
+//! Readers of HDF5 ignore what follows the last object of a file. All ranks check a share of the
+//! bytes each; the sum over 8-byte words mixed with their place does not depend on the shares.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use crate::comm::{Communicator, agree};
+use crate::error::{Error, Result};
+
+/// Marks a seal; also guards against other trailing bytes.
+const MAGIC: u64 = u64::from_le_bytes(*b"FISSSEAL");
+
+/// Magic, length of the sealed bytes, their checksum, and a number of the writer's choice.
+const SEAL_BYTES: u64 = 32;
+
+/// Bytes read at once.
+const BUFFER: usize = 1 << 20;
+
+/// Appends the seal with a number of the caller's choice to a closed file, and makes the file safe on
+/// the disc. Collective.
+///
+/// # Errors
+/// When the file cannot be read or written.
+pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
+    let length = agree(comm, length(path).map_err(|error| failure(path, &error)))?;
+    let sum = checksum(comm, path, length)?;
+    let append = || -> std::io::Result<()> {
+        let mut file = OpenOptions::new().append(true).open(path)?;
+        let words = [MAGIC, length, sum ^ mix(number), number];
+        file.write_all(&words.map(u64::to_le_bytes).concat())?;
+        file.sync_all()
+    };
+    let appended = match comm.rank() {
+        0 => append().map_err(|error| failure(path, &error)),
+        _ => Ok(()),
+    };
+    agree(comm, appended)
+}
+
+/// The number in the seal of a file, without a look at the rest; `None` where there is no seal.
+pub fn number(path: &Path) -> Option<u64> {
+    let sealed = length(path).ok()?.checked_sub(SEAL_BYTES)?;
+    let mut file = File::open(path).ok()?;
+    file.seek(SeekFrom::Start(sealed)).ok()?;
+    let mut words = [0_u64; 4];
+    for word in &mut words {
+        let mut bytes = [0; 8];
+        file.read_exact(&mut bytes).ok()?;
+        *word = u64::from_le_bytes(bytes);
+    }
+    (words[0] == MAGIC && words[1] == sealed).then_some(words[3])
+}
+
+/// Whether a file is as it was when it was sealed. Collective.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
+    let read = || -> std::io::Result<Option<(u64, u64, u64)>> {
+        let Some(number) = number(path) else {
+            return Ok(None);
+        };
+        let sealed = length(path)? - SEAL_BYTES;
+        let mut file = File::open(path)?;
+        file.seek(SeekFrom::Start(sealed + 16))?;
+        let mut bytes = [0; 8];
+        file.read_exact(&mut bytes)?;
+        Ok(Some((sealed, u64::from_le_bytes(bytes), number)))
+    };
+    match agree(comm, read().map_err(|error| failure(path, &error)))? {
+        None => Ok(false),
+        Some((length, expected, number)) => {
+            Ok(checksum(comm, path, length)? ^ mix(number) == expected)
+        }
+    }
+}
+
+fn length(path: &Path) -> std::io::Result<u64> {
+    Ok(std::fs::metadata(path)?.len())
+}
+
+/// The checksum of the first `length` bytes. Collective.
+fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
+    let words = length.div_ceil(8);
+    let (rank, size) = (comm.rank() as u64, comm.size() as u64);
+    let share = |rank: u64| (u128::from(words) * u128::from(rank) / u128::from(size)) as u64;
+    let own = sum_words(path, share(rank), share(rank + 1), length);
+    let own = agree(comm, own.map_err(|error| failure(path, &error)))?;
+    Ok(crate::comm::total(comm, own))
+}
+
+/// Sums the words from `first` up to `end`; the last one of the file is filled up with zeros.
+fn sum_words(path: &Path, first: u64, end: u64, length: u64) -> std::io::Result<u64> {
+    let mut file = File::open(path)?;
+    file.seek(SeekFrom::Start(8 * first))?;
+    let mut left = (8 * end).min(length).saturating_sub(8 * first);
+    let mut buffer = vec![0; BUFFER];
+    let (mut sum, mut place) = (0_u64, first);
+    while left > 0 {
+        let take = (left as usize).min(BUFFER);
+        file.read_exact(&mut buffer[..take])?;
+        buffer[take..take.next_multiple_of(8)].fill(0);
+        for word in buffer[..take.next_multiple_of(8)].chunks_exact(8) {
+            let word = u64::from_le_bytes(word.try_into().expect("a chunk has 8 bytes"));
+            sum = sum.wrapping_add(mix(word ^ mix(place)));
+            place += 1;
+        }
+        left -= take as u64;
+    }
+    Ok(sum)
+}
+
+/// Spreads every bit over the whole word (the finisher of SplitMix64).
+pub fn mix(word: u64) -> u64 {
+    let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    word ^ word >> 31
+}
+
+fn failure(path: &Path, error: &std::io::Error) -> Error {
+    Error::run(format!("{}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+
+    #[test]
+    fn any_flipped_bit_and_any_cut_is_seen() {
+        let path = std::env::temp_dir().join(format!("fissure-seal-{}", std::process::id()));
+        let bytes: Vec<u8> = (0..1003).map(|k| (k * 7) as u8).collect();
+        std::fs::write(&path, &bytes).unwrap();
+        threads::run(3, |comm| seal(comm, &path, 42).unwrap());
+        assert_eq!(number(&path), Some(42));
+        let intact = |ranks| threads::run(ranks, |comm| is_intact(comm, &path).unwrap());
+        assert_eq!(intact(2), [true, true]);
+        let sealed = std::fs::read(&path).unwrap();
+        for bit in (0..8 * sealed.len()).step_by(61) {
+            let mut flipped = sealed.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(&path, &flipped).unwrap();
+            assert_eq!(intact(1), [false], "bit {bit}");
+        }
+        for length in [0, 10, 500, sealed.len() - 1] {
+            std::fs::write(&path, &sealed[..length]).unwrap();
+            assert_eq!(intact(1), [false], "cut to {length}");
+        }
+        std::fs::remove_file(&path).unwrap();
+    }
+}

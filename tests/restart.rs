@@ -1,0 +1,370 @@
+//! Checkpoints: a run that is killed or stopped at any moment, and continued on any number of ranks,
+//! ends to the bit where the uninterrupted one ends.
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use fissure::output::ResultReader;
+use support::command::{Folder, finish, fissure, succeed, text, wait};
+use support::datasets::{datasets, difference};
+
+/// Exit code of a run that stopped and can be continued.
+const STOPPED: i32 = 75;
+
+/// A notched plate that is torn and shaken; long enough to be interrupted.
+fn plate(end: &str, extra: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        parameters = {{ pull = 20e6, end = {end} }}
+        grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+        material.glass.pmb = {{ density = 2440, youngs_modulus = 72e9 }}
+        damage.brittle.critical_stretch = {{ fracture_energy = 135, alpha = 0.25 }}
+        body.plate = {{ material = 'glass', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [0.06, 0.03] }} }}
+        crack.notch.segment = {{ from = [-1, 0.015], to = [0.02, 0.015] }}
+        set.top.where = 'y > 0.028'
+        set.bottom.where = 'y < 0.002'
+        condition.pull = {{ set = 'top', traction = ['1e6*sin(1e6*t)', 'pull'] }}
+        condition.hold = {{ set = 'bottom', displacement = ['free', '-1e-8*ramp(t, 0, 1e-5)'] }}
+        time = {{ end = 'end', step = 1e-8 }}
+        output.every_steps = 200
+        history = {{ every_steps = 50, reactions = ['bottom'], probe.tip.at = [0.02, 0.015] }}
+        {extra}
+        "
+    )
+}
+
+fn run(ranks: usize, deck: &Path, out: &Path, extra: &[&str]) -> Command {
+    let mut command = fissure(ranks);
+    command
+        .arg("run")
+        .arg(deck)
+        .arg("--output")
+        .arg(out)
+        .args(extra);
+    command
+}
+
+fn result(out: &Path) -> PathBuf {
+    out.join("result.vtkhdf")
+}
+
+/// Numbers of the processes that mpirun, or the command itself, started for the ranks.
+fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
+    if ranks == 1 {
+        return vec![child.id()];
+    }
+    let children = format!("/proc/{0}/task/{0}/children", child.id());
+    let text = std::fs::read_to_string(children).unwrap_or_default();
+    text.split_whitespace()
+        .filter_map(|id| id.parse().ok())
+        .collect()
+}
+
+fn send(signal: &str, process: u32) {
+    let sent = Command::new("kill")
+        .args([signal, &process.to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+}
+
+/// Whether a checkpoint is there to continue from.
+fn has_checkpoint(out: &Path) -> bool {
+    ["checkpoint_0.h5", "checkpoint_1.h5"]
+        .iter()
+        .any(|name| out.join(name).exists())
+}
+
+/// Kills one rank of a run after a while; returns whether the run was still under way.
+fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
+    let mut child = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(delay);
+    let under_way = child.try_wait().unwrap().is_none();
+    if under_way && let Some(process) = rank_processes(&child, ranks).last() {
+        let _ = Command::new("kill")
+            .args(["-9", &process.to_string()])
+            .status();
+    }
+    wait(child);
+    under_way
+}
+
+#[test]
+fn killed_at_any_moment_and_continued_on_any_number_of_ranks() {
+    // A checkpoint every 15 steps, so that kills hit their writing as well. The long form of this
+    // test is scripts/kill_test.
+    let kills: usize = std::env::var("FISSURE_KILLS").map_or(6, |text| text.parse().unwrap());
+    let folder = Folder::new("kills");
+    let text = plate("3e-5", "checkpoint.every_steps = 15");
+    let deck = folder.write("deck.toml", &text);
+    let whole = folder.join("whole");
+    let begin = Instant::now();
+    succeed(&mut run(2, &deck, &whole, &[]));
+    let duration = begin.elapsed();
+    let expected = datasets(&result(&whole));
+    let table = std::fs::read_to_string(whole.join("history.csv")).unwrap();
+
+    let mut random = u64::from(std::process::id());
+    let mut survived = 0;
+    while survived < kills {
+        let out = folder.join(format!("killed{survived}"));
+        let mut killed = 0;
+        loop {
+            random = random
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            let share = 0.15 + 0.7 * (random >> 11) as f64 / (1_u64 << 53) as f64;
+            let restart = has_checkpoint(&out);
+            let ranks = if restart {
+                1 + (killed + survived) % 4
+            } else {
+                2
+            };
+            let flags: &[&str] = if restart {
+                &["--restart"]
+            } else {
+                &["--overwrite"]
+            };
+            let command = run(ranks, &deck, &out, flags);
+            if killed < 3 && kill_after(command, ranks, duration.mul_f64(share)) {
+                killed += 1;
+                continue;
+            }
+            if killed == 3 {
+                succeed(&mut run(ranks, &deck, &out, flags));
+            }
+            break;
+        }
+        let found = datasets(&result(&out));
+        assert_eq!(difference(&expected, &found), None, "after {killed} kills");
+        assert_eq!(
+            std::fs::read_to_string(out.join("history.csv")).unwrap(),
+            table
+        );
+        survived += killed.max(1);
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+#[test]
+fn a_signal_to_any_rank_stops_all_and_nothing_is_lost() {
+    let folder = Folder::new("signals");
+    let deck = folder.write("deck.toml", &plate("3e-5", ""));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &[]));
+    let expected = datasets(&result(&whole));
+    for (ranks, signal) in [
+        (1, "-TERM"),
+        (1, "-INT"),
+        (2, "-USR1"),
+        (2, "-TERM"),
+        (3, "-USR1"),
+    ] {
+        let out = folder.join(format!("{ranks}{signal}"));
+        let mut command = run(ranks, &deck, &out, &[]);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        while ResultReader::open(&result(&out)).map_or(0, |it| it.times().map_or(0, |t| t.len()))
+            < 2
+        {
+            std::thread::sleep(Duration::from_millis(20));
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "the run ended by itself"
+            );
+        }
+        send(signal, *rank_processes(&child, ranks).last().unwrap());
+        let output = wait(child);
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(STOPPED), "{printed}");
+        assert_eq!(
+            printed.matches("stopped by a signal").count(),
+            1,
+            "{printed}"
+        );
+        assert!(has_checkpoint(&out));
+        succeed(&mut run(4 - ranks, &deck, &out, &["--restart"]));
+        assert_eq!(difference(&expected, &datasets(&result(&out))), None);
+    }
+}
+
+#[test]
+fn the_wall_clock_limit_stops_in_time() {
+    let folder = Folder::new("wall");
+    let deck = folder.write("deck.toml", &plate("1e-2", ""));
+    let out = folder.join("out");
+    for extra in [&[][..], &["--restart"]] {
+        let begin = Instant::now();
+        let output = finish(run(2, &deck, &out, &["--wall-time", "0:00:03"]).args(extra));
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(STOPPED), "{printed}");
+        assert!(
+            printed.contains("as the wall-clock limit is near"),
+            "{printed}"
+        );
+        assert!(begin.elapsed() < Duration::from_secs(20));
+    }
+}
+
+#[test]
+fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
+    let folder = Folder::new("changed");
+    let deck = folder.write("deck.toml", &plate("1e-5", ""));
+    let out = folder.join("out");
+    succeed(&mut run(2, &deck, &out, &[]));
+
+    let refused = finish(&mut run(
+        2,
+        &deck,
+        &out,
+        &["--restart", "--set", "pull=21e6"],
+    ));
+    let printed = text(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{printed}");
+    assert!(
+        printed.contains("condition.pull.traction[1]: was `pull` = 20000000, is `pull` = 21000000"),
+        "{printed}"
+    );
+
+    // Complete: nothing to do, and nothing done.
+    let before = datasets(&result(&out));
+    let printed = succeed(&mut run(1, &deck, &out, &["--restart"]));
+    assert!(printed.contains("complete already"), "{printed}");
+    assert_eq!(difference(&before, &datasets(&result(&out))), None);
+
+    succeed(&mut run(
+        3,
+        &deck,
+        &out,
+        &["--restart", "--set", "end=2e-5"],
+    ));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &["--set", "end=2e-5"]));
+    assert_eq!(
+        difference(&datasets(&result(&whole)), &datasets(&result(&out))),
+        None
+    );
+
+    // Other fields go to a new file; the one with the first half is kept.
+    let other = plate("3e-5", "").replace(
+        "output.every_steps = 200",
+        "output = { every_steps = 100, fields = ['damage'] }",
+    );
+    std::fs::write(&deck, other).unwrap();
+    let printed = succeed(&mut run(2, &deck, &out, &["--restart"]));
+    assert!(
+        printed.contains("result_until_step_2000.vtkhdf"),
+        "{printed}"
+    );
+    let steps = |file: &str| {
+        ResultReader::open(&out.join(file))
+            .unwrap()
+            .steps()
+            .unwrap()
+    };
+    assert_eq!(steps("result_until_step_2000.vtkhdf").last(), Some(&2000));
+    assert_eq!(steps("result.vtkhdf")[..3], [2000, 2100, 2200]);
+}
+
+#[test]
+fn a_damaged_checkpoint_is_recognised_and_the_other_one_used() {
+    let folder = Folder::new("damaged");
+    let deck = folder.write("deck.toml", &plate("2e-5", "checkpoint.every_steps = 700"));
+    let out = folder.join("out");
+    succeed(&mut run(2, &deck, &out, &[]));
+    let expected = datasets(&result(&out));
+    // Checkpoints at the steps 700, 1400 and 2000, so the newest is in the first file.
+    let newest = out.join("checkpoint_0.h5");
+    let sound = std::fs::read(&newest).unwrap();
+    let mut flipped = sound.clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 4;
+    for damaged in [&sound[..sound.len() / 3], &flipped[..], &[]] {
+        std::fs::write(&newest, damaged).unwrap();
+        let output = finish(&mut run(3, &deck, &out, &["--restart"]));
+        let printed = text(&output);
+        assert!(output.status.success(), "{printed}");
+        assert_eq!(
+            printed
+                .matches("checkpoint_0.h5 is damaged and not used")
+                .count(),
+            1,
+            "{printed}"
+        );
+        assert!(printed.contains("continued after step 1400"), "{printed}");
+        assert_eq!(difference(&expected, &datasets(&result(&out))), None);
+    }
+    for name in ["checkpoint_0.h5", "checkpoint_1.h5"] {
+        std::fs::write(out.join(name), "damaged").unwrap();
+    }
+    let output = finish(&mut run(2, &deck, &out, &["--restart"]));
+    let printed = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{printed}");
+    assert!(printed.contains("no usable checkpoint"), "{printed}");
+}
+
+#[test]
+fn a_full_disc_leaves_the_checkpoint_before() {
+    let folder = Folder::new("fullcheck");
+    let disc = folder.join("small");
+    std::fs::create_dir(&disc).unwrap();
+    let mount = |arguments: &[&str]| {
+        let mut command = Command::new("mount");
+        let status = command
+            .args(arguments)
+            .arg(&disc)
+            .stderr(Stdio::null())
+            .status();
+        status.is_ok_and(|status| status.success())
+    };
+    if !mount(&["-t", "tmpfs", "-o", "size=20m", "tmpfs"]) {
+        eprintln!("skipped: only root can mount the small disc that this test fills");
+        return;
+    }
+    let deck = folder.write("deck.toml", &plate("3e-5", "checkpoint.every_steps = 1000"));
+    let out = disc.join("out");
+    let mut command = run(2, &deck, &out, &[]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !has_checkpoint(&out) {
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "the run ended by itself"
+        );
+    }
+    // Something else takes up the rest of the disc.
+    let _ = std::fs::write(disc.join("other"), vec![0; 20 << 20]);
+    let output = wait(child);
+    let printed = text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
+    assert_eq!(printed.matches("error:").count(), 1, "{printed}");
+    assert!(printed.contains("No space left"), "{printed}");
+    std::fs::remove_file(disc.join("other")).unwrap();
+    succeed(&mut run(1, &deck, &out, &["--restart"]));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &[]));
+    assert_eq!(
+        difference(&datasets(&result(&whole)), &datasets(&result(&out))),
+        None
+    );
+    assert!(
+        Command::new("umount")
+            .arg(&disc)
+            .status()
+            .unwrap()
+            .success()
+    );
+}

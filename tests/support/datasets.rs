@@ -1,0 +1,46 @@
+//! Results as comparable bits.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use fissure::output::ResultReader;
+
+/// Every dataset of a result, rows sorted by id, as bits, by name.
+pub fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
+    let reader = ResultReader::open(result).unwrap_or_else(|error| panic!("{error}"));
+    let ids = reader.ids().unwrap();
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_by_key(|k| ids[*k]);
+    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect();
+    let sorted = |values: &[f64]| {
+        let width = values.len() / ids.len();
+        let row = |k: &usize| values[k * width..(k + 1) * width].to_vec();
+        bits(&order.iter().flat_map(row).collect::<Vec<f64>>())
+    };
+    let mut all = BTreeMap::new();
+    all.insert("times".to_owned(), bits(&reader.times().unwrap()));
+    all.insert("steps".to_owned(), reader.steps().unwrap());
+    let positions = reader.positions().unwrap();
+    all.insert("positions".to_owned(), sorted(positions.as_flattened()));
+    for field in reader.fields().unwrap() {
+        for step in 0..reader.times().unwrap().len() {
+            let values = reader.field(&field.name, step).unwrap();
+            all.insert(format!("{} {step}", field.name), sorted(&values));
+        }
+    }
+    for column in reader.history().unwrap() {
+        all.insert(format!("history {}", column.name), bits(&column.values));
+    }
+    all
+}
+
+/// The first dataset in which two results differ, if any.
+pub fn difference(
+    expected: &BTreeMap<String, Vec<u64>>,
+    found: &BTreeMap<String, Vec<u64>>,
+) -> Option<String> {
+    let mut names = expected.keys().chain(found.keys());
+    names
+        .find(|name| expected.get(*name) != found.get(*name))
+        .cloned()
+}
