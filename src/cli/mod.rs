@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use fissure::error::{Error, Result};
 
 /// Peridynamics for batch jobs: cracks that start, run and branch by themselves.
@@ -45,9 +45,9 @@ struct CommandLine {
     #[arg(short, long, global = true)]
     quiet: bool,
 
-    /// Print more; twice for even more.
-    #[arg(short, long, global = true, action = ArgAction::Count, conflicts_with = "quiet")]
-    verbose: u8,
+    /// Print more.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
 }
 
 #[derive(Subcommand)]
@@ -229,8 +229,8 @@ pub fn main() -> ExitCode {
     };
     let verbosity = match (line.quiet, line.verbose) {
         (true, _) => Verbosity::Quiet,
-        (_, 0) => Verbosity::Normal,
-        _ => Verbosity::Verbose,
+        (_, false) => Verbosity::Normal,
+        (_, true) => Verbosity::Verbose,
     };
     let outcome = match line.command {
         Command::Run(arguments) => return run::run(&arguments, verbosity),

@@ -47,7 +47,8 @@ pub struct Piece {
     pub total: u64,
 }
 
-/// A result file being written. All methods are collective, see [`CollectiveFile`].
+/// A result file being written. All methods are collective; where one fails on any rank, it fails on
+/// all, and the file takes no more.
 ///
 /// Room for all expected steps is made in advance, so that to add a step changes little besides the
 /// data themselves: a run that is killed meanwhile leaves a sound file.
@@ -327,7 +328,7 @@ impl<'a> ResultFile<'a> {
     /// Starts the history: a table of numbers, in the file and in a CSV file.
     ///
     /// # Errors
-    /// As [`History::create`].
+    /// The history's files cannot be written, or two columns have one name.
     pub fn create_history(&mut self, contents: &HistoryContents) -> Result<()> {
         self.history = Some(History::create(&mut self.file, contents)?);
         self.file.flush()
@@ -350,7 +351,8 @@ impl<'a> ResultFile<'a> {
         }
     }
 
-    /// See [`CollectiveFile::no_collective_cause`].
+    /// Why writes so far were not collective: bits of HDF5's causes, of any rank and any write; 0 when
+    /// all were.
     pub fn no_collective_cause(&self) -> u32 {
         self.file.no_collective_cause()
     }
