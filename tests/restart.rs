@@ -77,7 +77,7 @@ fn has_checkpoint(out: &Path) -> bool {
         .any(|name| out.join(name).exists())
 }
 
-/// Kills one rank of a run after a while; returns whether the run was still under way.
+/// Kills one rank of a run after a while; returns whether that ended the run.
 fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
     let mut child = command
         .stdout(Stdio::null())
@@ -85,14 +85,18 @@ fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
         .spawn()
         .unwrap();
     std::thread::sleep(delay);
-    let under_way = child.try_wait().unwrap().is_none();
-    if under_way && let Some(process) = rank_processes(&child, ranks).last() {
-        let _ = Command::new("kill")
-            .args(["-9", &process.to_string()])
-            .status();
-    }
-    wait(child);
-    under_way
+    let process = rank_processes(&child, ranks).last().copied();
+    let killed = process.is_some_and(|process| {
+        child.try_wait().unwrap().is_none()
+            && Command::new("kill")
+                .args(["-9", &process.to_string()])
+                .stderr(Stdio::null())
+                .status()
+                .unwrap()
+                .success()
+    });
+    let ended_well = wait(child).status.success();
+    killed && !ended_well
 }
 
 #[test]
@@ -147,7 +151,7 @@ fn killed_at_any_moment_and_continued_on_any_number_of_ranks() {
             std::fs::read_to_string(out.join("history.csv")).unwrap(),
             table
         );
-        survived += killed.max(1);
+        survived += killed;
         std::fs::remove_dir_all(&out).unwrap();
     }
 }
@@ -198,6 +202,54 @@ fn a_signal_to_any_rank_stops_all_and_nothing_is_lost() {
 }
 
 #[test]
+fn a_checkpoint_is_written_on_request_and_a_second_signal_ends_at_once() {
+    let folder = Folder::new("request");
+    let deck = folder.write("deck.toml", &plate("1e-2", ""));
+    let out = folder.join("out");
+    let mut command = run(2, &deck, &out, &[]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let outputs = || ResultReader::open(&result(&out)).map_or(0, |it| it.steps().unwrap().len());
+    while outputs() < 2 {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(!has_checkpoint(&out));
+    send("-USR2", *rank_processes(&child, 2).last().unwrap());
+    let before = outputs();
+    while !has_checkpoint(&out) || outputs() == before {
+        std::thread::sleep(Duration::from_millis(20));
+        assert!(child.try_wait().unwrap().is_none(), "the run goes on");
+    }
+    let ranks = rank_processes(&child, 2);
+    send("-USR1", ranks[0]);
+    let output = wait(child);
+    assert_eq!(output.status.code(), Some(STOPPED), "{}", text(&output));
+
+    // A rank that is stuck in its set-up cannot stop by itself: the second signal ends it.
+    let points = "0 0 1 0\n".repeat(4_000_000);
+    folder.write("points.txt", &points);
+    let stuck = folder.write(
+        "stuck.toml",
+        "dimension = 'plane-stress'
+        grid.horizon = 3
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.cloud = { material = 'rubber', points.file = 'points.txt' }
+        time = { end = 1, step = 0.1 }
+        ",
+    );
+    let mut command = run(1, &stuck, &folder.join("stuck"), &[]);
+    let child = command.stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    send("-TERM", child.id());
+    std::thread::sleep(Duration::from_millis(1500));
+    send("-TERM", child.id());
+    assert_eq!(wait(child).status.code(), Some(130));
+}
+
+#[test]
 fn the_wall_clock_limit_stops_in_time() {
     let folder = Folder::new("wall");
     let deck = folder.write("deck.toml", &plate("1e-2", ""));
@@ -211,7 +263,8 @@ fn the_wall_clock_limit_stops_in_time() {
             printed.contains("as the wall-clock limit is near"),
             "{printed}"
         );
-        assert!(begin.elapsed() < Duration::from_secs(20));
+        // The limit, and what it takes to start and end on a busy machine.
+        assert!(begin.elapsed() < Duration::from_secs(12));
     }
 }
 
@@ -254,7 +307,7 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
         None
     );
 
-    // Other fields go to a new file; the one with the first half is kept.
+    // Other fields go to a new file; the one with the first half is kept, a second time as well.
     let other = plate("3e-5", "").replace(
         "output.every_steps = 200",
         "output = { every_steps = 100, fields = ['damage'] }",
@@ -273,6 +326,18 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
     };
     assert_eq!(steps("result_until_step_2000.vtkhdf").last(), Some(&2000));
     assert_eq!(steps("result.vtkhdf")[..3], [2000, 2100, 2200]);
+    for (fields, name) in [
+        ("velocity", "result_until_step_3000"),
+        ("damage", "result_until_step_3000_1"),
+    ] {
+        let other = plate("3e-5", "").replace(
+            "output.every_steps = 200",
+            &format!("output = {{ every_steps = 100, fields = ['{fields}'] }}"),
+        );
+        std::fs::write(&deck, other).unwrap();
+        succeed(&mut run(2, &deck, &out, &["--restart"]));
+        assert!(!steps(&format!("{name}.vtkhdf")).is_empty());
+    }
 }
 
 #[test]

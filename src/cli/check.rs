@@ -1,5 +1,6 @@
 //! `fissure check`: what a deck would do.
 
+use crate::cli::say;
 use fissure::comm::threads;
 use fissure::deck::{self, Plan};
 use fissure::error::Result;
@@ -29,7 +30,7 @@ pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
 }
 
 fn line(name: &str, value: impl std::fmt::Display) {
-    println!("  {name:<24}{value}");
+    say!("  {name:<24}{value}");
 }
 
 fn report<const D: usize>(
@@ -39,10 +40,11 @@ fn report<const D: usize>(
 ) -> Result<()> {
     let comm = threads::alone();
     let mut simulation = Simulation::<D>::new(plan, &comm)?;
+    simulation.check()?;
     if verbosity == Verbosity::Quiet {
         return Ok(());
     }
-    println!(
+    say!(
         "{} is a valid deck: {}",
         arguments.deck.display(),
         plan.title
@@ -51,7 +53,7 @@ fn report<const D: usize>(
     line("horizon", si(plan.horizon, "m"));
     for body in &plan.bodies {
         let ListLaw::Pmb(law) = block_law(plan, body);
-        println!("body {}", body.name);
+        say!("body {}", body.name);
         line("material", &body.material_name);
         line("density", format!("{} kg/m³", body.material.density));
         line(
@@ -71,7 +73,7 @@ fn report<const D: usize>(
             }
         }
     }
-    println!("size");
+    say!("size");
     let model = &simulation.model;
     let total = model.total;
     line("points", count(total));
@@ -84,12 +86,12 @@ fn report<const D: usize>(
         "memory of each rank",
         format!("about {} on {ranks} rank(s)", bytes(estimate)),
     );
-    println!("time");
+    say!("time");
     line("end", si(plan.time.end, "s"));
     line("stable step", si(simulation.stable_step, "s"));
     line("time step", si(simulation.step, "s"));
     line("steps", count(simulation.last));
-    println!("sets");
+    say!("sets");
     let model = &simulation.model;
     for (index, set) in plan.sets.iter().enumerate() {
         let size = members(plan, model, index).len();
@@ -105,13 +107,13 @@ fn report<const D: usize>(
         .filter(|stored| stored.neighbours < few)
         .count();
     if poor > 0 {
-        println!(
+        say!(
             "warning: {} points have fewer than {few} intact bonds",
             count(poor as u64)
         );
     }
     if simulation.step > simulation.stable_step {
-        println!("warning: the time step is larger than the stable one");
+        say!("warning: the time step is larger than the stable one");
     }
     Ok(())
 }

@@ -28,10 +28,10 @@ impl Files {
         }
     }
 
-    /// Makes the folder for a new run. For rank 0.
+    /// Looks whether a new run may write here. For rank 0.
     ///
     /// # Errors
-    /// When a result or a checkpoint is there that must not be replaced, or the folder cannot be made.
+    /// When a result or a checkpoint is there that must not be replaced.
     pub fn prepare(&self, overwrite: bool) -> Result<()> {
         let files = [self.result.clone(), self.history.clone()];
         let existing = files
@@ -39,14 +39,35 @@ impl Files {
             .chain(Checkpoints::paths(&self.folder))
             .find(|file| file.exists());
         if let (Some(file), false) = (existing, overwrite) {
+            let restart = match Checkpoints::paths(&self.folder).any(|path| path.exists()) {
+                true => "--restart continues the run, ",
+                false => "",
+            };
             return Err(Error::input(format!(
-                "{} exists already; --restart continues the run, --overwrite replaces it, \
-                 --output DIR writes elsewhere",
+                "{} exists already; {restart}--overwrite replaces it, --output DIR writes elsewhere",
                 file.display()
             )));
         }
+        Ok(())
+    }
+
+    /// Makes the folder and takes it for this run, until the returned file is dropped. For rank 0.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or another run writes to it.
+    pub fn lock(&self) -> Result<fs::File> {
         fs::create_dir_all(&self.folder)
-            .map_err(|error| file_error(&self.folder, "create the folder", &error))
+            .map_err(|error| file_error(&self.folder, "create the folder", &error))?;
+        let path = self.folder.join(".lock");
+        let file = fs::File::create(&path).map_err(|error| file_error(&path, "create", &error))?;
+        match file.try_lock() {
+            Err(fs::TryLockError::WouldBlock) => Err(Error::input(format!(
+                "another run is writing to {}; --output DIR writes elsewhere",
+                self.folder.display()
+            ))),
+            // Some network file systems have no locks.
+            Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(file),
+        }
     }
 
     /// Renames result and history, so that others can take their names. For rank 0.
@@ -54,11 +75,21 @@ impl Files {
     /// # Errors
     /// When one cannot be renamed.
     pub fn set_aside(&self, number: u64) -> Result<PathBuf> {
-        let aside = |file: &Path| {
+        let named = |file: &Path, count: u32| {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy();
             let extension = file.extension().unwrap_or_default().to_string_lossy();
-            file.with_file_name(format!("{stem}_until_step_{number}.{extension}"))
+            let again = if count == 0 {
+                String::new()
+            } else {
+                format!("_{count}")
+            };
+            file.with_file_name(format!("{stem}_until_step_{number}{again}.{extension}"))
         };
+        let is_free = |count: &u32| {
+            !named(&self.result, *count).exists() && !named(&self.history, *count).exists()
+        };
+        let count = (0..).find(is_free).unwrap_or(u32::MAX);
+        let aside = |file: &Path| named(file, count);
         for file in [&self.result, &self.history] {
             if file.exists() {
                 fs::rename(file, aside(file))

@@ -14,6 +14,24 @@ mod run;
 mod summary;
 mod watch;
 
+/// Prints a line. A reader that has closed the output must not end a run.
+macro_rules! say {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($words)*);
+    }};
+}
+pub(crate) use say;
+
+/// As [`say`], for warnings and errors.
+macro_rules! tell {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($words)*);
+    }};
+}
+pub(crate) use tell;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -250,7 +268,7 @@ fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if speaks {
-                eprintln!("error: {error}");
+                tell!("error: {error}");
             }
             ExitCode::from(error.exit_code())
         }

@@ -1,5 +1,6 @@
 //! `fissure plot`: a picture of a result.
 
+use crate::cli::say;
 use std::path::{Path, PathBuf};
 
 use fissure::error::{Error, Result};
@@ -37,7 +38,7 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
         };
         look.draw(*index, times[*index], factor, &path)?;
         if verbosity > Verbosity::Quiet {
-            println!("wrote {}", path.display());
+            say!("wrote {}", path.display());
         }
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! How far a run has come: a moving bar on a terminal, a line every tenth of the way elsewhere
 //! (mpirun and Slurm pass output through pipes and files).
 
+use crate::cli::tell;
 use std::io::IsTerminal;
 use std::time::Instant;
 
@@ -76,7 +77,7 @@ impl Progress {
                     let left = start
                         .elapsed()
                         .mul_f64((*last - step) as f64 / (step - *first) as f64);
-                    eprintln!(
+                    tell!(
                         "[{}{}] {:>3} %  step {step}/{last}  t = {}  eta {:.0} s",
                         "█".repeat(full),
                         "·".repeat(WIDTH - full),

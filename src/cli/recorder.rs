@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use fissure::comm::{Communicator, IdOrder};
+use fissure::comm::{Communicator, IdOrder, agree};
 use fissure::deck::Plan;
 use fissure::deck::plan::Field;
-use fissure::error::Result;
+use fissure::error::{ErrorKind, Result};
+use fissure::output::checkpoint::Header;
 use fissure::output::{
     Contents, Creation, FieldData, FieldDescription, HistoryContents, Piece, ResultFile,
     ResultReader,
@@ -92,7 +93,11 @@ impl<'a> Recorder<'a> {
                         Ok(file)
                     },
                 );
-                if made.is_err() && comm.rank() == 0 {
+                let begun = made
+                    .as_ref()
+                    .err()
+                    .is_some_and(|error| error.kind == ErrorKind::Run);
+                if begun && comm.rank() == 0 {
                     // Without its first output it is of no use; that it cannot be removed either
                     // changes nothing.
                     let _ = std::fs::remove_file(&files.result);
@@ -116,6 +121,11 @@ impl<'a> Recorder<'a> {
             rows,
             held: Vec::new(),
         })
+    }
+
+    /// Whether something is due after a step.
+    pub fn is_due(&self, number: u64) -> bool {
+        self.outputs.is_due(number) || self.rows.is_due(number)
     }
 
     /// Writes what is due after the present step. Collective.
@@ -197,16 +207,31 @@ pub fn id_order<const D: usize>(simulation: &Simulation<'_, D>) -> IdOrder {
     IdOrder::new(simulation.comm, &model.ids[..model.owned()], model.total)
 }
 
-/// Whether a result that is there has the fields and columns that the plan asks for, so that it can be
-/// continued. Collective.
+/// Whether the result that a checkpoint belongs to is there, with the fields and columns that the plan
+/// asks for, so that it can be continued. Collective.
 ///
 /// # Errors
-/// When a set of the history is empty.
-pub fn can_continue<const D: usize>(simulation: &Simulation<'_, D>, files: &Files) -> Result<bool> {
+/// When a set of the history is empty, or the result is there but cannot be read.
+pub fn can_continue<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    files: &Files,
+    header: &Header,
+) -> Result<bool> {
     let comm: &dyn Communicator = simulation.comm;
     let observer = HistoryObserver::new(simulation)?;
     let same = || -> Result<bool> {
+        if !files.result.exists() {
+            return Ok(false);
+        }
         let reader = ResultReader::open(&files.result)?;
+        let rows = reader
+            .history()?
+            .first()
+            .map_or(0, |column| column.values.len() as u64);
+        // Fewer than the checkpoint counts: it is not the file that the checkpoint belongs to.
+        if (reader.steps()?.len() as u64) < header.outputs || rows < header.rows {
+            return Ok(false);
+        }
         let fields = reader.fields()?;
         let found: Vec<&str> = fields
             .iter()
@@ -220,10 +245,11 @@ pub fn can_continue<const D: usize>(simulation: &Simulation<'_, D>, files: &File
         let expected = observer.columns().iter().map(|(name, _)| name);
         Ok(found == wanted && columns.eq(expected))
     };
-    let mut answer = match comm.rank() {
-        0 => vec![u8::from(same().unwrap_or(false))],
-        _ => Vec::new(),
+    let same = match comm.rank() {
+        0 => same(),
+        _ => Ok(true),
     };
+    let mut answer = vec![u8::from(agree(comm, same)?)];
     comm.broadcast(0, &mut answer);
     Ok(answer == [1])
 }

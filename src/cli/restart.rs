@@ -1,5 +1,6 @@
 //! Checkpoints of a run, and going on from one.
 
+use crate::cli::tell;
 use std::time::{Duration, Instant};
 
 use fissure::comm::{Communicator, IdOrder, agree};
@@ -99,7 +100,7 @@ pub fn restart<const D: usize>(
     let comm: &dyn Communicator = simulation.comm;
     let warn = |message: String| {
         if comm.rank() == 0 {
-            eprintln!("warning: {message}");
+            tell!("warning: {message}");
         }
     };
     let (checkpoints, path) = Checkpoints::open(comm, &files.folder, &warn)?;

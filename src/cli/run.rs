@@ -1,5 +1,6 @@
 //! `fissure run`: from a deck to a result.
 
+use crate::cli::{say, tell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
@@ -18,7 +19,7 @@ use super::progress::Progress;
 use super::recorder::{Recorder, Start, can_continue};
 use super::restart::{Keeper, Restart, restart};
 use super::summary::Summary;
-use super::watch::{Reason, STOPPED, Watch};
+use super::watch::{Reason, STOPPED, Signals, Watch};
 use super::{RunArguments, Verbosity, finish, launch};
 
 /// How a run ended.
@@ -54,6 +55,7 @@ fn run_deck(
     verbosity: Verbosity,
     start: Instant,
 ) -> Result<Ending> {
+    let signals = agree(world, Signals::listen())?;
     let deck = agree(world, deck::read(&arguments.deck, &arguments.set))?;
     let plan = agree(world, deck.plan())?;
     let explained = agree(world, deck.explain())?;
@@ -64,16 +66,22 @@ fn run_deck(
         world.rank() == 0,
         verbosity > Verbosity::Quiet,
     ) {
-        eprintln!("warning: {warning}");
+        tell!("warning: {warning}");
     }
     let stem = arguments.deck.file_stem().unwrap_or_default();
     let folder = arguments.output.clone();
     let files = Files::new(folder.unwrap_or_else(|| Path::new("out").join(stem)));
+    // Taken before anything is looked at, and kept until the end.
     let prepared = match world.rank() {
-        0 if !arguments.restart => files.prepare(arguments.overwrite),
-        _ => Ok(()),
+        0 => files.lock().and_then(|lock| {
+            if !arguments.restart {
+                files.prepare(arguments.overwrite)?;
+            }
+            Ok(Some(lock))
+        }),
+        _ => Ok(None),
     };
-    agree(world, prepared)?;
+    let _lock = agree(world, prepared)?;
     let job = Job {
         world,
         plan: &plan,
@@ -82,6 +90,7 @@ fn run_deck(
         threads,
         arguments,
         verbosity,
+        signals: &signals,
         start,
     };
     match plan.dimension.count() {
@@ -100,6 +109,7 @@ struct Job<'a> {
     threads: usize,
     arguments: &'a RunArguments,
     verbosity: Verbosity,
+    signals: &'a Signals,
     start: Instant,
 }
 
@@ -112,30 +122,35 @@ impl<'a> Job<'a> {
         let hosts = self.world.hosts();
         if self.speaks() {
             let (ranks, threads) = (self.world.size(), self.threads);
-            println!("{}", self.plan.title);
-            println!("{ranks} ranks × {threads} threads on {hosts} host(s)");
+            say!("{}", self.plan.title);
+            say!("{ranks} ranks × {threads} threads on {hosts} host(s)");
         }
         let mut simulation = Simulation::<D>::new(self.plan, self.world)?;
         simulation.check()?;
+        if self.speaks() && simulation.step > simulation.stable_step {
+            let (step, stable) = (simulation.step, simulation.stable_step);
+            tell!(
+                "warning: the time step {} is larger than the stable one, {}",
+                si(step, "s"),
+                si(stable, "s")
+            );
+        }
         let (mut keeper, mut recorder) = match self.arguments.restart {
             true => self.continue_run(&mut simulation, hosts)?,
             false => self.begin_run(&mut simulation, hosts)?,
         };
-        let mut watch = Watch::new(
-            self.plan.checkpoint,
-            self.arguments.wall_time,
-            self.start,
-            simulation.step,
-            simulation.number,
-            simulation.last,
-        )?;
+        let rule = self.plan.checkpoint;
+        let limit = self.arguments.wall_time.map(|limit| (self.start, limit));
+        let steps = (simulation.step, simulation.number, simulation.last);
+        let mut watch = Watch::new(self.signals, rule, limit, steps);
         let first = simulation.number;
         let mut progress = Progress::new(self.speaks(), first, simulation.last);
         let mut stopped = None;
         while simulation.number < simulation.last {
             simulation.advance();
             let complete = simulation.number == simulation.last;
-            if complete || watch.is_due(simulation.number) {
+            let number = simulation.number;
+            if complete || watch.is_due(number) || recorder.is_due(number) {
                 if let Err(error) = simulation.check() {
                     // The reader of the result should see where it went wrong.
                     recorder.write(&mut simulation, true, true)?;
@@ -144,7 +159,7 @@ impl<'a> Job<'a> {
                     return Err(error);
                 }
                 recorder.record(&mut simulation)?;
-                let decision = watch.look(self.world, simulation.number);
+                let decision = watch.look(self.world, number);
                 if complete || decision.checkpoint || decision.stop.is_some() {
                     watch.wrote_checkpoint(keeper.write(&simulation, &mut recorder)?);
                 }
@@ -154,8 +169,7 @@ impl<'a> Job<'a> {
                     break;
                 }
             } else {
-                recorder.record(&mut simulation)?;
-                progress.show(simulation.number, simulation.time());
+                progress.show(number, simulation.time());
             }
         }
         progress.finish(stopped.is_none());
@@ -172,9 +186,9 @@ impl<'a> Job<'a> {
                 summary.print(&simulation, self.threads, record.0, record.1);
             }
             match cause {
-                0 if self.verbosity == Verbosity::Verbose => println!("all writes were collective"),
+                0 if self.verbosity == Verbosity::Verbose => say!("all writes were collective"),
                 0 => {}
-                _ => println!("warning: some writes were not collective (HDF5 cause {cause:#x})"),
+                _ => say!("warning: some writes were not collective (HDF5 cause {cause:#x})"),
             }
             self.say_where();
         }
@@ -212,13 +226,13 @@ impl<'a> Job<'a> {
             restart(simulation, self.files, self.explained.clone())?;
         if self.speaks() {
             let time = si(simulation.time(), "s");
-            println!("continued after step {} (t = {time})", simulation.number);
+            say!("continued after step {} (t = {time})", simulation.number);
             if simulation.number >= simulation.last {
-                println!("the run was complete already");
+                say!("the run was complete already");
             }
         }
         let metadata = self.metadata(simulation, hosts);
-        if can_continue(simulation, self.files)? {
+        if can_continue(simulation, self.files, &header)? {
             let start = Start::After(header.outputs, header.rows);
             let mut recorder = Recorder::new(simulation, self.files, start, &metadata)?;
             recorder.observer.continue_from(header.start);
@@ -230,7 +244,7 @@ impl<'a> Job<'a> {
         };
         if let (Some(aside), true) = (agree(self.world, aside)?, self.speaks()) {
             let aside = aside.display();
-            println!("other outputs are asked for, or the result is gone: it is kept as {aside}");
+            say!("other outputs are asked for, or the result is gone: it is kept as {aside}");
         }
         let start = Start::New(Creation::Exclusive);
         let mut recorder = Recorder::new(simulation, self.files, start, &metadata)?;
@@ -252,9 +266,9 @@ impl<'a> Job<'a> {
 
     fn say_where(&self) {
         let (result, history) = (self.files.result.display(), self.files.history.display());
-        println!("result   {result}   (ParaView 5.12 or later; result.xdmf for older ones)");
-        println!("history  {history}");
-        println!("picture  fissure plot {result}");
+        say!("result   {result}   (ParaView 5.12 or later; result.xdmf for older ones)");
+        say!("history  {history}");
+        say!("picture  fissure plot {result}");
     }
 
     fn say_stopped<const D: usize>(&self, simulation: &Simulation<'_, D>, reason: Reason) {
@@ -265,7 +279,7 @@ impl<'a> Job<'a> {
             };
             let (number, last) = (simulation.number, simulation.last);
             let time = si(simulation.time(), "s");
-            eprintln!(
+            tell!(
                 "stopped {because} after step {number} of {last} (t = {time}); a checkpoint is \
                  written, --restart continues"
             );
@@ -279,15 +293,20 @@ impl<'a> Job<'a> {
         hosts: usize,
     ) -> Vec<(&'static str, String)> {
         let command_line: Vec<String> = std::env::args().collect();
+        // All ranks must write the same; what differs between them is told by rank 0.
+        let mut own = format!("{}\n{}", self.threads, command_line.join(" ")).into_bytes();
+        self.world.broadcast(0, &mut own);
+        let own = String::from_utf8_lossy(&own);
+        let (threads, command_line) = own.split_once('\n').unwrap_or_default();
         vec![
             ("title", self.plan.title.clone()),
             ("deck", self.plan.source.text.clone()),
             ("deck_in_full", self.explained.clone()),
             ("deck_path", self.plan.source.path.display().to_string()),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("command_line", command_line.join(" ")),
+            ("command_line", command_line.to_owned()),
             ("ranks", self.world.size().to_string()),
-            ("threads", self.threads.to_string()),
+            ("threads", threads.to_owned()),
             ("hosts", hosts.to_string()),
             ("dimension", D.to_string()),
             ("section", self.plan.dimension.section().to_string()),

@@ -1,5 +1,6 @@
 //! What a run did, for the reader of the log.
 
+use crate::cli::say;
 use std::time::Duration;
 
 use fissure::comm::{self, Communicator};
@@ -67,8 +68,8 @@ impl Summary {
         broken: u64,
     ) {
         let comm: &dyn Communicator = simulation.comm;
-        let line = |name: &str, value: String| println!("  {name:<17}{value}");
-        println!("summary");
+        let line = |name: &str, value: String| say!("  {name:<17}{value}");
+        say!("summary");
         line("points", count(self.points));
         line("bonds", count(self.bonds / 2));
         line("broken bonds", count(broken));
@@ -85,12 +86,12 @@ impl Summary {
         let loop_seconds = bonds + halo + motion;
         let updates = self.bonds as f64 * self.steps as f64 / loop_seconds;
         line("bond updates", si(updates, "/s"));
-        println!("time by phase");
+        say!("time by phase");
         for (name, seconds) in PHASES.iter().zip(self.seconds) {
             let share = 100.0 * seconds / self.seconds[6];
-            println!("  {name:<17}{seconds:8.3} s {share:5.1} %");
+            say!("  {name:<17}{seconds:8.3} s {share:5.1} %");
         }
-        println!("energy");
+        say!("energy");
         line("kinetic", si(energies.kinetic, "J"));
         line("strain", si(energies.strain, "J"));
         line("fracture", si(energies.fracture, "J"));

@@ -9,7 +9,6 @@ use fissure::deck::plan::CheckpointRule;
 use fissure::error::{Error, Result};
 use fissure::solver::schedule::Schedule;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
-use signal_hook::flag;
 
 /// Exit code of a run that stopped before its end and can be continued with --restart (that of
 /// sysexits.h for "try again").
@@ -17,6 +16,10 @@ pub const STOPPED: u8 = 75;
 
 /// Exit code after a second signal.
 const ENDED_AT_ONCE: i32 = 130;
+
+/// The same signal may come twice, from the launcher and from the batch system; only one that comes this
+/// much later is a second one.
+const ONE_SIGNAL: Duration = Duration::from_secs(1);
 
 /// The ranks look at signals and clocks together, at most this many steps and about this long apart.
 const MOST_STEPS: u64 = 10;
@@ -45,10 +48,52 @@ pub enum Reason {
     WallTime,
 }
 
-/// The signals and clocks of one rank.
-pub struct Watch {
+/// The signals of this process.
+pub struct Signals {
     stop: Arc<AtomicBool>,
     request: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// Starts to listen, in a thread of its own.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn listen() -> Result<Self> {
+        let signals = Self {
+            stop: Arc::default(),
+            request: Arc::default(),
+        };
+        let (stop, request) = (Arc::clone(&signals.stop), Arc::clone(&signals.request));
+        let refused = |error| Error::run(format!("cannot listen to signals: {error}"));
+        let mut queue = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGUSR1, SIGUSR2])
+            .map_err(refused)?;
+        std::thread::Builder::new()
+            .name("signals".to_owned())
+            .spawn(move || {
+                let mut first: Option<Instant> = None;
+                for signal in queue.forever() {
+                    match (signal, first) {
+                        (SIGUSR2, _) => request.store(true, Ordering::Relaxed),
+                        (_, None) => {
+                            stop.store(true, Ordering::Relaxed);
+                            first = Some(Instant::now());
+                        }
+                        (_, Some(first)) if first.elapsed() > ONE_SIGNAL => {
+                            signal_hook::low_level::exit(ENDED_AT_ONCE);
+                        }
+                        _ => {}
+                    }
+                }
+            })
+            .map_err(refused)?;
+        Ok(signals)
+    }
+}
+
+/// The signals and clocks that decide what a rank wants.
+pub struct Watch<'a> {
+    signals: &'a Signals,
     rule: CheckpointRule,
     schedule: Option<Schedule>,
     limit: Option<(Instant, f64)>,
@@ -58,47 +103,32 @@ pub struct Watch {
     next_look: u64,
 }
 
-impl Watch {
-    /// Starts to listen. `limit` is the wall-clock time of the run that `start` began.
-    ///
-    /// # Errors
-    /// When the system refuses the signal handlers.
+impl<'a> Watch<'a> {
+    /// For a run of `steps`: length (s), number made, number of the last. `limit` is a wall-clock time
+    /// and when it began; without it that of the Slurm job counts.
     pub fn new(
+        signals: &'a Signals,
         rule: CheckpointRule,
-        limit: Option<Duration>,
-        start: Instant,
-        step: f64,
-        number: u64,
-        last: u64,
-    ) -> Result<Self> {
-        let (stop, request) = (Arc::default(), Arc::default());
-        let listen = || -> std::io::Result<()> {
-            for signal in [SIGTERM, SIGINT, SIGUSR1] {
-                // In this order: the first signal sets the flag, a second one finds it set.
-                flag::register_conditional_shutdown(signal, ENDED_AT_ONCE, Arc::clone(&stop))?;
-                flag::register(signal, Arc::clone(&stop))?;
-            }
-            flag::register(SIGUSR2, Arc::clone(&request))?;
-            Ok(())
-        };
-        listen().map_err(|error| Error::run(format!("cannot listen to signals: {error}")))?;
+        limit: Option<(Instant, Duration)>,
+        (step, number, last): (f64, u64, u64),
+    ) -> Self {
         let schedule = match rule {
             CheckpointRule::WallClock(_) => None,
             CheckpointRule::Simulation(interval) => Some(Schedule::new(interval, step, last)),
         };
-        Ok(Self {
-            stop,
-            request,
+        let of_job = || Some((Instant::now(), left_to_slurm()?));
+        Self {
+            signals,
             rule,
             schedule,
             limit: limit
-                .or_else(left_to_slurm)
-                .map(|limit| (start, limit.as_secs_f64())),
+                .or_else(of_job)
+                .map(|(start, limit)| (start, limit.as_secs_f64())),
             last_checkpoint: Instant::now(),
             cost: Duration::ZERO,
             last_look: (Instant::now(), number),
             next_look: number + 1,
-        })
+        }
     }
 
     /// Whether the ranks look together after this step.
@@ -127,9 +157,9 @@ impl Watch {
         });
         let flag = |set: bool| f64::from(u8::from(set));
         let mut votes = [
-            flag(self.stop.load(Ordering::Relaxed)),
+            flag(self.signals.stop.load(Ordering::Relaxed)),
             flag(late),
-            flag(due || self.request.swap(false, Ordering::Relaxed)),
+            flag(due || self.signals.request.swap(false, Ordering::Relaxed)),
             per_step,
         ];
         comm.max(&mut votes);

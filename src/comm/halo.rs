@@ -42,16 +42,6 @@ impl Halo {
         }
     }
 
-    /// Number of ghosts received.
-    pub fn ghosts(&self) -> usize {
-        self.neighbours.iter().map(|n| n.receive.len()).sum()
-    }
-
-    /// Number of ranks exchanged with.
-    pub fn ranks(&self) -> usize {
-        self.neighbours.len()
-    }
-
     /// Copies the values that other ranks need into the messages: `components` arrays over the local
     /// points, each sent for every point.
     pub fn pack(&mut self, components: &[&[f64]]) {

@@ -39,9 +39,6 @@ pub trait Communicator {
     /// The number of ranks.
     fn size(&self) -> usize;
 
-    /// Returns when all ranks have called it.
-    fn barrier(&self);
-
     /// Element-wise sum over the ranks (wrapping), in place.
     fn sum(&self, values: &mut [u64]);
 

@@ -144,10 +144,6 @@ impl Communicator for World {
         self.world.size() as usize
     }
 
-    fn barrier(&self) {
-        self.world.barrier();
-    }
-
     fn sum(&self, values: &mut [u64]) {
         let own = values.to_vec();
         self.world

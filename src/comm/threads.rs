@@ -79,10 +79,6 @@ impl Communicator for ThreadRank {
         self.size
     }
 
-    fn barrier(&self) {
-        self.shared.barrier.wait();
-    }
-
     fn sum(&self, values: &mut [u64]) {
         if self.size == 1 {
             return;
@@ -118,11 +114,11 @@ impl Communicator for ThreadRank {
         for (to, message) in outgoing.into_iter().enumerate() {
             *self.slot(self.rank, to) = message;
         }
-        self.barrier();
+        self.shared.barrier.wait();
         let incoming = (0..self.size)
             .map(|from| std::mem::take(&mut *self.slot(from, self.rank)))
             .collect();
-        self.barrier();
+        self.shared.barrier.wait();
         incoming
     }
 

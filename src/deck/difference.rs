@@ -16,6 +16,9 @@ const FREE: [&str; 5] = ["title", "parameters", "output", "history", "checkpoint
 /// Keys within sections that a restart may change.
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
+/// Sections in which the order counts: later entries take precedence over earlier ones.
+const ORDERED: [&str; 3] = ["body", "initial", "condition"];
+
 /// What differs in the physics of two decks, both with every default filled in: a line for each key
 /// with its old and its new value.
 ///
@@ -50,7 +53,16 @@ impl Comparison<'_> {
             return;
         }
         match (old, new) {
+            // A set counts where it is used: what it is is compared if both decks have it.
+            (None, _) | (_, None) if key == "set" || key.starts_with("set.") => {}
             (Some(Value::Table(old)), Some(Value::Table(new))) => {
+                let order = |table: &Table| table.keys().cloned().collect::<Vec<_>>();
+                let mut sorted = [order(old), order(new)];
+                let reordered = sorted[0] != sorted[1];
+                sorted.iter_mut().for_each(|keys| keys.sort());
+                if ORDERED.contains(&key) && reordered && sorted[0] == sorted[1] {
+                    self.lines.push(format!("{key}: stands in another order"));
+                }
                 let added = new.keys().filter(|name| !old.contains_key(*name));
                 for name in old.keys().chain(added) {
                     let inner = if key.is_empty() {
@@ -140,6 +152,13 @@ mod tests {
         assert!(against("'3*dx'", "1.5").is_empty());
         assert!(
             against(
+                "time",
+                "set.left.where = 'x < 1'\n history.reactions = ['left']\n time"
+            )
+            .is_empty()
+        );
+        assert!(
+            against(
                 "dimension",
                 "title = 'x'\n output.every_steps = 3\n dimension"
             )
@@ -157,6 +176,16 @@ mod tests {
         let lines = against("dx = 0.5", "dx = 0.25");
         assert_eq!(lines.len(), 2);
         assert_eq!(lines[0], "grid.spacing: was `dx` = 0.5, is `dx` = 0.25");
+        let swapped = DECK.replace(
+            "condition.pull",
+            "condition.push = { set = 'all', force = [1] }\n condition.pull",
+        );
+        let other = DECK.replace(
+            "time =",
+            "condition.push = { set = 'all', force = [1] }\n time =",
+        );
+        let lines = differences(&source(&swapped), &source(&other)).unwrap();
+        assert_eq!(lines, ["condition: stands in another order"]);
         let lines = against("density = 2", "density = 3");
         assert_eq!(lines, ["material.rubber.pmb.density: was 2, is 3"]);
         let lines = against("time", "initial.push.velocity = ['x']\n time");

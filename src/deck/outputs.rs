@@ -92,7 +92,23 @@ pub fn history(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Resu
             scope.within(number, key, 0.0..1.0, "at least 0 and below 1")?
         }
     };
+    for (k, set) in history.reactions.iter().enumerate() {
+        if history.reactions[..k]
+            .iter()
+            .any(|earlier| earlier.get_ref() == set.get_ref())
+        {
+            let message = format!("[history] reactions: `{}` is named twice", set.get_ref());
+            return Err(scope.error(set.span(), message));
+        }
+    }
     let probes = resolve_each(&history.probe, |name, probe| {
+        if name.is_empty() || name.contains(['/', '.', ',']) {
+            let message = format!(
+                "[history.probe.{name}]: the name becomes that of columns, so it must not be empty \
+                 or contain `/`, `.` or `,`"
+            );
+            return Err(scope.error(probe.span(), message));
+        }
         scope.vector(&probe.get_ref().at, &format!("[history.probe.{name}] at"))
     })?;
     Ok(plan::History {

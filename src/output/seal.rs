@@ -26,7 +26,7 @@ const BUFFER: usize = 1 << 20;
 /// # Errors
 /// When the file cannot be read or written.
 pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
-    let length = agree(comm, length(path).map_err(|error| failure(path, &error)))?;
+    let length = from_root(comm, path, || Ok([length(path)?]))?[0];
     let sum = checksum(comm, path, length)?;
     let append = || -> std::io::Result<()> {
         let mut file = OpenOptions::new().append(true).open(path)?;
@@ -55,28 +55,37 @@ pub fn number(path: &Path) -> Option<u64> {
     (words[0] == MAGIC && words[1] == sealed).then_some(words[3])
 }
 
-/// Whether a file is as it was when it was sealed. Collective.
-///
-/// # Errors
-/// When the file cannot be read.
-pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
-    let read = || -> std::io::Result<Option<(u64, u64, u64)>> {
-        let Some(number) = number(path) else {
-            return Ok(None);
-        };
+/// Whether a file is as it was when it was sealed; one that cannot be read is not. Collective.
+pub fn is_intact(comm: &dyn Communicator, path: &Path) -> bool {
+    let seal = from_root(comm, path, || {
+        let number = number(path).ok_or(std::io::ErrorKind::InvalidData)?;
         let sealed = length(path)? - SEAL_BYTES;
         let mut file = File::open(path)?;
         file.seek(SeekFrom::Start(sealed + 16))?;
         let mut bytes = [0; 8];
         file.read_exact(&mut bytes)?;
-        Ok(Some((sealed, u64::from_le_bytes(bytes), number)))
+        Ok([sealed, u64::from_le_bytes(bytes), number])
+    });
+    let checked = seal.and_then(|[length, expected, number]| {
+        Ok(checksum(comm, path, length)? ^ mix(number) == expected)
+    });
+    checked.unwrap_or(false)
+}
+
+/// What rank 0 reads of a file, on all ranks: others may see an older state of it. Collective.
+fn from_root<const N: usize>(
+    comm: &dyn Communicator,
+    path: &Path,
+    read: impl FnOnce() -> std::io::Result<[u64; N]>,
+) -> Result<[u64; N]> {
+    let words = match comm.rank() {
+        0 => read().map_err(|error| failure(path, &error)),
+        _ => Ok([0; N]),
     };
-    match agree(comm, read().map_err(|error| failure(path, &error)))? {
-        None => Ok(false),
-        Some((length, expected, number)) => {
-            Ok(checksum(comm, path, length)? ^ mix(number) == expected)
-        }
-    }
+    // Ranks other than 0 have zeros, so that the sum is what rank 0 read.
+    let mut words = agree(comm, words)?;
+    comm.sum(&mut words);
+    Ok(words)
 }
 
 fn length(path: &Path) -> std::io::Result<u64> {
@@ -138,7 +147,7 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         threads::run(3, |comm| seal(comm, &path, 42).unwrap());
         assert_eq!(number(&path), Some(42));
-        let intact = |ranks| threads::run(ranks, |comm| is_intact(comm, &path).unwrap());
+        let intact = |ranks| threads::run(ranks, |comm| is_intact(comm, &path));
         assert_eq!(intact(2), [true, true]);
         let sealed = std::fs::read(&path).unwrap();
         for bit in (0..8 * sealed.len()).step_by(61) {

@@ -9,7 +9,7 @@
 //! /history/c             one number per history row and column
 //! ```
 //!
-//! The points are one part whatever the number of ranks, in rank order. A step's data are flushed
+//! The points are one part whatever the number of ranks, in the order of their ids. A step's data are flushed
 //! before its row of the tables: a file whose writer was killed holds all its complete steps.
 
 use super::access::Creation;
@@ -207,7 +207,33 @@ impl<'a> ResultFile<'a> {
         let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept as usize)?;
 
         let part = path.with_extension("vtkhdf.part");
-        let mut result = Self::create(&part, comm, Creation::Truncate, contents)?;
+        let copied = Self::copy(&mut old, &part, comm, contents, (kept, times, numbers));
+        let finished = copied.and_then(|mut result| {
+            let rows = History::read(&mut old, history.columns, kept_rows)?;
+            old.close()?;
+            result.create_history(history)?;
+            result.append_history(&rows)?;
+            result.file.flush()?;
+            result.file.rename(path)?;
+            Ok(result)
+        });
+        if finished.is_err() && comm.rank() == 0 {
+            // It only takes up space; that it cannot be removed either changes nothing.
+            let _ = std::fs::remove_file(&part);
+        }
+        finished
+    }
+
+    /// A new file with the first steps of an old one.
+    fn copy(
+        old: &mut CollectiveFile<'a>,
+        part: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        (kept, times, numbers): (u64, Vec<f64>, Vec<u64>),
+    ) -> Result<Self> {
+        let piece = contents.piece;
+        let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
         result.make_room(kept)?;
         for (field, values) in &result.fields {
             let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
@@ -225,12 +251,6 @@ impl<'a> ResultFile<'a> {
         result
             .file
             .set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
-        let rows = History::read(&mut old, history.columns, kept_rows)?;
-        old.close()?;
-        result.create_history(history)?;
-        result.append_history(&rows)?;
-        result.file.flush()?;
-        result.file.rename(path)?;
         Ok(result)
     }
 

@@ -246,14 +246,19 @@ impl<const D: usize> Conditions<D> {
                 Motion::Displacement => support.values.at(&support.positions, time, |k, value| {
                     field[points[k] as usize] = value;
                 }),
-                // The trapezoid rule; it starts from the initial displacement.
-                Motion::Velocity => {
+                // The trapezoid rule, from where the points were before they drifted.
+                Motion::Velocity if step > 0.0 => {
+                    for (from, point) in support.moved_from.iter().zip(points) {
+                        field[*point as usize] = *from;
+                    }
                     for now in [time - step, time] {
                         support.values.at(&support.positions, now, |k, value| {
                             field[points[k] as usize] += 0.5 * step * value;
                         });
                     }
                 }
+                // At the start the points are at their initial displacement.
+                Motion::Velocity => {}
             }
         }
     }
@@ -273,8 +278,9 @@ impl<const D: usize> Conditions<D> {
 
     /// Gives supported points their velocity at `time` (s), and finds the reactions: what a support
     /// must add to the forces so that the Verlet scheme makes the prescribed motion. `step` is the
-    /// time step (s).
-    pub fn guide(&mut self, model: &Model<D>, state: &mut State<D>, time: f64, step: f64) {
+    /// time step (s). Returns whether all of that is finite.
+    pub fn guide(&mut self, model: &Model<D>, state: &mut State<D>, time: f64, step: f64) -> bool {
+        let mut finite = true;
         for support in &mut self.supports {
             let (component, motion) = (support.component, support.motion);
             // Value now, and a step before and after; before the start the motion is extrapolated.
@@ -285,7 +291,11 @@ impl<const D: usize> Conditions<D> {
                 let value = |time: f64| support.values.expression.evaluate(position, time);
                 if support.values.varies || k == 0 {
                     now = value(time);
-                    let after = value(time + step);
+                    // The motion may end here, as √(1 − t) does: then it is extrapolated.
+                    let after = match value(time + step) {
+                        after if after.is_finite() || time < step => after,
+                        _ => 2.0 * now - value(time - step),
+                    };
                     let before = match motion {
                         _ if time >= step => value(time - step),
                         Motion::Displacement => 2.0 * now - after,
@@ -307,8 +317,10 @@ impl<const D: usize> Conditions<D> {
                 let needed = model.density_of(point) * acceleration;
                 support.reaction[k] = needed - *force;
                 *force = needed;
+                finite &= velocity.is_finite() && support.reaction[k].is_finite();
             }
         }
+        finite
     }
 
     /// After forces and reactions are known at the new place: adds up the work of the step, by the

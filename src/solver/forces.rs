@@ -65,11 +65,6 @@ impl<const D: usize> Forces<D> {
         self.bonds.iter().map(|bonds| bonds.list.bytes()).sum()
     }
 
-    /// The halo plan.
-    pub fn halo(&self) -> &Halo {
-        &self.halo
-    }
-
     /// Breaks the bonds for which `crosses` (of the two local indices) holds.
     pub fn cut(&mut self, crosses: impl Fn(usize, usize) -> bool) {
         for bonds in &mut self.bonds {
@@ -213,7 +208,7 @@ impl<const D: usize> Forces<D> {
             let ListLaw::Pmb(law) = *law;
             let kernel = Energy { geometry, law };
             let rows = 0..list.len();
-            sweep(list, rows, &geometry, &mut stored, &kernel);
+            sweep(list, rows, &mut stored, &kernel);
         }
         stored
     }
@@ -226,7 +221,7 @@ impl<const D: usize> Forces<D> {
             let ListLaw::Pmb(law) = *law;
             let kernel = Stiffness { geometry, law };
             let rows = 0..list.len();
-            sweep(list, rows, &geometry, &mut stiffness, &kernel);
+            sweep(list, rows, &mut stiffness, &kernel);
         }
         stiffness
     }
@@ -288,7 +283,7 @@ fn sum_forces<const D: usize>(
                     law,
                     failure,
                 };
-                sweep(list, rows, &geometry, responses, &kernel);
+                sweep(list, rows, responses, &kernel);
             }
             ListFailure::Uniform(critical) => {
                 let failure = Uniform(critical);
@@ -297,7 +292,7 @@ fn sum_forces<const D: usize>(
                     law,
                     failure,
                 };
-                sweep(list, rows, &geometry, responses, &kernel);
+                sweep(list, rows, responses, &kernel);
             }
             ListFailure::PerPoint => {
                 let failure = PerPoint(thresholds);
@@ -306,7 +301,7 @@ fn sum_forces<const D: usize>(
                     law,
                     failure,
                 };
-                sweep(list, rows, &geometry, responses, &kernel);
+                sweep(list, rows, responses, &kernel);
             }
         }
     }
@@ -321,6 +316,6 @@ fn smallest_stretches<const D: usize>(
     for bonds in all {
         let rows = rows_of(bonds, &points);
         let kernel = SmallestStretch { geometry };
-        sweep(&mut bonds.list, rows, &geometry, smallest, &kernel);
+        sweep(&mut bonds.list, rows, smallest, &kernel);
     }
 }

@@ -23,6 +23,9 @@ pub trait Kernel: Sync {
     /// What is summed for each point.
     type Output: Send;
 
+    /// The number of local points that it can read.
+    fn points(&self) -> usize;
+
     /// Adds a row's share to its point's output.
     fn row(&self, row: Row<'_>, output: &mut Self::Output);
 }
@@ -180,6 +183,10 @@ pub struct Force<'a, L, F, const D: usize> {
 impl<L: BondLaw, F: Failure, const D: usize> Kernel for Force<'_, L, F, D> {
     type Output = Response<D>;
 
+    fn points(&self) -> usize {
+        self.geometry.points()
+    }
+
     #[inline(always)]
     fn row(&self, row: Row<'_>, output: &mut Response<D>) {
         let mut force = [Lanes::splat(0.0); D];
@@ -219,6 +226,10 @@ pub struct SmallestStretch<'a, const D: usize> {
 impl<const D: usize> Kernel for SmallestStretch<'_, D> {
     type Output = f64;
 
+    fn points(&self) -> usize {
+        self.geometry.points()
+    }
+
     #[inline(always)]
     fn row(&self, row: Row<'_>, output: &mut f64) {
         let mut smallest = Lanes::splat(f64::INFINITY);
@@ -256,6 +267,10 @@ pub struct Energy<'a, L, const D: usize> {
 impl<L: BondLaw, const D: usize> Kernel for Energy<'_, L, D> {
     type Output = Stored;
 
+    fn points(&self) -> usize {
+        self.geometry.points()
+    }
+
     #[inline(always)]
     fn row(&self, row: Row<'_>, output: &mut Stored) {
         let mut energy = Lanes::splat(0.0);
@@ -281,6 +296,10 @@ pub struct Stiffness<'a, L, const D: usize> {
 
 impl<L: BondLaw, const D: usize> Kernel for Stiffness<'_, L, D> {
     type Output = [f64; 6];
+
+    fn points(&self) -> usize {
+        self.geometry.points()
+    }
 
     #[inline(always)]
     fn row(&self, row: Row<'_>, output: &mut [f64; 6]) {

@@ -2,7 +2,7 @@
 
 pub mod conditions;
 pub mod forces;
-pub mod kernels;
+mod kernels;
 pub mod model;
 pub mod observe;
 mod saved;
@@ -13,5 +13,6 @@ pub mod state;
 mod sweep;
 mod verlet;
 
+pub use kernels::{Response, Stored};
 pub use saved::Saved;
 pub use simulation::Simulation;

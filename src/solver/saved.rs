@@ -61,7 +61,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Goes back to a saved state, after step `number` of steps of `step` (s). Collective.
     ///
     /// # Errors
-    /// When the state is that of other points or bonds; on any rank by itself.
+    /// When the state is that of other points or bonds; the same on all ranks.
     pub fn restore(
         &mut self,
         order: &IdOrder,
@@ -98,7 +98,7 @@ impl<const D: usize> Simulation<'_, D> {
             .update_ghosts(self.comm, &mut self.state.displacement);
         self.number = number;
         self.step = step;
-        self.last = (self.plan.time.end / step - 1e-9).ceil() as u64;
+        self.last = super::simulation::steps_to(self.plan.time.end, step) as u64;
         self.conditions.restore(&conditions, self.time());
         Ok(())
     }

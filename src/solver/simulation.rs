@@ -154,14 +154,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         let time = self.time();
         self.conditions.add_loads(time, &mut self.state.responses);
-        if let Some(step) = kick {
-            let finite = verlet::kick(&self.model, &mut self.state, step);
-            if !finite && self.bad.is_none() {
-                self.bad = self.first_bad();
-            }
+        let mut finite = match kick {
+            Some(step) => verlet::kick(&self.model, &mut self.state, step),
+            None => true,
+        };
+        let (model, state) = (&self.model, &mut self.state);
+        finite &= self.conditions.guide(model, state, time, self.step);
+        if !finite && self.bad.is_none() {
+            self.bad = self.first_bad();
         }
-        self.conditions
-            .guide(&self.model, &mut self.state, time, self.step);
         self.times.motion += start.elapsed();
     }
 
@@ -223,7 +224,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 /// The time step and the number of the last one. An automatic step divides the run evenly.
 fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
     let (step, last) = match plan.time.step {
-        StepRule::Fixed(step) => (step, (plan.time.end / step - 1e-9).ceil()),
+        StepRule::Fixed(step) => (step, steps_to(plan.time.end, step)),
         StepRule::Automatic(_) if stable.is_infinite() => {
             return Err(Error::input(
                 "no point has a neighbour, so there is no stable step; is the horizon in m and \
@@ -242,6 +243,15 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
         )));
     }
     Ok((step, last.max(1.0) as u64))
+}
+
+/// The number of steps (s) that reach an end time (s), up to rounding.
+pub(super) fn steps_to(end: f64, step: f64) -> f64 {
+    let steps = end / step;
+    match (steps - steps.round()).abs() < 1e-9 * steps {
+        true => steps.round(),
+        false => steps.ceil(),
+    }
 }
 
 /// Breaks the bonds that cross a pre-crack. Both ends ask with the lower id first.

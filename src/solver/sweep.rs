@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::families::{BondList, Rows};
 
-use super::kernels::{Geometry, Kernel};
+use super::kernels::Kernel;
 
 /// Rows below which a range is not split further.
 const LEAF: usize = 128;
@@ -15,16 +15,15 @@ const LEAF: usize = 128;
 /// Runs the kernel over a range of rows. `outputs` are over the owned points.
 ///
 /// # Panics
-/// When an array of the geometry is too short for the list's indices.
-pub fn sweep<K: Kernel, const D: usize>(
+/// When an array that the kernel reads is too short for the list's indices.
+pub fn sweep<K: Kernel>(
     list: &mut BondList,
     rows: Range<usize>,
-    geometry: &Geometry<'_, D>,
     outputs: &mut [K::Output],
     kernel: &K,
 ) {
     assert!(
-        list.reach() <= geometry.points(),
+        list.reach() <= kernel.points(),
         "an array is too short for the bonds"
     );
     let leaf = match rayon::current_num_threads() {

@@ -1,0 +1,114 @@
+//! The commands that need no MPI launch, used as a newcomer would.
+
+mod support;
+
+use fissure::output::ResultReader;
+use support::command::{Folder, finish, fissure, succeed, text};
+
+#[test]
+fn from_an_example_deck_to_pictures() {
+    let folder = Folder::new("commands");
+    let deck = folder.join("plate.toml");
+    let printed = succeed(fissure(1).arg("init").arg(&deck));
+    assert!(printed.contains("fissure check"), "{printed}");
+    let again = finish(fissure(1).arg("init").arg(&deck));
+    assert_eq!(again.status.code(), Some(2), "{}", text(&again));
+
+    let printed = succeed(
+        fissure(1)
+            .arg("check")
+            .arg(&deck)
+            .args(["--set", "dx=2e-3"]),
+    );
+    for line in [
+        "points                  1 000",
+        "critical stretch",
+        "memory of each rank",
+        "top",
+    ] {
+        assert!(printed.contains(line), "{printed}");
+    }
+
+    let printed = succeed(fissure(1).arg("explain").arg(&deck));
+    assert!(printed.contains("safety = 0.8"), "{printed}");
+    let full = folder.write("full.toml", &printed);
+    assert_eq!(succeed(fissure(1).arg("explain").arg(&full)), printed);
+
+    let out = folder.join("out");
+    let mut command = fissure(1);
+    command.arg("run").arg(&deck).arg("--output").arg(&out);
+    succeed(command.args(["--set", "dx=2e-3", "--quiet"]));
+    let result = out.join("result.vtkhdf");
+    let plot = |arguments: &[&str]| finish(fissure(1).arg("plot").arg(&result).args(arguments));
+    for arguments in [
+        &[][..],
+        &["--field", "velocity", "--time", "2e-5", "--deform", "3"],
+    ] {
+        let output = plot(arguments);
+        assert!(output.status.success(), "{}", text(&output));
+    }
+    for name in ["damage.png", "velocity.png"] {
+        assert!(
+            std::fs::read(out.join(name))
+                .unwrap()
+                .starts_with(b"\x89PNG")
+        );
+    }
+    let frames = folder.join("frame.png");
+    let output = plot(&["--time", "all", "-o", frames.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", text(&output));
+    let outputs = ResultReader::open(&result).unwrap().times().unwrap().len();
+    let last = folder.join(format!("frame_{:04}.png", outputs - 1));
+    assert!(last.exists());
+    for (wrong, message) in [
+        (["--field", "damge"], "has no field `damge`; it has"),
+        (["--time", "soon"], "--time must be"),
+        (["--slice", "z=0"], "--slice is for solids"),
+        (["--range", "1,0"], "LOW below HIGH"),
+    ] {
+        let output = plot(&wrong);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(message), "{}", text(&output));
+    }
+}
+
+#[test]
+fn no_result_and_no_deck() {
+    let folder = Folder::new("nothing");
+    let file = folder.write("notes.txt", "no deck and no result");
+    let output = finish(fissure(1).arg("plot").arg(&file));
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(
+        text(&output).contains("not a readable HDF5 file"),
+        "{}",
+        text(&output)
+    );
+    let output = finish(fissure(1).arg("check").arg(&file));
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains("notes.txt:1:"), "{}", text(&output));
+}
+
+#[test]
+fn a_point_file_that_is_not_there() {
+    let folder = Folder::new("nofile");
+    let deck = folder.write(
+        "deck.toml",
+        "dimension = '1d'\ngrid.horizon = 3\nmaterial.a.pmb = { density = 1, youngs_modulus = 1 }\n\
+         body.b = { material = 'a', points.file = 'none.csv' }\ntime.end = 1\n",
+    );
+    for ranks in [1, 2] {
+        let out = folder.join("out");
+        let output = finish(
+            fissure(ranks)
+                .arg("run")
+                .arg(&deck)
+                .arg("--output")
+                .arg(&out),
+        );
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_eq!(
+            text(&output).matches("cannot read the point file").count(),
+            1
+        );
+    }
+}
