@@ -57,6 +57,56 @@ reactions = ['rim']
 probe.ahead.at = [0.02, 0]
 ";
 
+/// Blocks of different state-based and bond-based laws and horizons, damped, some of them breaking.
+const LAWS: &str = "
+dimension = 'plane-stress'
+[grid]
+spacing = 1
+horizon = 3
+volume_correction = 'exact'
+[material]
+first.ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4, damping = 0.02 }
+second.normalised_pmb = { density = 2, youngs_modulus = 5 }
+third.ordinary = { density = 3, youngs_modulus = 8, poisson_ratio = 0.1, influence = 'gaussian' }
+[damage.brittle.critical_stretch]
+fracture_energy = 0.05
+[body.left]
+material = 'first'
+damage = 'brittle'
+shape.box = { lower = [0, 0], upper = [12, 16] }
+[body.middle]
+material = 'second'
+damage = 'brittle'
+shape.box = { lower = [12, 0], upper = [22, 16] }
+[body.right]
+material = 'third'
+horizon = 2
+spacing = 0.5
+shape.box = { lower = [22, 0], upper = [26, 16] }
+[initial.burst]
+velocity = ['0.02*x', '0.03*(y - 8) + 0.005*sin(x)']
+[time]
+end = 12
+[output]
+every_steps = 7
+fields = ['displacement', 'damage', 'strain_energy_density', 'dilatation', 'weighted_volume', 'stress']
+[history]
+every_steps = 3
+";
+
+/// The same with one law, so that its own loops run.
+fn with_one_law(law: &str) -> String {
+    let mut lines: Vec<String> = LAWS.lines().map(str::to_owned).collect();
+    for line in &mut lines {
+        for name in ["first", "second", "third"] {
+            if line.starts_with(&format!("{name}.")) {
+                *line = format!("{name}.{law}");
+            }
+        }
+    }
+    lines.join("\n")
+}
+
 /// A block of scattered points from a file, flying apart.
 const BLOCK: &str = "
 dimension = '3d'
@@ -140,6 +190,23 @@ fn same_everywhere(name: &str, deck: &str, must_break: bool) {
 #[test]
 fn a_plate_of_two_materials() {
     same_everywhere("plate", PLATE, true);
+}
+
+#[test]
+fn blocks_of_different_laws() {
+    same_everywhere("laws", LAWS, true);
+}
+
+#[test]
+fn blocks_of_the_ordinary_law() {
+    let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    same_everywhere("ordinary", &with_one_law(law), true);
+}
+
+#[test]
+fn blocks_of_the_normalised_law() {
+    let law = "normalised_pmb = { density = 2, youngs_modulus = 5 }";
+    same_everywhere("normalised", &with_one_law(law), true);
 }
 
 #[test]

@@ -16,10 +16,15 @@ fn row<const D: usize>(
 
 /// An elastic block that is stretched, turning and flying.
 fn flying_block(step: f64) -> String {
+    flying("pmb = { density = 2, youngs_modulus = 5 }", step)
+}
+
+/// A block of a law that is stretched, turning and flying.
+fn flying(law: &str, step: f64) -> String {
     format!(
         "dimension = '3d'
         grid = {{ spacing = 1, horizon = 3 }}
-        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        material.rubber.{law}
         body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0, 0], upper = [8, 6, 5] }} }}
         [initial.motion]
         displacement = ['0.02*x', '-0.01*y*z/5', 0]
@@ -41,33 +46,73 @@ fn momentum_is_constant_to_rounding() {
         }
         let end = row(&mut observer, &mut simulation);
         let total = 2.0 * 240.0;
-        for d in 9..12 {
+        for d in 10..13 {
             let change = (end.values[d] - start.values[d]).abs();
             assert!(change < 1e-12 * total, "component {d}: {change}");
         }
         assert!(
-            (start.values[9] - total * 0.94).abs() < 1e-9,
+            (start.values[10] - total * 0.94).abs() < 1e-9,
             "mean velocity 1 − 0.02·3"
         );
     });
 }
 
+/// Laws with what makes each of them different, without and with damping.
+const LAWS: [&str; 7] = [
+    "pmb = { density = 2, youngs_modulus = 5 }",
+    "normalised_pmb = { density = 2, youngs_modulus = 5 }",
+    "normalised_pmb = { density = 2, youngs_modulus = 5, form = 'diehl2016' }",
+    "linear_microelastic = { density = 2, youngs_modulus = 5 }",
+    "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.1 }",
+    "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4, influence = 'linear' }",
+    "pmb = { density = 2, youngs_modulus = 5, damping = 0.2 }",
+];
+
 #[test]
 fn energy_drift_falls_by_four_when_the_step_halves() {
-    let largest_error = |step: f64| {
-        simulate::<3, _>(&flying_block(step), |mut simulation| {
-            let mut observer = HistoryObserver::new(&simulation).unwrap();
-            row(&mut observer, &mut simulation);
-            let mut largest = 0.0_f64;
-            while simulation.number < simulation.last {
-                simulation.advance();
-                largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
-            }
-            largest
-        })
-    };
-    let ratio = largest_error(0.08) / largest_error(0.04);
-    assert!((3.6..4.4).contains(&ratio), "{ratio}");
+    for law in LAWS {
+        let largest_error = |step: f64| {
+            simulate::<3, _>(&flying(law, step), |mut simulation| {
+                let mut observer = HistoryObserver::new(&simulation).unwrap();
+                row(&mut observer, &mut simulation);
+                let mut largest = 0.0_f64;
+                while simulation.number < simulation.last {
+                    simulation.advance();
+                    largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
+                }
+                largest
+            })
+        };
+        let ratio = largest_error(0.08) / largest_error(0.04);
+        assert!((3.6..4.4).contains(&ratio), "{law}: {ratio}");
+    }
+}
+
+#[test]
+fn damping_takes_the_energy_that_the_motion_loses() {
+    // A body in free flight: u̇ falls as exp(−r t).
+    let text = "dimension = '3d'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, damping = 0.25 }
+        body.block = { material = 'rubber', shape.box = { lower = [0, 0, 0], upper = [4, 4, 4] } }
+        initial.flight.velocity = [3, 0, 0]
+        time = { end = 4, step = 0.01 }
+        ";
+    simulate::<3, _>(text, |mut simulation| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let start = row(&mut observer, &mut simulation).energies;
+        while simulation.number < simulation.last {
+            simulation.advance();
+        }
+        let end = row(&mut observer, &mut simulation).energies;
+        let expected = 3.0 * (-1.0_f64).exp();
+        for velocity in &simulation.state.velocity[0] {
+            assert!((velocity / expected - 1.0).abs() < 1e-5, "{velocity}");
+        }
+        let lost = start.kinetic * (1.0 - (-2.0_f64).exp());
+        assert!((end.dissipated / lost - 1.0).abs() < 1e-5);
+        assert!(end.error.abs() < 1e-5 * lost);
+    });
 }
 
 #[test]
@@ -330,9 +375,9 @@ fn loads_accelerate_as_newton_says() {
             }
             let end = row(&mut observer, &mut simulation);
             assert!(
-                (end.values[9] / 12.0 - 1.0).abs() < 1e-12,
+                (end.values[10] / 12.0 - 1.0).abs() < 1e-12,
                 "{}",
-                end.values[9]
+                end.values[10]
             );
             // Half of F²t²/m.
             let work = 0.5 * 12.0_f64.powi(2) / 480.0;

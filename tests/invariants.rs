@@ -7,8 +7,45 @@ use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, Snapshot};
 use support::{displace, largest_force, simulate, simulate_on};
 
-/// A body of about 400 points with the material given, in each dimension.
-fn deck(dimension: &str, extra: &str) -> String {
+/// Every law, as the material `rubber`.
+const LAWS: [&str; 12] = [
+    "pmb = { density = 2, youngs_modulus = 5 }",
+    "pmb = { density = 2, youngs_modulus = 5, surface_correction = 'energy' }",
+    "proportional = { density = 2, youngs_modulus = 5 }",
+    "normalised_pmb = { density = 2, youngs_modulus = 5 }",
+    "normalised_pmb = { density = 2, youngs_modulus = 5, form = 'diehl2016' }",
+    "linear_microelastic = { density = 2, youngs_modulus = 5 }",
+    "linear_microelastic = { density = 2, youngs_modulus = 5, lambda = '0.01*exp(-r)' }",
+    "linear_microelastic = { density = 2, youngs_modulus = 5, surface_correction = 'energy' }",
+    "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4 }",
+    "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.1, influence = 'linear' }",
+    "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.25, influence = 'gaussian' }",
+    "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = -0.3, influence = 'inverse' }",
+];
+
+/// Every volume correction.
+const CORRECTIONS: [&str; 3] = ["none", "linear", "exact"];
+
+/// A law for tests that are about something else.
+const PMB: &str = LAWS[0];
+
+/// Whether the law has a 1-D form.
+fn has_line(law: &str) -> bool {
+    !law.starts_with("ordinary") && !law.contains("diehl2016")
+}
+
+/// Whether forces are linear in the displacements, so that turning a body strains it.
+fn is_linear(law: &str) -> bool {
+    law.starts_with("linear_microelastic")
+}
+
+/// Whether bonds can break.
+fn can_break(law: &str) -> bool {
+    !is_linear(law) && !law.starts_with("proportional")
+}
+
+/// A body of about 400 points with the law given, in each dimension.
+fn deck(dimension: &str, law: &str, correction: &str, extra: &str) -> String {
     let (upper, thickness) = match dimension {
         "1d" => ("[40]", ""),
         "3d" => ("[8, 7, 6]", ""),
@@ -18,30 +55,44 @@ fn deck(dimension: &str, extra: &str) -> String {
     format!(
         "dimension = '{dimension}'
         {thickness}
-        grid = {{ spacing = 1, horizon = 3 }}
-        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        grid = {{ spacing = 1, horizon = 3, volume_correction = '{correction}' }}
+        material.rubber.{law}
         body.block = {{ material = 'rubber', shape.box = {{ lower = {lower}, upper = {upper} }} {extra} }}
         time = {{ end = 1 }}
         "
     )
 }
 
-const DAMAGE: &str = "damage.brittle.critical_stretch = { critical_stretch = 0.05 }";
+fn damage(alpha: f64) -> String {
+    format!("damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = {alpha} }}")
+}
 
-/// Applies a check to a simulation of each dimension.
-macro_rules! in_all_dimensions {
+/// Applies a check to a simulation of each law, volume correction and dimension.
+macro_rules! for_all_laws {
     ($check:ident) => {
-        simulate(&deck("1d", ""), $check::<1>);
-        simulate(&deck("plane-stress", ""), $check::<2>);
-        simulate(&deck("plane-strain", ""), $check::<2>);
-        simulate(&deck("3d", ""), $check::<3>);
+        for_all_laws!($check, |_: &str| true)
+    };
+    ($check:ident, $chosen:expr) => {
+        for law in LAWS.into_iter().filter(|law| $chosen(law)) {
+            for correction in CORRECTIONS {
+                if has_line(law) {
+                    simulate(&deck("1d", law, correction, ""), $check::<1>);
+                }
+                simulate(&deck("plane-stress", law, correction, ""), $check::<2>);
+                simulate(&deck("plane-strain", law, correction, ""), $check::<2>);
+                simulate(&deck("3d", law, correction, ""), $check::<3>);
+            }
+        }
     };
 }
 
-/// The force density at one per cent of isotropic strain, to measure others by.
+/// The largest force density at one per cent of isotropic or of deviatoric strain, to measure others
+/// by.
 fn force_scale<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     displace(simulation, |x| x.map(|x| 1.01 * x));
-    largest_force(simulation)
+    let isotropic = largest_force(simulation);
+    displace(simulation, |[x, y, z]| [1.01 * x, 0.99 * y, z]);
+    isotropic.max(largest_force(simulation))
 }
 
 #[test]
@@ -58,7 +109,7 @@ fn nothing_at_rest_and_under_translation() {
         });
         assert!(largest_force(&simulation) < 1e-9 * scale);
     }
-    in_all_dimensions!(check);
+    for_all_laws!(check);
 }
 
 #[test]
@@ -80,12 +131,18 @@ fn nothing_under_finite_rotation() {
                 }
             };
             displace(&mut simulation, turn);
-            assert!(largest_force(&simulation) < 1e-12 * scale);
+            let largest = largest_force(&simulation);
+            let deck = &simulation.plan.source.text;
+            assert!(largest < 1e-12 * scale, "{largest} of {scale}: {deck}");
         }
     }
-    simulate(&deck("plane-stress", ""), check::<2>);
-    simulate(&deck("plane-strain", ""), check::<2>);
-    simulate(&deck("3d", ""), check::<3>);
+    for law in LAWS.into_iter().filter(|law| !is_linear(law)) {
+        for correction in CORRECTIONS {
+            simulate(&deck("plane-stress", law, correction, ""), check::<2>);
+            simulate(&deck("plane-strain", law, correction, ""), check::<2>);
+            simulate(&deck("3d", law, correction, ""), check::<3>);
+        }
+    }
 }
 
 /// A smooth, uneven map with strains of several per cent.
@@ -111,24 +168,57 @@ fn forces_are_equal_and_opposite() {
             assert!(gross > 0.0 && net.abs() < 1e-12 * gross, "{net} of {gross}");
         }
     }
-    in_all_dimensions!(check);
-    let breakable = format!("{}{DAMAGE}", deck("3d", ", damage = 'brittle'"));
-    simulate(&breakable, check::<3>);
-    simulate(&two_blocks(), check::<2>);
+    for_all_laws!(check);
+    for law in LAWS.into_iter().filter(|law| can_break(law)) {
+        for alpha in [0.0, 0.25] {
+            let deck = deck("3d", law, "linear", ", damage = 'brittle'");
+            simulate(&format!("{deck}{}", damage(alpha)), check::<3>);
+        }
+    }
+    for deck in two_blocks() {
+        simulate(&deck, check::<2>);
+    }
 }
 
-/// Two blocks of different materials, one of which can break.
-fn two_blocks() -> String {
-    "dimension = 'plane-stress'
-    grid = { spacing = 1, horizon = 3 }
-    material.soft.pmb = { density = 2, youngs_modulus = 5 }
-    material.hard.pmb = { density = 3, youngs_modulus = 50 }
-    damage.brittle.critical_stretch = { critical_stretch = 0.05 }
-    body.left = { material = 'soft', shape.box = { lower = [0, 0], upper = [10, 12] } }
-    body.right = { material = 'hard', damage = 'brittle', shape.box = { lower = [10, 0], upper = [20, 12] } }
-    time = { end = 1 }
-    "
-    .to_owned()
+/// Two blocks of different materials, horizons and spacings, one of which can break.
+fn two_blocks() -> Vec<String> {
+    let pmb = [
+        "pmb = { density = 2, youngs_modulus = 5 }",
+        "pmb = { density = 3, youngs_modulus = 50 }",
+    ];
+    let ordinary = [
+        "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4 }",
+        "ordinary = { density = 3, youngs_modulus = 50, poisson_ratio = 0.1, influence = 'inverse' }",
+    ];
+    let normalised = "normalised_pmb = { density = 3, youngs_modulus = 20 }";
+    let mut decks = Vec::new();
+    for (correction, [soft, hard], rule) in [
+        ("none", pmb, "own"),
+        ("linear", pmb, "own"),
+        ("exact", pmb, "average"),
+        ("none", pmb, "minimum"),
+        ("none", ordinary, "own"),
+        ("exact", ordinary, "own"),
+        ("linear", [ordinary[0], pmb[1]], "own"),
+        ("none", [ordinary[0], normalised], "own"),
+        ("none", [pmb[0], normalised], "own"),
+    ] {
+        for right in ["", "horizon = 2.1,", "horizon = 1.6, spacing = 0.5,"] {
+            decks.push(format!(
+                "dimension = 'plane-stress'
+                grid = {{ spacing = 1, horizon = 3, volume_correction = '{correction}' }}
+                interface.rule = '{rule}'
+                material.soft.{soft}
+                material.hard.{hard}
+                damage.brittle.critical_stretch = {{ critical_stretch = 0.05 }}
+                body.left = {{ material = 'soft', shape.box = {{ lower = [0, 0], upper = [10, 12] }} }}
+                body.right = {{ material = 'hard', damage = 'brittle', {right} shape.box = {{ lower = [10, 0], upper = [20, 12] }} }}
+                time = {{ end = 1 }}
+                "
+            ));
+        }
+    }
+    decks
 }
 
 #[test]
@@ -146,8 +236,8 @@ fn the_force_is_the_slope_of_the_energy() {
     }
     fn check<const D: usize>(mut simulation: Simulation<D>) {
         displace(&mut simulation, wave);
-        let volume = simulation.model.volume[0];
         for point in [0, 7, 31] {
+            let volume = simulation.model.volume[point];
             for d in 0..D {
                 let force = simulation.state.responses[point].force[d] * volume;
                 let place = simulation.state.displacement[d][point];
@@ -163,8 +253,10 @@ fn the_force_is_the_slope_of_the_energy() {
             }
         }
     }
-    in_all_dimensions!(check);
-    simulate(&two_blocks(), check::<2>);
+    for_all_laws!(check);
+    for deck in two_blocks() {
+        simulate(&deck, check::<2>);
+    }
 }
 
 #[test]
@@ -195,30 +287,37 @@ fn the_mirror_image_has_the_mirrored_forces() {
             }
         }
     }
-    in_all_dimensions!(check);
+    for_all_laws!(check);
 }
 
 #[test]
 fn both_ends_of_a_bond_break_together() {
-    for alpha in [0.0, 0.25] {
-        let damage = format!(
-            "damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = {alpha} }}"
-        );
-        let text = format!("{}{damage}", deck("plane-stress", ", damage = 'brittle'"));
-        let broken = simulate_on::<2, _>(3, &text, |mut simulation| {
-            let before = count_intact(&mut simulation);
-            displace(&mut simulation, wave);
-            assert!(count_intact(&mut simulation) < before, "nothing broke");
-            intact_bonds(&mut simulation)
-        });
-        let mut all: Vec<(u64, u64)> = broken.into_iter().flatten().collect();
-        all.sort_unstable();
-        for (here, there) in &all {
-            assert!(
-                all.binary_search(&(*there, *here)).is_ok(),
-                "{here} {there}"
-            );
+    for law in LAWS.into_iter().filter(|law| can_break(law)) {
+        for alpha in [0.0, 0.25] {
+            let deck = deck("plane-stress", law, "linear", ", damage = 'brittle'");
+            together(&format!("{deck}{}", damage(alpha)));
         }
+    }
+    for deck in two_blocks() {
+        together(&deck);
+    }
+}
+
+fn together(text: &str) {
+    let broken = simulate_on::<2, _>(3, text, |mut simulation| {
+        let before = intact_bonds(&mut simulation).len();
+        displace(&mut simulation, wave);
+        (before, intact_bonds(&mut simulation))
+    });
+    let before: usize = broken.iter().map(|(before, _)| before).sum();
+    let mut all: Vec<(u64, u64)> = broken.into_iter().flat_map(|(_, left)| left).collect();
+    assert!(all.len() < before, "nothing broke");
+    all.sort_unstable();
+    for (here, there) in &all {
+        assert!(
+            all.binary_search(&(*there, *here)).is_ok(),
+            "{here} {there}"
+        );
     }
 }
 
@@ -308,7 +407,7 @@ fn bonds_of_a_no_failure_zone_hold() {
     let text = format!(
         "{}set.left.where = 'x < 8'
         damage.brittle.critical_stretch = {{ critical_stretch = 0.05, no_failure = ['left'] }}",
-        deck("plane-stress", ", damage = 'brittle'")
+        deck("plane-stress", PMB, "none", ", damage = 'brittle'")
     );
     for ranks in [1, 3] {
         let parts = simulate_on::<2, _>(ranks, &text, |mut simulation| {
@@ -328,7 +427,7 @@ fn bonds_of_a_no_failure_zone_hold() {
 fn a_pre_crack_shows_as_damage_and_cuts_forces() {
     let text = format!(
         "{}crack.notch.segment = {{ from = [0, 9], to = [11, 9] }}",
-        deck("plane-stress", "")
+        deck("plane-stress", PMB, "none", "")
     );
     simulate::<2, _>(&text, |mut simulation| {
         let snapshot = Snapshot::new(&mut simulation);
@@ -338,7 +437,7 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
             row.broken, 0,
             "bonds that start broken do not count as broken by the run"
         );
-        let damage = snapshot.field(&simulation, fissure::deck::plan::Field::Damage);
+        let damage = snapshot.field(&mut simulation, fissure::deck::plan::Field::Damage);
         for (point, damage) in damage.iter().enumerate() {
             let [x, y, _] = simulation.model.position(point);
             match ((y - 9.0).abs(), x) {

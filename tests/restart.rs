@@ -341,6 +341,30 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
 }
 
 #[test]
+fn a_damped_state_based_run_goes_on_as_if_it_had_never_stopped() {
+    let folder = Folder::new("damped");
+    let law =
+        "ordinary = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.2, damping = 1e5 }";
+    let text = plate("1e-5", "")
+        .replace("pmb = { density = 2440, youngs_modulus = 72e9 }", law)
+        .replace(
+            "output.every_steps = 200",
+            "output = { every_steps = 200, fields = ['stress', 'damage'] }",
+        );
+    let deck = folder.write("deck.toml", &text);
+    let out = folder.join("out");
+    succeed(&mut run(2, &deck, &out, &[]));
+    let further = ["--restart", "--set", "end=2e-5"];
+    succeed(&mut run(3, &deck, &out, &further));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &["--set", "end=2e-5"]));
+    assert_eq!(
+        difference(&datasets(&result(&whole)), &datasets(&result(&out))),
+        None
+    );
+}
+
+#[test]
 fn a_damaged_checkpoint_is_recognised_and_the_other_one_used() {
     let folder = Folder::new("damaged");
     let deck = folder.write("deck.toml", &plate("2e-5", "checkpoint.every_steps = 700"));

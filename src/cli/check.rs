@@ -4,9 +4,10 @@ use crate::cli::say;
 use fissure::comm::threads;
 use fissure::deck::{self, Plan};
 use fissure::error::Result;
+use fissure::material::AnyLaw;
 use fissure::solver::Simulation;
+use fissure::solver::assign::block_laws;
 use fissure::solver::conditions::members;
-use fissure::solver::model::{ListLaw, block_damage, block_law};
 
 use super::format::{bytes, count, si};
 use super::{CheckArguments, Verbosity, launch};
@@ -52,7 +53,6 @@ fn report<const D: usize>(
     line("dimension", plan.dimension.name());
     line("horizon", si(plan.horizon, "m"));
     for body in &plan.bodies {
-        let ListLaw::Pmb(law) = block_law(plan, body);
         say!("body {}", body.name);
         line("material", &body.material_name);
         line("density", format!("{} kg/m³", body.material.density));
@@ -64,8 +64,16 @@ fn report<const D: usize>(
             "Poisson's ratio",
             format!("{:.4}", body.material.elastic.poisson_ratio),
         );
-        line("micromodulus", format!("{:.4e} N/m⁶", law.micromodulus));
-        match block_damage(plan, body) {
+        let laws = block_laws(plan, body);
+        match laws.law {
+            AnyLaw::Pmb(law) => line("micromodulus", format!("{:.4e} N/m⁶", law.micromodulus)),
+            AnyLaw::LinearMicroelastic(law) => {
+                line("micromodulus", format!("{:.4e} N/m⁶", law.micromodulus));
+            }
+            AnyLaw::Normalised(_) => line("micromodulus", "of each point's own family"),
+            AnyLaw::Ordinary(_) => line("forces", "ordinary state-based"),
+        }
+        match laws.damage {
             None => line("damage", "none"),
             Some(damage) => {
                 line("critical stretch", format!("{:.4e}", damage.critical));

@@ -8,6 +8,9 @@ use std::f64::consts::PI;
 
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
+use crate::material::{Influence, Ordinary};
+
+use super::pull_apart::pull_apart;
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +35,20 @@ impl CriticalStretch {
             Dimension::Line { .. } => 5.0 / (2.0 * elastic.youngs_modulus),
         };
         (factor * energy / horizon).sqrt()
+    }
+
+    /// s0 of an ordinary state-based law, from the fracture energy G0 (J/m²) and the horizon δ (m): the
+    /// stretch at which pulling a body apart costs G0.
+    pub fn from_energy_ordinary(
+        law: &Ordinary,
+        influence: Influence,
+        energy: f64,
+        horizon: f64,
+    ) -> f64 {
+        let dimension = law.dimension() as i32;
+        let [bonds, points] = pull_apart(dimension, influence);
+        let cost = law.extensional() * bonds + law.volumetric() * points;
+        (energy / (cost * horizon)).sqrt()
     }
 
     /// The fracture energy G0 = K_Ic²/E′ (J/m²) of a fracture toughness (Pa·√m), where E′ is E in
@@ -67,6 +84,25 @@ mod tests {
         let found = CriticalStretch::from_energy(Dimension::Space, alon, energy, horizon);
         let expected = 5.0 * 2_f64.sqrt() / 12.0 * toughness / (210e9 * horizon.sqrt());
         assert!((found / expected - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_ordinary_law_has_the_stretch_of_the_bond_based_one() {
+        for dimension in [
+            Dimension::Space,
+            Dimension::PlaneStress { thickness: 0.1 },
+            Dimension::PlaneStrain { thickness: 0.1 },
+        ] {
+            let elastic = Isotropic {
+                youngs_modulus: 3e9,
+                poisson_ratio: dimension.bond_based_poisson_ratio(),
+            };
+            let expected = CriticalStretch::from_energy(dimension, elastic, 50.0, 0.002);
+            let law = Ordinary::new(dimension, elastic).unwrap();
+            let influence = Influence::Inverse;
+            let found = CriticalStretch::from_energy_ordinary(&law, influence, 50.0, 0.002);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{dimension:?}");
+        }
     }
 
     #[test]

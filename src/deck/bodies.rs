@@ -6,6 +6,7 @@ use indexmap::IndexMap;
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck};
+use super::number::shown;
 use super::plan;
 use super::resolve::{Scope, find, resolve_each};
 use super::shapes;
@@ -57,13 +58,29 @@ pub fn bodies(
                 Ok(damages[index].clone())
             })
             .transpose()?;
+        let horizon = match &body.horizon {
+            None => scope.number(&deck.grid.get_ref().horizon, "[grid] horizon")?,
+            Some(number) => scope.positive(number, &format!("{key} horizon"))?,
+        };
+        let unbreakable = matches!(
+            materials[material].law,
+            plan::Law::Proportional { .. } | plan::Law::LinearMicroelastic { .. }
+        );
+        if let (Some(name), true) = (&body.damage, unbreakable) {
+            let message = format!(
+                "{key} damage: bonds of the law `{}` never break; take `pmb` for a body that can",
+                materials[material].law.name()
+            );
+            return Err(scope.error(name.span(), message));
+        }
         Ok(plan::Body {
             name: name.to_owned(),
             span: table.span(),
             material_name: body.material.get_ref().clone(),
-            material: materials[material],
+            points: point_source(scope, deck, &key, table.span(), body, spacing, horizon)?,
+            material: materials[material].clone(),
             damage,
-            points: point_source(scope, deck, &key, table.span(), body, spacing)?,
+            horizon,
         })
     })
     .and_then(|bodies| rows_are_taken_once(scope, bodies.into_values().collect()))
@@ -103,6 +120,7 @@ fn point_source(
     span: Range<usize>,
     body: &grammar::Body,
     grid_spacing: Option<f64>,
+    horizon: f64,
 ) -> Result<plan::PointSource> {
     let given = [
         ("shape", body.shape.as_ref().map(Spanned::span)),
@@ -115,7 +133,6 @@ fn point_source(
     match (&body.shape, &body.points) {
         (Some(shape), _) => {
             let grid = deck.grid.get_ref();
-            let horizon = scope.number(&grid.horizon, "[grid] horizon")?;
             let own = body
                 .spacing
                 .as_ref()
@@ -125,6 +142,15 @@ fn point_source(
                 let message = "[grid]: a body given as a shape needs `spacing` here or in the body";
                 return Err(scope.error(deck.grid.span(), message));
             };
+            if let (Some(number), true) = (&body.horizon, spacing > horizon) {
+                let message = format!(
+                    "{key} horizon: {} m is smaller than the spacing {} m, so no point would have \
+                     a neighbour",
+                    shown(horizon),
+                    shown(spacing)
+                );
+                return Err(scope.error(number.span(), message));
+            }
             let origin = match &grid.origin {
                 Some(origin) => scope.vector(origin, "[grid] origin")?,
                 None => [0.0; 3],

@@ -36,10 +36,12 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         if body.shape.is_some() {
             body.spacing = body.spacing.take().or(grid.spacing.clone());
         }
+        body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
     }
     for material in deck.material.values_mut() {
-        let super::grammar::Material::Pmb(elastic) = material.get_mut();
-        let elastic = elastic.get_mut();
+        let any_ratio = matches!(material.get_ref(), super::grammar::Material::Ordinary(_));
+        let elastic = material.get_mut().elastic_mut();
+        elastic.damping = elastic.damping.take().or(number(0.0));
         let own = plan.dimension.bond_based_poisson_ratio();
         let without_ratio = [
             &elastic.youngs_modulus,
@@ -52,6 +54,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
             .filter(|constant| constant.is_some())
             .count()
             == 1
+            && !any_ratio
         {
             elastic.poisson_ratio = elastic.poisson_ratio.take().or(number(own));
         }

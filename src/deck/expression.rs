@@ -59,12 +59,14 @@ pub enum Variable {
     Z,
     /// `t`, the time.
     T,
+    /// `r`, a length; the value of the first coordinate.
+    R,
 }
 
 impl Variable {
     /// The variable of that name.
     fn from_name(name: &str) -> Option<Self> {
-        [Self::X, Self::Y, Self::Z, Self::T]
+        [Self::X, Self::Y, Self::Z, Self::T, Self::R]
             .into_iter()
             .find(|variable| variable.name() == name)
     }
@@ -76,6 +78,17 @@ impl Variable {
             Self::Y => "y",
             Self::Z => "z",
             Self::T => "t",
+            Self::R => "r",
+        }
+    }
+
+    /// Its place among x, y, z, t.
+    fn slot(self) -> usize {
+        match self {
+            Self::X | Self::R => 0,
+            Self::Y => 1,
+            Self::Z => 2,
+            Self::T => 3,
         }
     }
 }

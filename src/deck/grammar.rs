@@ -38,6 +38,9 @@ pub struct Deck {
     pub parameters: IndexMap<Text, Number>,
     /// Spacing and horizon.
     pub grid: Spanned<Grid>,
+    /// The bonds between blocks.
+    #[serde(default)]
+    pub interface: Interface,
     /// Materials by name.
     pub material: Tables<Material>,
     /// Damage laws by name.
@@ -103,6 +106,71 @@ pub struct Grid {
     /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
+    /// What the volumes of points near the edge of a family count: `"none"`, `"linear"` or `"exact"`.
+    #[serde(default = "no_correction")]
+    pub volume_correction: Spanned<VolumeCorrection>,
+    /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
+    #[serde(default)]
+    pub quadrature: Quadrature,
+}
+
+fn no_correction() -> Spanned<VolumeCorrection> {
+    Spanned::new(0..0, VolumeCorrection::None)
+}
+
+/// How volumes near the edge of a family are corrected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum VolumeCorrection {
+    /// Points within the horizon count whole.
+    None,
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1).
+    Linear,
+    /// Points count the share of their cell within the horizon.
+    Exact,
+}
+
+/// The points of a lattice cell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quadrature {
+    /// One at the centre.
+    #[default]
+    Midpoint,
+    /// 2 in 1-D, 4 in the plane, 8 in 3-D.
+    Gauss,
+}
+
+/// The bonds between blocks.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Interface {
+    /// What constants they have: `"own"`, `"average"` or `"minimum"`. With `"own"` each end exerts its
+    /// half with its own modulus and horizon; else both have the mean or the smaller of each.
+    #[serde(default = "own")]
+    pub rule: Spanned<Rule>,
+}
+
+impl Default for Interface {
+    fn default() -> Self {
+        Self { rule: own() }
+    }
+}
+
+fn own() -> Spanned<Rule> {
+    Spanned::new(0..0, Rule::Own)
+}
+
+/// What constants bonds between blocks have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// Means.
+    Average,
+    /// The smaller.
+    Minimum,
+    /// Those of each end.
+    Own,
 }
 
 /// A material law.
@@ -111,9 +179,30 @@ pub struct Grid {
 pub enum Material {
     /// Prototype microelastic (brittle) material, f = c s e.
     Pmb(Spanned<Elastic>),
+    /// The same without failure.
+    Proportional(Spanned<Elastic>),
+    /// The same with a micromodulus for each point, from its own neighbours.
+    NormalisedPmb(Spanned<Elastic>),
+    /// f = λ(|ξ|) ξ⊗ξ η.
+    LinearMicroelastic(Spanned<Elastic>),
+    /// Ordinary state-based (linear peridynamic solid), any Poisson ratio.
+    Ordinary(Spanned<Elastic>),
 }
 
-/// Density and one or two elastic constants.
+impl Material {
+    /// What stands in the table.
+    pub fn elastic_mut(&mut self) -> &mut Elastic {
+        match self {
+            Self::Pmb(elastic)
+            | Self::Proportional(elastic)
+            | Self::NormalisedPmb(elastic)
+            | Self::LinearMicroelastic(elastic)
+            | Self::Ordinary(elastic) => elastic.get_mut(),
+        }
+    }
+}
+
+/// Density, elastic constants, and what only some laws have.
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Elastic {
@@ -134,6 +223,57 @@ pub struct Elastic {
     /// Poisson's ratio ν.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poisson_ratio: Option<Number>,
+    /// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping: Option<Number>,
+    /// `"energy"` corrects the micromodulus by the strain energy of each point's own family, `"none"`
+    /// does not; for `pmb`, `proportional` and `linear_microelastic`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface_correction: Option<Spanned<SurfaceCorrection>>,
+    /// `"energy"` or `"diehl2016"`; for `normalised_pmb`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<Spanned<Form>>,
+    /// `"constant"`, `"linear"`, `"gaussian"` or `"inverse"`; for `ordinary`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub influence: Option<Spanned<Influence>>,
+    /// λ in N/m⁹, an expression of the bond's length r in m; for `linear_microelastic`, c/r³ if not
+    /// given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lambda: Option<Number>,
+}
+
+/// What corrects the micromodulus near surfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SurfaceCorrection {
+    /// Nothing.
+    None,
+    /// Strain energy.
+    Energy,
+}
+
+/// How a point's micromodulus follows from its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Form {
+    /// w = c s²|ξ|/2.
+    Energy,
+    /// w = c s²/2, as printed by Diehl & Schweitzer 2016.
+    Diehl2016,
+}
+
+/// Influence functions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Influence {
+    /// 1.
+    Constant,
+    /// 1 − r/δ.
+    Linear,
+    /// exp(−(2r/δ)²).
+    Gaussian,
+    /// δ/r.
+    Inverse,
 }
 
 /// A damage law.
@@ -187,6 +327,9 @@ pub struct Body {
     /// Lattice spacing of this body in m; that of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Number>,
+    /// Horizon of this body in m; that of `[grid]` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub horizon: Option<Number>,
 }
 
 /// Points from a file with rows `x y [z] volume block`, separated by commas or spaces.

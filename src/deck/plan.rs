@@ -9,6 +9,7 @@ use super::expression::Expression;
 use super::source::Source;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
+use crate::material::Influence;
 
 /// Everything that a run needs to know.
 #[derive(Debug, Clone)]
@@ -19,8 +20,14 @@ pub struct Plan {
     pub title: String,
     /// The setting.
     pub dimension: Dimension,
-    /// Horizon δ, m.
+    /// Horizon δ of the grid, m; bodies may have their own.
     pub horizon: f64,
+    /// What volumes near the edge of a family count.
+    pub volume_correction: VolumeCorrection,
+    /// Where the points of a lattice cell lie.
+    pub quadrature: Quadrature,
+    /// The bonds between blocks.
+    pub interface: InterfaceRule,
     /// Bodies in the order of the deck; the index is the block number.
     pub bodies: Vec<Body>,
     /// Sets: `all`, then the bodies, then those of the deck.
@@ -54,12 +61,14 @@ pub struct Body {
     pub material: Material,
     /// The damage law, if bonds can break.
     pub damage: Option<CriticalStretch>,
+    /// Horizon δ, m.
+    pub horizon: f64,
     /// Where its points come from.
     pub points: PointSource,
 }
 
 /// A material: density, elastic constants and the law that uses them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Material {
     /// Which law.
     pub law: Law,
@@ -67,13 +76,87 @@ pub struct Material {
     pub density: f64,
     /// E and ν; for a bond-based law ν is the law's own.
     pub elastic: Isotropic,
+    /// Viscous damping r, 1/s: a force density −r ρ u̇.
+    pub damping: f64,
 }
 
 /// The material laws.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub enum Law {
     /// Prototype microelastic.
-    Pmb,
+    Pmb {
+        /// Whether the strain energy of each point's own family corrects the micromodulus.
+        corrected: bool,
+    },
+    /// Prototype microelastic that cannot break.
+    Proportional {
+        /// As for the prototype microelastic.
+        corrected: bool,
+    },
+    /// With a micromodulus for each point.
+    NormalisedPmb(NormalisedForm),
+    /// Linear in the displacements.
+    LinearMicroelastic {
+        /// λ(r), N/m⁹; c/r³ if there is none.
+        lambda: Option<Expression>,
+        /// As for the prototype microelastic.
+        corrected: bool,
+    },
+    /// Ordinary state-based.
+    Ordinary(Influence),
+}
+
+impl Law {
+    /// Its name in decks.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Pmb { .. } => "pmb",
+            Self::Proportional { .. } => "proportional",
+            Self::NormalisedPmb(_) => "normalised_pmb",
+            Self::LinearMicroelastic { .. } => "linear_microelastic",
+            Self::Ordinary(_) => "ordinary",
+        }
+    }
+}
+
+/// How a point's micromodulus follows from its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NormalisedForm {
+    /// w = c s²|ξ|/2 holds the classical energy.
+    Energy,
+    /// Diehl & Schweitzer 2016, eq. 15–17, as printed.
+    Diehl2016,
+}
+
+/// What volumes near the edge of a family count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VolumeCorrection {
+    /// Whole or not at all.
+    None,
+    /// A share that falls linearly with the distance.
+    Linear,
+    /// The share of the cell that lies within the horizon.
+    Exact,
+}
+
+/// Where the points of a lattice cell lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quadrature {
+    /// One at the centre.
+    Midpoint,
+    /// Two by direction, at ±√3/3 of half the edge.
+    Gauss,
+}
+
+/// What constants the bonds between blocks have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InterfaceRule {
+    /// Means of the moduli and of the horizons.
+    Average,
+    /// The smaller of the moduli and of the horizons.
+    Minimum,
+    /// Each end exerts its own half.
+    Own,
 }
 
 /// Critical-stretch damage.
@@ -332,20 +415,32 @@ pub enum Field {
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
+    /// θ.
+    Dilatation,
+    /// m = Σ ω|ξ|²Ṽ, m⁵.
+    WeightedVolume,
+    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz.
+    Stress,
     /// Number of intact bonds.
     Neighbours,
+    /// The rank that owns the point.
+    Rank,
 }
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 11] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
         Self::ForceDensity,
         Self::Damage,
         Self::StrainEnergyDensity,
+        Self::Dilatation,
+        Self::WeightedVolume,
+        Self::Stress,
         Self::Neighbours,
+        Self::Rank,
     ];
 
     /// Its name in decks and results.
@@ -357,7 +452,11 @@ impl Field {
             Self::ForceDensity => "force_density",
             Self::Damage => "damage",
             Self::StrainEnergyDensity => "strain_energy_density",
+            Self::Dilatation => "dilatation",
+            Self::WeightedVolume => "weighted_volume",
+            Self::Stress => "stress",
             Self::Neighbours => "neighbours",
+            Self::Rank => "rank",
         }
     }
 
@@ -368,16 +467,19 @@ impl Field {
             Self::Velocity => "m/s",
             Self::Acceleration => "m/s^2",
             Self::ForceDensity => "N/m^3",
-            Self::Damage | Self::Neighbours => "1",
+            Self::Damage | Self::Dilatation | Self::Neighbours | Self::Rank => "1",
+            Self::WeightedVolume => "m^5",
+            Self::Stress => "Pa",
             Self::StrainEnergyDensity => "J/m^3",
         }
     }
 
-    /// 3 for vectors (padded with 0 in 1-D and 2-D), 1 for scalars.
+    /// 3 for vectors and 6 for symmetric tensors (padded with 0 in 1-D and 2-D), 1 for scalars.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement | Self::Velocity | Self::Acceleration | Self::ForceDensity => 3,
-            Self::Damage | Self::StrainEnergyDensity | Self::Neighbours => 1,
+            Self::Stress => 6,
+            _ => 1,
         }
     }
 }

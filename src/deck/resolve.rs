@@ -95,7 +95,7 @@ impl<'a> Scope<'a> {
             .filter(|variable| match variable {
                 Variable::Y => self.dimension > 1,
                 Variable::Z => self.dimension > 2,
-                Variable::X | Variable::T => true,
+                Variable::X | Variable::T | Variable::R => true,
             })
             .collect();
         let names: Vec<&str> = self.parameters.keys().map(String::as_str).collect();

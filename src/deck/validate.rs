@@ -1,6 +1,6 @@
 //! From the grammar to the plan: every value checked, every name resolved.
 
-use super::grammar::{Deck, DimensionName};
+use super::grammar::{Deck, DimensionName, Quadrature, Rule, VolumeCorrection};
 use super::number::{Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
@@ -26,6 +26,8 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         materials::damage(&scope, &sets, name, table)
     })?;
     let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
+    let volume_correction = volume_correction(&scope, deck, &bodies)?;
+    let interface = interface(&scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| {
         shapes::crack(&scope, name, table)
     })?;
@@ -35,6 +37,12 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         title: deck.title.clone(),
         dimension,
         horizon,
+        volume_correction,
+        quadrature: match deck.grid.get_ref().quadrature {
+            Quadrature::Midpoint => plan::Quadrature::Midpoint,
+            Quadrature::Gauss => plan::Quadrature::Gauss,
+        },
+        interface,
         bodies,
         cracks: cracks.into_values().collect(),
         initials: conditions::initials(&scope, deck, &sets)?,
@@ -96,6 +104,72 @@ pub fn checked_spacing(scope: &Scope, number: &Number, key: &str, horizon: f64) 
         return Err(scope.error(number.span(), message));
     }
     Ok(spacing)
+}
+
+fn volume_correction(
+    scope: &Scope,
+    deck: &Deck,
+    bodies: &[plan::Body],
+) -> Result<plan::VolumeCorrection> {
+    let grid = deck.grid.get_ref();
+    let correction = match grid.volume_correction.get_ref() {
+        VolumeCorrection::None => return Ok(plan::VolumeCorrection::None),
+        VolumeCorrection::Linear => plan::VolumeCorrection::Linear,
+        VolumeCorrection::Exact => plan::VolumeCorrection::Exact,
+    };
+    let from_file = |body: &&plan::Body| matches!(body.points, plan::PointSource::File { .. });
+    let reason = match bodies.iter().find(from_file) {
+        Some(body) => format!("and [body.{}] has its points from a file", body.name),
+        None if grid.quadrature == Quadrature::Gauss => {
+            "not with `quadrature = \"gauss\"`".to_owned()
+        }
+        None => return Ok(correction),
+    };
+    let message = format!(
+        "[grid] volume_correction: only points at the centres of lattice cells have cells to \
+         correct, {reason}"
+    );
+    Err(scope.error(grid.volume_correction.span(), message))
+}
+
+fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::InterfaceRule> {
+    let rule = &deck.interface.rule;
+    let linear =
+        |body: &&plan::Body| matches!(body.material.law, plan::Law::LinearMicroelastic { .. });
+    let name = |body: &plan::Body| body.material.law.name();
+    if let Some(body) = bodies.iter().find(linear)
+        && let Some(other) = bodies.iter().find(|other| name(other) != name(body))
+    {
+        let message = format!(
+            "[body.{}] material: the forces of `{}` and of `linear_microelastic` have different \
+             directions, so that no bond can have both",
+            other.name,
+            name(other),
+        );
+        return Err(scope.error(other.span.clone(), message));
+    }
+    let found = match rule.get_ref() {
+        Rule::Own => return Ok(plan::InterfaceRule::Own),
+        Rule::Average => plan::InterfaceRule::Average,
+        Rule::Minimum => plan::InterfaceRule::Minimum,
+    };
+    let own_only = |body: &&plan::Body| match &body.material.law {
+        plan::Law::Ordinary(_) => true,
+        plan::Law::LinearMicroelastic { lambda, .. } => lambda.is_some(),
+        _ => name(body) != name(&bodies[0]),
+    };
+    match bodies.iter().find(own_only) {
+        None => Ok(found),
+        Some(body) => {
+            let message = format!(
+                "[interface] rule: one micromodulus for both ends needs the same bond-based law in \
+                 all bodies, but [body.{}] is `{}`; take `own`",
+                body.name,
+                name(body)
+            );
+            Err(scope.error(rule.span(), message))
+        }
+    }
 }
 
 fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {

@@ -1,6 +1,7 @@
 //! The list family: for each point the indices of its neighbours, in groups of eight, and one bit a
 //! bond that says whether it is intact. Serves any cloud of points.
 
+use crate::material::Lanes;
 use crate::material::lanes::WIDTH;
 
 /// The bonds from points of one block to points of one block.
@@ -21,6 +22,9 @@ pub struct BondList {
     pub(super) intact: Vec<u8>,
     /// One bit a bond, clear where it can never break; all can break if there is none.
     pub(super) breakable: Option<Vec<u8>>,
+    /// What volumes are multiplied by in the sums of the own and of the far end, 0 where a bond only
+    /// fills up a group; 1 if there are none, the own end's if the far end has none.
+    pub(super) weights: [Option<Vec<Lanes>>; 2],
     /// One more than the largest local index in the list.
     pub(super) reach: usize,
 }
@@ -35,6 +39,9 @@ pub struct Row<'a> {
     pub intact: &'a mut [u8],
     /// Which bonds can break.
     pub breakable: Option<&'a [u8]>,
+    /// What volumes are multiplied by in the sums of the own and of the far end; 1 if there are
+    /// none, the own end's if the far end has none.
+    pub weights: [Option<&'a [Lanes]>; 2],
 }
 
 /// A range of rows that can be split between threads.
@@ -44,6 +51,7 @@ pub struct Rows<'a> {
     neighbours: &'a [[u32; WIDTH]],
     intact: &'a mut [u8],
     breakable: Option<&'a [u8]>,
+    weights: [Option<&'a [Lanes]>; 2],
 }
 
 impl BondList {
@@ -90,8 +98,29 @@ impl BondList {
             starts: &self.starts[range.start..=range.end],
             neighbours: &self.neighbours[groups.clone()],
             breakable: self.breakable.as_ref().map(|bits| &bits[groups.clone()]),
+            weights: self
+                .weights
+                .each_ref()
+                .map(|weights| weights.as_ref().map(|weights| &weights[groups.clone()])),
             intact: &mut self.intact[groups],
         }
+    }
+
+    /// Sets what volumes are multiplied by in the sums of one end, 0 the own, 1 the far one: `weight`
+    /// of the two local indices.
+    pub fn weigh(&mut self, end: usize, weight: impl Fn(usize, usize) -> f64) {
+        let mut weights = vec![Lanes::splat(0.0); self.neighbours.len()];
+        for row in 0..self.points.len() {
+            let own = self.points[row];
+            for group in self.starts[row]..self.starts[row + 1] {
+                for (k, there) in self.neighbours[group].iter().enumerate() {
+                    if *there != own {
+                        weights[group].0[k] = weight(own as usize, *there as usize);
+                    }
+                }
+            }
+        }
+        self.weights[end] = Some(weights);
     }
 
     /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
@@ -160,6 +189,7 @@ impl BondList {
         4 * self.points.len()
             + 8 * self.starts.len()
             + groups * (4 * WIDTH + 1 + usize::from(self.breakable.is_some()))
+            + groups * 8 * WIDTH * self.weights.iter().flatten().count()
     }
 }
 
@@ -192,12 +222,15 @@ impl<'a> Rows<'a> {
             }
             None => (None, None),
         };
+        let weights_a = self.weights.map(|all| all.map(|weights| &weights[..group]));
+        let weights_b = self.weights.map(|all| all.map(|weights| &weights[group..]));
         let first = Self {
             points: points_a,
             starts: &self.starts[..=row],
             neighbours: neighbours_a,
             intact: intact_a,
             breakable: breakable_a,
+            weights: weights_a,
         };
         let second = Self {
             points: points_b,
@@ -205,6 +238,7 @@ impl<'a> Rows<'a> {
             neighbours: neighbours_b,
             intact: intact_b,
             breakable: breakable_b,
+            weights: weights_b,
         };
         (first, second)
     }
@@ -217,7 +251,43 @@ impl<'a> Rows<'a> {
             point: self.points[row] as usize,
             neighbours: &self.neighbours[groups.clone()],
             breakable: self.breakable.map(|bits| &bits[groups.clone()]),
+            weights: self
+                .weights
+                .map(|all| all.map(|weights| &weights[groups.clone()])),
             intact: &mut self.intact[groups],
         }
+    }
+}
+
+impl Row<'_> {
+    /// A bit for each bond of a group, broken or not, clear where it only fills up the group.
+    #[inline(always)]
+    pub fn filled(&self, group: usize) -> u8 {
+        let mut bits = 0;
+        for (k, there) in self.neighbours[group].iter().enumerate() {
+            bits |= u8::from(*there as usize != self.point) << k;
+        }
+        bits
+    }
+
+    /// What the volumes of a group's neighbours are multiplied by in the own end's sums.
+    #[inline(always)]
+    pub fn weight_here(&self, group: usize) -> Lanes {
+        self.weights[0].map_or(Lanes::splat(1.0), |weights| weights[group])
+    }
+
+    /// What the volumes of a group's neighbours are multiplied by in the far ends' forces.
+    #[inline(always)]
+    pub fn weight_there(&self, group: usize) -> Lanes {
+        match self.weights {
+            [_, Some(weights)] | [Some(weights), None] => weights[group],
+            [None, None] => Lanes::splat(1.0),
+        }
+    }
+
+    /// A bit for each bond of a group that counts in the own end's sums, if it is intact.
+    #[inline(always)]
+    pub fn family(&self, group: usize) -> u8 {
+        self.weights[0].map_or(u8::MAX, |weights| weights[group].above(0.0))
     }
 }

@@ -6,6 +6,8 @@
 
 mod list;
 mod search;
+mod volume;
 
 pub use list::{BondList, Row, Rows};
 pub use search::{cutoff, search};
+pub use volume::CellShare;

@@ -34,13 +34,16 @@ struct Chunk {
     entries: Vec<Found>,
 }
 
-/// The bond lists of a domain, for blocks 0 … `blocks` − 1 and a horizon in m.
+/// The bond lists of a domain, for blocks 0 … `blocks` − 1; `cutoffs` has the longest bond (m) of each
+/// pair of them, row by row, and is symmetric.
 ///
 /// # Errors
 /// When two points lie at the same place.
-pub fn search(domain: &Domain, blocks: usize, horizon: f64) -> Result<Vec<BondList>> {
+pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>> {
     let positions: Vec<[f64; 3]> = domain.points.iter().map(|point| point.position).collect();
-    let bins = Bins::new(&positions, cutoff(horizon));
+    let longest = cutoffs.iter().copied().fold(0.0, f64::max);
+    let bins = Bins::new(&positions, longest);
+    let squares: Vec<f64> = cutoffs.iter().map(|cutoff| cutoff * cutoff).collect();
     let mut lists: Vec<BondList> = (0..blocks * blocks)
         .map(|pair| BondList {
             here: pair / blocks,
@@ -55,7 +58,7 @@ pub fn search(domain: &Domain, blocks: usize, horizon: f64) -> Result<Vec<BondLi
             .into_par_iter()
             .map(|chunk| {
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(domain.owned);
-                search_chunk(domain, &bins, range)
+                search_chunk(domain, &bins, range, blocks, &squares)
             })
             .collect();
         for chunk in found {
@@ -74,7 +77,13 @@ pub fn search(domain: &Domain, blocks: usize, horizon: f64) -> Result<Vec<BondLi
     Ok(lists)
 }
 
-fn search_chunk(domain: &Domain, bins: &Bins, range: std::ops::Range<usize>) -> Result<Chunk> {
+fn search_chunk(
+    domain: &Domain,
+    bins: &Bins,
+    range: std::ops::Range<usize>,
+    blocks: usize,
+    squares: &[f64],
+) -> Result<Chunk> {
     let mut chunk = Chunk::default();
     for index in range {
         let here = &domain.points[index];
@@ -87,6 +96,9 @@ fn search_chunk(domain: &Domain, bins: &Bins, range: std::ops::Range<usize>) -> 
             }
             if squared == 0.0 {
                 coincident = Some(there.id);
+            }
+            if squared > squares[here.block as usize * blocks + there.block as usize] {
+                return;
             }
             chunk.entries.push((there.block, there.id, other));
         });
@@ -148,7 +160,7 @@ mod tests {
             let rows = threads::run(ranks, |comm| {
                 let piece = if comm.rank() == 0 { all.clone() } else { Vec::new() };
                 let domain = distribute(comm, piece, all.len() as u64, cutoff(1.0)).unwrap();
-                let mut lists = search(&domain, 3, 1.0).unwrap();
+                let mut lists = search(&domain, 3, &[cutoff(1.0); 9]).unwrap();
                 let mut rows = Vec::new();
                 for list in &mut lists {
                     let (there, length) = (list.there, list.len());
@@ -197,7 +209,7 @@ mod tests {
             Point::new(1, [1.0; 3], 1.0, 0),
         ];
         let domain = distribute(&threads::alone(), points, 2, 1.0).unwrap();
-        let error = search(&domain, 1, 1.0).unwrap_err();
+        let error = search(&domain, 1, &[1.0]).unwrap_err();
         assert!(error.message.contains("points 0 and 1"), "{error}");
     }
 }

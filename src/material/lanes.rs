@@ -76,6 +76,16 @@ impl Lanes {
         bits
     }
 
+    /// A bit for each lane that is larger than a number.
+    #[inline(always)]
+    pub fn above(self, limit: f64) -> u8 {
+        let mut bits = 0;
+        for k in 0..WIDTH {
+            bits |= u8::from(self.0[k] > limit) << k;
+        }
+        bits
+    }
+
     /// The sum of all lanes, in a fixed order.
     #[inline(always)]
     pub fn sum(self) -> f64 {

@@ -1,7 +1,8 @@
-//! Points at the centres of lattice cells, made in pieces.
+//! Points in lattice cells, made in pieces: one at the centre of each, or at the places of the Gauss
+//! rule, ±√3/3 of half the edge by direction (Emmrich & Weckner 2006, §4).
 
 use crate::comm::{Communicator, agree};
-use crate::deck::plan::{Plan, PointSource, Shape};
+use crate::deck::plan::{Plan, PointSource, Quadrature, Shape};
 use crate::error::{Error, Result};
 
 use super::{Point, shape};
@@ -50,8 +51,8 @@ impl Range {
 }
 
 /// This rank's piece of a body's points; ids count from 0 within the piece. Cells are numbered with
-/// x fastest, and ranks take consecutive ranges of them. A point that also lies in a later lattice
-/// body is left to that one.
+/// x fastest, and ranks take consecutive ranges of them. A cell belongs to a body if its centre does;
+/// one that also lies in a later lattice body is left to that one.
 ///
 /// # Errors
 /// When the lattice has more cells than the ranks can go through.
@@ -94,8 +95,22 @@ pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result
         let taken = later
             .iter()
             .any(|shape| shape::contains(shape, position, tolerance));
-        if shape::contains(region, position, tolerance) && !taken {
-            points.push(Point::new(0, position, volume, body));
+        if !shape::contains(region, position, tolerance) || taken {
+            continue;
+        }
+        match plan.quadrature {
+            Quadrature::Midpoint => points.push(Point::new(0, position, volume, body)),
+            Quadrature::Gauss => {
+                let count = 1 << dimension;
+                let shift = spacing / 12.0_f64.sqrt();
+                for corner in 0..count {
+                    let mut place = position;
+                    for k in 0..dimension {
+                        place[k] += if corner >> k & 1 == 1 { shift } else { -shift };
+                    }
+                    points.push(Point::new(0, place, volume / f64::from(count), body));
+                }
+            }
         }
     }
     Ok(points)

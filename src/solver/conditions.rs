@@ -312,8 +312,11 @@ impl<const D: usize> Conditions<D> {
                     Motion::Velocity => (now, (after - before) / (2.0 * step)),
                 };
                 let point = *point as usize;
+                let damping = model.damping_of(point) * model.density_of(point);
+                let change = velocity - state.velocity[component][point];
                 state.velocity[component][point] = velocity;
                 let force = &mut state.responses[point].force[component];
+                *force -= damping * change;
                 let needed = model.density_of(point) * acceleration;
                 support.reaction[k] = needed - *force;
                 *force = needed;

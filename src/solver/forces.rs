@@ -1,30 +1,25 @@
 //! Internal forces: exchange the displacements, break bonds, sum forces.
 //!
-//! Two passes, of which the first is only made where a damage law needs it: what neighbours must
-//! know of a point is computed and exchanged, then the bonds are summed. Interior points are worked
-//! on while messages are in flight.
+//! Each pass over the bonds begins with a message that brings what it reads up to date at the ghosts:
+//! first the displacements, then what the pass before has found. Interior points are worked on while
+//! messages are in flight.
 
-use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use crate::comm::{Communicator, Halo};
-use crate::damage::CriticalStretch;
+use crate::material::Law;
 
-use super::kernels::{
-    Energy, Force, Geometry, NoFailure, PerPoint, Response, SmallestStretch, Stiffness, Stored,
-    Uniform,
-};
-use super::model::{Bonds, ListFailure, ListLaw, Model};
-use super::sweep::sweep;
+use super::geometry::{Geometry, Shared};
+use super::kernels::{Bonded, Energy, Response, Stored};
+use super::laws::{BlockLaws, Bonds, with_laws};
+use super::measures::{Constant, Dilatation, Expansion, Stiffness, Stress};
+use super::model::Model;
+use super::passes::{Passes, sweep_all};
 
 /// The bonds of a rank and what it takes to sum over them.
 pub struct Forces<const D: usize> {
-    bonds: Vec<Bonds>,
+    passes: Passes,
     halo: Halo,
-    /// Damage law of each block.
-    damage: Vec<Option<CriticalStretch>>,
-    /// Threshold of each local point, where it depends on the point's smallest stretch.
-    thresholds: Vec<f64>,
 }
 
 /// Where the time of a force evaluation went.
@@ -37,44 +32,80 @@ pub struct ForceTimes {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Puts together the bonds, the halo plan and the blocks' damage laws.
+    /// Puts together the bonds, the halo plan and the blocks' laws, and finds the points' constants
+    /// from their whole families; collective.
     pub fn new(
+        comm: &dyn Communicator,
+        model: &Model<D>,
         bonds: Vec<Bonds>,
         halo: Halo,
-        damage: Vec<Option<CriticalStretch>>,
-        local_points: usize,
+        blocks: Vec<BlockLaws>,
     ) -> Self {
-        let per_point = bonds
-            .iter()
-            .any(|bonds| matches!(bonds.failure, ListFailure::PerPoint));
-        Self {
-            bonds,
-            halo,
-            damage,
-            thresholds: vec![0.0; if per_point { local_points } else { 0 }],
+        let local = model.volume.len();
+        let passes = Passes::new(bonds, blocks, model.owned(), local);
+        let mut forces = Self { passes, halo };
+        if !forces.passes.constants.is_empty() {
+            forces.find_constants(comm, model);
         }
+        forces
+    }
+
+    fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
+        let Self { passes, halo } = self;
+        let owned = model.owned();
+        let still = vec![0.0; model.volume.len()];
+        let geometry = Geometry {
+            reference: components(&model.reference),
+            displacement: [&still[..]; D],
+            volume: &model.volume,
+        };
+        for Bonds { list, law, .. } in &mut passes.bonds {
+            with_laws!(*law, laws => {
+                let law = laws[0];
+                sweep_all(list, &mut passes.constants[..owned], &Constant { geometry, law });
+            });
+        }
+        for (constant, block) in passes.constants.iter_mut().zip(&model.block) {
+            *constant = passes.blocks[usize::from(*block)].law.constant(*constant);
+        }
+        halo.pack(&[&passes.constants]);
+        halo.exchange(comm, &mut || {});
+        halo.unpack(&mut [&mut passes.constants]);
     }
 
     /// Bonds of the rank's points, each counted from its end here, broken ones included.
     pub fn directed_bonds(&self) -> u64 {
-        self.bonds.iter().map(|bonds| bonds.list.bonds()).sum()
+        self.passes
+            .bonds
+            .iter()
+            .map(|bonds| bonds.list.bonds())
+            .sum()
     }
 
     /// Memory of the bonds, bytes.
     pub fn bytes(&self) -> usize {
-        self.bonds.iter().map(|bonds| bonds.list.bytes()).sum()
+        self.passes
+            .bonds
+            .iter()
+            .map(|bonds| bonds.list.bytes())
+            .sum()
+    }
+
+    /// The halo plan.
+    pub fn halo(&self) -> &Halo {
+        &self.halo
     }
 
     /// Breaks the bonds for which `crosses` (of the two local indices) holds.
     pub fn cut(&mut self, crosses: impl Fn(usize, usize) -> bool) {
-        for bonds in &mut self.bonds {
+        for bonds in &mut self.passes.bonds {
             bonds.list.cut(&crosses);
         }
     }
 
     /// Calls `found` with the local indices of both ends of every intact bond of the owned points.
     pub fn for_each_intact(&self, mut found: impl FnMut(usize, usize)) {
-        for bonds in &self.bonds {
+        for bonds in &self.passes.bonds {
             bonds.list.for_each_intact(&mut found);
         }
     }
@@ -82,7 +113,12 @@ impl<const D: usize> Forces<D> {
     /// How many bytes of bits the bonds of each owned point take.
     pub fn intact_lengths(&self, owned: usize) -> Vec<u32> {
         let mut lengths = vec![0; owned];
-        for (point, row) in self.bonds.iter().flat_map(|bonds| bonds.list.intact_rows()) {
+        for (point, row) in self
+            .passes
+            .bonds
+            .iter()
+            .flat_map(|bonds| bonds.list.intact_rows())
+        {
             lengths[point] += row.len() as u32;
         }
         lengths
@@ -92,7 +128,12 @@ impl<const D: usize> Forces<D> {
     pub fn intact(&self, lengths: &[u32]) -> Vec<u8> {
         let (mut next, total) = starts(lengths);
         let mut bytes = vec![0; total];
-        for (point, row) in self.bonds.iter().flat_map(|bonds| bonds.list.intact_rows()) {
+        for (point, row) in self
+            .passes
+            .bonds
+            .iter()
+            .flat_map(|bonds| bonds.list.intact_rows())
+        {
             bytes[next[point]..next[point] + row.len()].copy_from_slice(row);
             next[point] += row.len();
         }
@@ -102,7 +143,7 @@ impl<const D: usize> Forces<D> {
     /// Puts back what [`Self::intact`] gave.
     pub fn set_intact(&mut self, lengths: &[u32], bytes: &[u8]) {
         let (mut next, _) = starts(lengths);
-        for bonds in &mut self.bonds {
+        for bonds in &mut self.passes.bonds {
             for (point, row) in bonds.list.intact_rows_mut() {
                 row.copy_from_slice(&bytes[next[point]..next[point] + row.len()]);
                 next[point] += row.len();
@@ -123,7 +164,7 @@ impl<const D: usize> Forces<D> {
         self.halo.pack(&[protected]);
         self.halo.exchange(comm, &mut || {});
         self.halo.unpack(&mut [protected]);
-        for bonds in &mut self.bonds {
+        for bonds in &mut self.passes.bonds {
             bonds.list.protect(|point| protected[point] == 1.0);
         }
     }
@@ -137,15 +178,8 @@ impl<const D: usize> Forces<D> {
         responses: &mut [Response<D>],
         times: &mut ForceTimes,
     ) {
-        let Self {
-            bonds,
-            halo,
-            damage,
-            thresholds,
-        } = self;
+        let Self { passes, halo } = self;
         let owned = responses.len();
-        let interior = 0..model.interior;
-        let border = model.interior..owned;
         let start = Instant::now();
         let mut in_bonds = Duration::ZERO;
         let mut timed = |work: &mut dyn FnMut()| {
@@ -156,74 +190,129 @@ impl<const D: usize> Forces<D> {
         for response in responses.iter_mut() {
             response.force = [0.0; D];
         }
-
-        halo.pack(&components(displacement));
-        if thresholds.is_empty() {
+        let mut before = None;
+        for pass in passes.order.clone() {
+            match before.and_then(|pass| passes.found(pass)) {
+                None => halo.pack(&components(displacement)),
+                Some(found) => halo.pack(&[found]),
+            }
+            passes.start(pass, owned);
             halo.exchange(comm, &mut || {
                 timed(&mut || {
                     let geometry = geometry(model, displacement);
-                    sum_forces(bonds, geometry, &[], interior.clone(), responses);
+                    passes.run(pass, geometry, 0..model.interior, responses);
                 });
             });
-            halo.unpack(&mut components_mut(displacement));
-        } else {
-            let smallest = &mut thresholds[..owned];
-            smallest.fill(f64::INFINITY);
-            halo.exchange(comm, &mut || {
-                timed(&mut || {
-                    let geometry = geometry(model, displacement);
-                    smallest_stretches(bonds, geometry, interior.clone(), smallest);
-                });
-            });
-            halo.unpack(&mut components_mut(displacement));
-            let geometry = geometry(model, displacement);
+            match before.and_then(|pass| passes.found(pass)) {
+                None => halo.unpack(&mut components_mut(displacement)),
+                Some(found) => halo.unpack(&mut [found]),
+            }
             timed(&mut || {
-                smallest_stretches(bonds, geometry, border.clone(), smallest);
-                for (value, block) in smallest.iter_mut().zip(&model.block) {
-                    *value = match damage[usize::from(*block)] {
-                        // A point without intact bonds has no smallest stretch.
-                        Some(law) if value.is_infinite() => law.critical,
-                        Some(law) => law.threshold(*value),
-                        None => f64::INFINITY,
-                    };
-                }
+                let geometry = geometry(model, displacement);
+                passes.run(pass, geometry, model.interior..owned, responses);
+                passes.finish(pass, model, responses);
             });
-            halo.pack(&[&thresholds[..]]);
-            halo.exchange(comm, &mut || {
-                timed(&mut || sum_forces(bonds, geometry, thresholds, interior.clone(), responses));
-            });
-            halo.unpack(&mut [&mut thresholds[..]]);
+            before = Some(pass);
         }
-        let geometry = geometry(model, displacement);
-        timed(&mut || sum_forces(bonds, geometry, thresholds, border.clone(), responses));
         times.bonds += in_bonds;
         times.halo += start.elapsed() - in_bonds;
     }
 
     /// What the intact bonds of each owned point hold, at displacements whose ghosts are up to date.
     pub fn stored(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<Stored> {
-        let mut stored = vec![Stored::default(); model.owned()];
         let geometry = geometry(model, displacement);
-        for Bonds { list, law, .. } in &mut self.bonds {
-            let ListLaw::Pmb(law) = *law;
-            let kernel = Energy { geometry, law };
-            let rows = 0..list.len();
-            sweep(list, rows, &mut stored, &kernel);
+        let mut stored = self.sum(
+            |bonds, shared, stored| {
+                with_laws!(bonds.law, laws => {
+                    let bonded = Bonded { geometry, shared, laws };
+                    sweep_all(&mut bonds.list, stored, &Energy { bonded });
+                });
+            },
+            model,
+        );
+        for (point, stored) in stored.iter_mut().enumerate() {
+            let constant = self.passes.constants.get(point).copied().unwrap_or(0.0);
+            let law = self.passes.blocks[usize::from(model.block[point])].law;
+            stored.energy += law.point_energy(stored.state_sum, constant);
         }
         stored
     }
 
-    /// D = Σ V C n⊗n of each owned point (N/m⁴): xx, yy, zz, xy, xz, yz.
-    pub fn stiffness(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<[f64; 6]> {
-        let mut stiffness = vec![[0.0; 6]; model.owned()];
-        let geometry = geometry(model, displacement);
-        for Bonds { list, law, .. } in &mut self.bonds {
-            let ListLaw::Pmb(law) = *law;
-            let kernel = Stiffness { geometry, law };
-            let rows = 0..list.len();
-            sweep(list, rows, &mut stiffness, &kernel);
+    /// Finds the states of the owned points at displacements whose ghosts are up to date, without
+    /// breaking bonds.
+    pub fn refresh_states(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) {
+        let stored = self.stored(model, displacement);
+        let Passes {
+            states,
+            constants,
+            blocks,
+            ..
+        } = &mut self.passes;
+        for (point, state) in states.iter_mut().enumerate().take(stored.len()) {
+            let law = blocks[usize::from(model.block[point])].law;
+            *state = law.state(stored[point].state_sum, constants[point]);
         }
-        stiffness
+    }
+
+    /// D = Σ V C n⊗n of each owned point (N/m⁴): xx, yy, zz, xy, yz, xz.
+    pub fn stiffness(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<[f64; 6]> {
+        let geometry = geometry(model, displacement);
+        self.sum(
+            |bonds, shared, stiffness| {
+                with_laws!(bonds.law, laws => {
+                    let bonded = Bonded { geometry, shared, laws };
+                    sweep_all(&mut bonds.list, stiffness, &Stiffness { bonded });
+                });
+            },
+            model,
+        )
+    }
+
+    /// Stress of each owned point (Pa): xx, yy, zz, xy, yz, xz; at the displacements of the last
+    /// [evaluation](Self::evaluate).
+    pub fn stress(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<[f64; 6]> {
+        let geometry = geometry(model, displacement);
+        self.sum(
+            |bonds, shared, stress| {
+                with_laws!(bonds.law, laws => {
+                    let bonded = Bonded { geometry, shared, laws };
+                    sweep_all(&mut bonds.list, stress, &Stress { bonded });
+                });
+            },
+            model,
+        )
+    }
+
+    /// What gives the dilatation of each owned point, at displacements whose ghosts are up to date.
+    pub fn expansion(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<Expansion> {
+        let geometry = geometry(model, displacement);
+        self.sum(
+            |bonds, _, expansion| {
+                let linear = matches!(bonds.law, super::laws::ListLaw::LinearMicroelastic(_));
+                sweep_all(&mut bonds.list, expansion, &Dilatation { geometry, linear });
+            },
+            model,
+        )
+    }
+
+    /// Sums over all bonds of the owned points.
+    fn sum<T: Default + Clone>(
+        &mut self,
+        sweep: impl Fn(&mut Bonds, Shared<'_>, &mut [T]),
+        model: &Model<D>,
+    ) -> Vec<T> {
+        let mut sums = vec![T::default(); model.owned()];
+        let Passes {
+            bonds,
+            constants,
+            states,
+            ..
+        } = &mut self.passes;
+        let shared = Shared { constants, states };
+        for bonds in bonds {
+            sweep(bonds, shared, &mut sums);
+        }
+        sums
     }
 }
 
@@ -256,66 +345,5 @@ fn geometry<'a, const D: usize>(
         reference: components(&model.reference),
         displacement: components(displacement),
         volume: &model.volume,
-    }
-}
-
-/// The rows of a list whose points have local indices in a range.
-fn rows_of(bonds: &Bonds, points: &Range<usize>) -> Range<usize> {
-    bonds.list.rows_below(points.start)..bonds.list.rows_below(points.end)
-}
-
-fn sum_forces<const D: usize>(
-    all: &mut [Bonds],
-    geometry: Geometry<'_, D>,
-    thresholds: &[f64],
-    points: Range<usize>,
-    responses: &mut [Response<D>],
-) {
-    for bonds in all {
-        let rows = rows_of(bonds, &points);
-        let ListLaw::Pmb(law) = bonds.law;
-        let list = &mut bonds.list;
-        match bonds.failure {
-            ListFailure::Never => {
-                let failure = NoFailure;
-                let kernel = Force {
-                    geometry,
-                    law,
-                    failure,
-                };
-                sweep(list, rows, responses, &kernel);
-            }
-            ListFailure::Uniform(critical) => {
-                let failure = Uniform(critical);
-                let kernel = Force {
-                    geometry,
-                    law,
-                    failure,
-                };
-                sweep(list, rows, responses, &kernel);
-            }
-            ListFailure::PerPoint => {
-                let failure = PerPoint(thresholds);
-                let kernel = Force {
-                    geometry,
-                    law,
-                    failure,
-                };
-                sweep(list, rows, responses, &kernel);
-            }
-        }
-    }
-}
-
-fn smallest_stretches<const D: usize>(
-    all: &mut [Bonds],
-    geometry: Geometry<'_, D>,
-    points: Range<usize>,
-    smallest: &mut [f64],
-) {
-    for bonds in all {
-        let rows = rows_of(bonds, &points);
-        let kernel = SmallestStretch { geometry };
-        sweep(&mut bonds.list, rows, smallest, &kernel);
     }
 }

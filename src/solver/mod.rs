@@ -1,10 +1,17 @@
 //! The solver: state, bond loops, time integration, conditions and what is observed.
 
+pub mod assign;
 pub mod conditions;
+pub mod damping;
+mod failure;
 pub mod forces;
+mod geometry;
 mod kernels;
+pub mod laws;
+mod measures;
 pub mod model;
 pub mod observe;
+mod passes;
 mod saved;
 pub mod schedule;
 pub mod simulation;

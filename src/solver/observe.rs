@@ -11,6 +11,7 @@ use crate::points::distance_squared;
 use super::Simulation;
 use super::conditions::{members, not_empty};
 use super::kernels::Stored;
+use super::measures::Expansion;
 
 /// Points summed by one task.
 const CHUNK: usize = 4096;
@@ -41,9 +42,15 @@ impl Snapshot {
         }
     }
 
-    /// A field over the owned points, row-major with [`Field::components`] entries a point.
-    pub fn field<const D: usize>(&self, simulation: &Simulation<'_, D>, field: Field) -> Vec<f64> {
+    /// A field over the owned points, row-major with [`Field::components`] entries a point; of the
+    /// moment of the snapshot.
+    pub fn field<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'_, D>,
+        field: Field,
+    ) -> Vec<f64> {
         let (model, state) = (&simulation.model, &simulation.state);
+        let displacement = &state.displacement;
         let count = model.owned();
         match field {
             Field::Displacement => rows(count, |d, k| state.displacement[d][k], D),
@@ -54,7 +61,11 @@ impl Snapshot {
                 rows(count, acceleration, D)
             }
             Field::ForceDensity => {
-                let mut values = rows(count, |d, k| state.responses[k].force[d], D);
+                let damping = |d: usize, k: usize| {
+                    model.damping_of(k) * model.density_of(k) * state.velocity[d][k]
+                };
+                let internal = |d: usize, k: usize| state.responses[k].force[d] + damping(d, k);
+                let mut values = rows(count, internal, D);
                 for (point, component, reaction) in simulation.conditions.reactions() {
                     values[3 * point + component] -= reaction;
                 }
@@ -71,6 +82,23 @@ impl Snapshot {
                 let neighbours = |stored: &Stored| f64::from(stored.neighbours);
                 self.stored.iter().map(neighbours).collect()
             }
+            Field::Dilatation => {
+                let expansion = simulation.forces.expansion(model, displacement);
+                let dilatation = |sums: &Expansion| match sums.weighted_volume {
+                    0.0 => 0.0,
+                    volume => D as f64 * sums.growth / volume,
+                };
+                expansion.iter().map(dilatation).collect()
+            }
+            Field::WeightedVolume => {
+                let expansion = simulation.forces.expansion(model, displacement);
+                expansion.iter().map(|sums| sums.weighted_volume).collect()
+            }
+            Field::Stress => {
+                let stress = simulation.forces.stress(model, displacement);
+                stress.into_iter().flatten().collect()
+            }
+            Field::Rank => vec![simulation.comm.rank() as f64; count],
         }
     }
 }
@@ -112,7 +140,9 @@ pub struct Energies {
     pub fracture: f64,
     /// Work done by loads and supports.
     pub work: f64,
-    /// Kinetic + strain + fracture − work, less its value at the start: 0 for an exact integrator.
+    /// Taken by viscous damping.
+    pub dissipated: f64,
+    /// Kinetic + strain + fracture + dissipated − work, less its value at the start: 0 for an exact integrator.
     pub error: f64,
 }
 
@@ -141,6 +171,7 @@ impl HistoryObserver {
             ("strain_energy", "J"),
             ("fracture_energy", "J"),
             ("external_work", "J"),
+            ("dissipated_energy", "J"),
             ("energy_error", "J"),
             ("broken_bonds", "1"),
             ("cracked_points", "1"),
@@ -198,12 +229,17 @@ impl HistoryObserver {
         let comm = simulation.comm;
         let mut sums = point_sums(simulation, snapshot);
         sums.push(simulation.conditions.work());
+        let mut dissipated = ExactSum::default();
+        for energy in &simulation.damping.dissipated {
+            dissipated.add(*energy);
+        }
+        sums.push(dissipated);
         for members in &self.reactions {
             sums.extend(simulation.conditions.reaction(&simulation.model, members));
         }
         let sums = reduce(comm, &mut sums);
         let (own, rest) = sums.split_at(3 + D);
-        let (work, reactions) = (rest[0], &rest[1..]);
+        let (work, dissipated, reactions) = (rest[0], rest[1], &rest[2..]);
 
         let cracked = Cracked::new(simulation, snapshot);
         let intact: u64 = snapshot
@@ -216,13 +252,14 @@ impl HistoryObserver {
         let [intact, cracked_points] = counts;
         let (lower, upper) = cracked.extent(comm);
 
-        let energy = own[0] + own[1] + own[2] - work;
+        let energy = own[0] + own[1] + own[2] + dissipated - work;
         let (first_energy, first_intact) = *self.start.get_or_insert((energy, intact));
         let energies = Energies {
             kinetic: own[0],
             strain: own[1],
             fracture: own[2],
             work,
+            dissipated,
             error: energy - first_energy,
         };
         let broken = (first_intact - intact) / 2;
@@ -233,6 +270,7 @@ impl HistoryObserver {
             energies.strain,
             energies.fracture,
             energies.work,
+            energies.dissipated,
             energies.error,
             broken as f64,
             cracked_points as f64,

@@ -11,8 +11,8 @@ use super::Simulation;
 /// The state of the points of this rank's block of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Saved {
-    /// Numbers a point: displacement, velocity and force density by component, energy set free, and
-    /// with conditions work and reactions.
+    /// Numbers a point: displacement, velocity and force density by component, energy set free,
+    /// with damping the energy it took, and with conditions work and reactions.
     pub width: usize,
     /// Row-major, `width` a point.
     pub values: Vec<f64>,
@@ -26,7 +26,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Numbers that are saved a point.
     pub fn saved_width(&self) -> usize {
         let conditions = if self.conditions.are_none() { 0 } else { 1 + D };
-        3 * D + 1 + conditions
+        3 * D + 1 + usize::from(!self.damping.dissipated.is_empty()) + conditions
     }
 
     /// The present state, dealt out by id. Collective.
@@ -40,11 +40,12 @@ impl<const D: usize> Simulation<'_, D> {
             values.extend(self.state.velocity.iter().map(|field| field[point]));
             values.extend(response.force);
             values.push(response.set_free);
+            values.extend(self.damping.dissipated.get(point));
             values.extend(
                 conditions
                     .iter()
                     .skip((1 + D) * point)
-                    .take(width - 3 * D - 1),
+                    .take(if self.conditions.are_none() { 0 } else { 1 + D }),
             );
         }
         let lengths = self.forces.intact_lengths(owned);
@@ -92,10 +93,14 @@ impl<const D: usize> Simulation<'_, D> {
                 self.state.responses[point].force[d] = motion[2 * D + d];
             }
             self.state.responses[point].set_free = rest[0];
-            conditions.extend_from_slice(&rest[1..]);
+            let rest = self.damping.restore(point, &rest[1..]);
+            conditions.extend_from_slice(rest);
         }
         self.forces
             .update_ghosts(self.comm, &mut self.state.displacement);
+        self.damping.after_moving(&self.model, &self.state, 0.0);
+        self.forces
+            .refresh_states(&self.model, &self.state.displacement);
         self.number = number;
         self.step = step;
         self.last = super::simulation::steps_to(self.plan.time.end, step) as u64;

@@ -8,9 +8,11 @@ use crate::error::{Error, Result};
 use crate::partition::{Domain, distribute};
 use crate::{families, points};
 
+use super::assign::{assign, block_laws, cutoffs};
 use super::conditions::{Conditions, apply_initials, members};
+use super::damping::Damping;
 use super::forces::{ForceTimes, Forces};
-use super::model::{Model, assign, block_damage};
+use super::model::Model;
 use super::stable_step::stable_step;
 use super::state::State;
 use super::verlet;
@@ -29,6 +31,8 @@ pub struct Simulation<'a, const D: usize> {
     pub forces: Forces<D>,
     /// Loads and supports.
     pub conditions: Conditions<D>,
+    /// What viscous damping takes.
+    pub damping: Damping,
     /// Volume of each owned point's whole family, broken bonds included, m³.
     pub family_volume: Vec<f64>,
     /// The stable step, s.
@@ -72,18 +76,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
     pub fn new(plan: &'a Plan, comm: &'a dyn Communicator) -> Result<Self> {
         let start = Instant::now();
         let (pieces, total) = points::generate(plan, comm)?;
-        let mut domain = distribute(comm, pieces, total, families::cutoff(plan.horizon))?;
-        let lists = families::search(&domain, plan.bodies.len(), plan.horizon);
+        let cutoffs = cutoffs(plan);
+        let longest = cutoffs.iter().copied().fold(0.0, f64::max);
+        let mut domain = distribute(comm, pieces, total, longest)?;
+        let lists = families::search(&domain, plan.bodies.len(), &cutoffs);
         let lists = agree(comm, lists)?;
         let model = Model::new(plan, &domain);
-        let damage: Vec<_> = plan
-            .bodies
-            .iter()
-            .map(|body| block_damage(plan, body))
-            .collect();
+        let bodies = plan.bodies.iter();
+        let blocks: Vec<_> = bodies.map(|body| block_laws(plan, body)).collect();
         let halo = std::mem::take(&mut domain.halo);
-        let bonds = assign(plan, lists);
-        let mut forces = Forces::new(bonds, halo, damage, domain.points.len());
+        let bonds = assign(plan, &domain, &blocks, lists);
+        let mut forces = Forces::new(comm, &model, bonds, halo, blocks);
         let mut state = State::new(&model);
 
         let stiffness = forces.stiffness(&model, &state.displacement);
@@ -98,6 +101,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         apply_initials(plan, comm, &model, &mut state)?;
         let conditions = Conditions::new(plan, comm, &model)?;
         let mut simulation = Self {
+            damping: Damping::new(&model),
             plan,
             comm,
             model,
@@ -114,6 +118,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         };
         simulation.conditions.place(&mut simulation.state, 0.0, 0.0);
         simulation.act(None);
+        simulation
+            .damping
+            .after_moving(&simulation.model, &simulation.state, 0.0);
         simulation.bad = simulation.first_bad();
         simulation.times = Times {
             set_up: start.elapsed(),
@@ -139,6 +146,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.act(Some(self.step));
         let start = Instant::now();
         self.conditions.after_moving(&self.model, &self.state);
+        self.damping
+            .after_moving(&self.model, &self.state, self.step);
         self.times.motion += start.elapsed();
     }
 
@@ -159,6 +168,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             None => true,
         };
         let (model, state) = (&self.model, &mut self.state);
+        self.damping.add(model, state);
         finite &= self.conditions.guide(model, state, time, self.step);
         if !finite && self.bad.is_none() {
             self.bad = self.first_bad();

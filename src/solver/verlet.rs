@@ -34,8 +34,8 @@ pub fn kick_and_drift<const D: usize>(model: &Model<D>, state: &mut State<D>, st
     }
 }
 
-/// Half a kick with the forces at the new place. Returns whether all velocities are still finite.
-/// `step` in s.
+/// Half a kick with the forces at the new place, and with the damping at the velocity that comes out:
+/// u̇ ← (u̇ + ½ Δt ü)/(1 + ½ r Δt). Returns whether all velocities are still finite. `step` in s.
 pub fn kick<const D: usize>(model: &Model<D>, state: &mut State<D>, step: f64) -> bool {
     let responses = &state.responses;
     let mut finite = true;
@@ -52,6 +52,10 @@ pub fn kick<const D: usize>(model: &Model<D>, state: &mut State<D>, step: f64) -
                 for k in 0..velocity.len() {
                     let density = model.density[usize::from(block[k])];
                     velocity[k] += 0.5 * step * (responses[k].force[d] / density);
+                    let damping = model.damping[usize::from(block[k])];
+                    if damping > 0.0 {
+                        velocity[k] /= 1.0 + 0.5 * damping * step;
+                    }
                     finite &= velocity[k].is_finite();
                 }
                 finite

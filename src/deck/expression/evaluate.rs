@@ -273,7 +273,7 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// The code's value with the variables in the order of [`Variable`], where `stack_size` is what
+/// The code's value with the variables x, y, z, t, where `stack_size` is what
 /// the function of that name says.
 pub(super) fn evaluate(code: &[Instruction], stack_size: usize, variables: [f64; 4]) -> f64 {
     match code {
@@ -294,7 +294,7 @@ fn run<const SIZE: usize>(code: &[Instruction], variables: [f64; 4]) -> f64 {
                 size += 1;
             }
             Instruction::Variable(variable) => {
-                stack[size] = variables[variable as usize];
+                stack[size] = variables[variable.slot()];
                 size += 1;
             }
             Instruction::Unary(operation) => {

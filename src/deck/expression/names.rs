@@ -84,7 +84,10 @@ impl Scope<'_> {
 
     /// What pushes the value of that name, or the message about it.
     pub(super) fn value(&self, name: &str) -> Result<Instruction, String> {
-        if let Some(variable) = Variable::from_name(name) {
+        // `r` is a variable only where it can be used: it is a likely name of a parameter.
+        let reserved =
+            |variable: &Variable| *variable != Variable::R || self.variables.contains(variable);
+        if let Some(variable) = Variable::from_name(name).filter(reserved) {
             return if self.variables.contains(&variable) {
                 Ok(Instruction::Variable(variable))
             } else {

@@ -1,0 +1,181 @@
+//! The share of a lattice cell that counts in a family: Ṽ/V.
+//!
+//! `linear` is the taper of EMU, Peridigm and LAMMPS (Parks et al. 2008); `exact` is the share of the
+//! cell that lies within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl & Schweitzer 2016, eq. 2): closed
+//! form in 1-D and 2-D, quadrature over slices in 3-D.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+use crate::deck::plan::VolumeCorrection;
+
+use super::search::cutoff;
+
+/// Slices of a cell in 3-D.
+const SLICES: u32 = 256;
+
+/// Offsets are told apart to this share of the cell's edge.
+const RESOLUTION: f64 = 1e-6;
+
+/// The share of the cells of one edge in the families of one horizon.
+pub struct CellShare {
+    correction: VolumeCorrection,
+    horizon: f64,
+    edge: f64,
+    dimension: usize,
+    known: RefCell<HashMap<[i64; 3], f64>>,
+}
+
+impl CellShare {
+    /// For families of a horizon (m) and neighbours in cells of an edge (m).
+    pub fn new(correction: VolumeCorrection, horizon: f64, edge: f64, dimension: usize) -> Self {
+        Self {
+            correction,
+            horizon,
+            edge,
+            dimension,
+            known: RefCell::default(),
+        }
+    }
+
+    /// The longest bond (m) that counts. A cell's farthest overlap with the ball is at a corner.
+    pub fn cutoff(&self) -> f64 {
+        let half = 0.5 * self.edge;
+        match self.correction {
+            VolumeCorrection::None => cutoff(self.horizon),
+            VolumeCorrection::Linear => self.horizon + half,
+            VolumeCorrection::Exact => self.horizon + half * (self.dimension as f64).sqrt(),
+        }
+    }
+
+    /// The share of a cell whose centre is at an offset ξ (m); the same for ξ and −ξ.
+    pub fn at(&self, offset: [f64; 3]) -> f64 {
+        let squared = offset.iter().map(|x| x * x).sum::<f64>();
+        match self.correction {
+            VolumeCorrection::None => f64::from(squared <= cutoff(self.horizon).powi(2)),
+            VolumeCorrection::Linear => {
+                ((self.horizon - squared.sqrt()) / self.edge + 0.5).clamp(0.0, 1.0)
+            }
+            VolumeCorrection::Exact => {
+                // Cells and balls look the same along all axes, so few shares are different.
+                let mut key = offset.map(|x| (x.abs() / self.edge / RESOLUTION).round() as i64);
+                key.sort_unstable_by(|a, b| b.cmp(a));
+                let share = || {
+                    let radius = self.horizon / self.edge;
+                    overlap(key.map(|k| k as f64 * RESOLUTION), radius, self.dimension)
+                };
+                *self.known.borrow_mut().entry(key).or_insert_with(share)
+            }
+        }
+    }
+}
+
+/// The part of a unit cell centred at `centre` within the ball of a radius around the origin.
+fn overlap(centre: [f64; 3], radius: f64, dimension: usize) -> f64 {
+    let range = |k: usize| [centre[k] - 0.5, centre[k] + 0.5];
+    match dimension {
+        1 => (radius.min(range(0)[1]) - (-radius).max(range(0)[0])).clamp(0.0, 1.0),
+        2 => rectangle_in_disc(range(0), range(1), radius),
+        _ => {
+            let [low, high] = range(2);
+            let (low, high) = (low.max(-radius), high.min(radius));
+            let thickness = (high - low).max(0.0) / f64::from(SLICES);
+            let slice = |k: u32| {
+                let z = low + (f64::from(k) + 0.5) * thickness;
+                let radius = (radius * radius - z * z).max(0.0).sqrt();
+                rectangle_in_disc(range(0), range(1), radius)
+            };
+            (0..SLICES).map(slice).sum::<f64>() * thickness
+        }
+    }
+}
+
+/// The area of a rectangle within the disc of a radius around the origin.
+fn rectangle_in_disc(x: [f64; 2], y: [f64; 2], radius: f64) -> f64 {
+    let corner =
+        |x: f64, y: f64| x.signum() * y.signum() * quadrant_in_disc(x.abs(), y.abs(), radius);
+    let area = corner(x[1], y[1]) - corner(x[0], y[1]) - corner(x[1], y[0]) + corner(x[0], y[0]);
+    area.max(0.0)
+}
+
+/// The area of [0, x] × [0, y] within the disc.
+fn quadrant_in_disc(x: f64, y: f64, radius: f64) -> f64 {
+    if x * x + y * y <= radius * radius {
+        return x * y;
+    }
+    let (x, y) = (x.min(radius), y.min(radius));
+    if radius == 0.0 {
+        return 0.0;
+    }
+    // Up to `a` the rectangle's upper edge is the lower one, from there on the circle.
+    let a = (radius * radius - y * y).max(0.0).sqrt().min(x);
+    let under_circle = |u: f64| {
+        let height = (radius * radius - u * u).max(0.0).sqrt();
+        0.5 * (u * height + radius * radius * (u / radius).min(1.0).asin())
+    };
+    a * y + under_circle(x) - under_circle(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    /// The sum over all offsets of a lattice, the own cell included.
+    fn whole(correction: VolumeCorrection, dimension: usize, horizon: f64) -> f64 {
+        let share = CellShare::new(correction, horizon, 1.0, dimension);
+        let reach = horizon.ceil() as i32 + 1;
+        let range = |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
+        let mut sum = 0.0;
+        for z in range(2) {
+            for y in range(1) {
+                for x in range(0) {
+                    sum += share.at([x, y, z].map(f64::from));
+                }
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn exact_shares_fill_the_ball() {
+        for horizon in [1.3, 2.0, 3.0, 3.7] {
+            let exact = |dimension| whole(VolumeCorrection::Exact, dimension, horizon);
+            assert!((exact(1) / (2.0 * horizon) - 1.0).abs() < 1e-12);
+            assert!((exact(2) / (PI * horizon.powi(2)) - 1.0).abs() < 1e-12);
+            let ball = 4.0 / 3.0 * PI * horizon.powi(3);
+            assert!(
+                (exact(3) / ball - 1.0).abs() < 1e-5,
+                "{}",
+                exact(3) / ball - 1.0
+            );
+        }
+    }
+
+    #[test]
+    fn an_exact_share_by_counting() {
+        let share = CellShare::new(VolumeCorrection::Exact, 0.003, 0.001, 3);
+        let cells = 100;
+        let at = |k: i32| (f64::from(k) + 0.5) / f64::from(cells) - 0.5;
+        let mut within = 0;
+        for i in 0..cells {
+            for j in 0..cells {
+                for k in 0..cells {
+                    let (x, y, z) = (2.0 + at(i), 2.0 + at(j), 1.0 + at(k));
+                    within += i32::from(x * x + y * y + z * z <= 9.0);
+                }
+            }
+        }
+        let counted = f64::from(within) / f64::from(cells).powi(3);
+        let found = share.at([0.002, -0.001, -0.002]);
+        assert!((found - counted).abs() < 1e-3, "{found} {counted}");
+    }
+
+    #[test]
+    fn a_cell_on_the_horizon_counts_half_with_the_linear_taper() {
+        let share = CellShare::new(VolumeCorrection::Linear, 3.0, 1.0, 2);
+        assert_eq!(share.at([3.0, 0.0, 0.0]), 0.5);
+        assert_eq!(share.at([0.0, -2.0, 0.0]), 1.0);
+        assert_eq!(share.at([2.0, 3.0, 0.0]), 0.0);
+    }
+}
