@@ -81,7 +81,7 @@ fn has_checkpoint(out: &Path) -> bool {
 fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
     let mut child = command
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     std::thread::sleep(delay);
@@ -95,7 +95,9 @@ fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
                 .unwrap()
                 .success()
     });
-    let ended_well = wait(child).status.success();
+    let output = wait(child);
+    let ended_well = output.status.success();
+    assert!(killed || ended_well, "{}", text(&output));
     killed && !ended_well
 }
 

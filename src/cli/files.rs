@@ -2,11 +2,15 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use fissure::error::{Error, Result};
 use fissure::output::checkpoint::Checkpoints;
 
 use super::file_error;
+
+/// How long a run waits for another one that writes to its folder.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Where a run writes to.
 pub struct Files {
@@ -60,13 +64,22 @@ impl Files {
             .map_err(|error| file_error(&self.folder, "create the folder", &error))?;
         let path = self.folder.join(".lock");
         let file = fs::File::create(&path).map_err(|error| file_error(&path, "create", &error))?;
-        match file.try_lock() {
-            Err(fs::TryLockError::WouldBlock) => Err(Error::input(format!(
-                "another run is writing to {}; --output DIR writes elsewhere",
-                self.folder.display()
-            ))),
-            // Some network file systems have no locks.
-            Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(file),
+        let begin = Instant::now();
+        loop {
+            match file.try_lock() {
+                // The ranks of a run that was killed take a moment to end.
+                Err(fs::TryLockError::WouldBlock) if begin.elapsed() < PATIENCE => {
+                    std::thread::sleep(Duration::from_millis(100));
+                }
+                Err(fs::TryLockError::WouldBlock) => {
+                    return Err(Error::input(format!(
+                        "another run is writing to {}; --output DIR writes elsewhere",
+                        self.folder.display()
+                    )));
+                }
+                // Some network file systems have no locks.
+                Ok(()) | Err(fs::TryLockError::Error(_)) => return Ok(file),
+            }
         }
     }
 
