@@ -9,15 +9,14 @@ fn number(names: &[&str]) -> Option<usize> {
         .find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
-/// This process's rank as the launcher tells it; 0 without a launcher.
-pub fn rank_from_environment() -> usize {
+/// This process's rank as the launcher tells it before MPI has started; `None` without a launcher.
+pub fn rank_from_environment() -> Option<usize> {
     number(&[
         "OMPI_COMM_WORLD_RANK",
         "PMIX_RANK",
         "PMI_RANK",
         "SLURM_PROCID",
     ])
-    .unwrap_or(0)
 }
 
 /// The number of ranks on this host as the launcher tells it.

@@ -37,6 +37,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
+use fissure::comm::mpi::World;
 use fissure::error::{Error, Result};
 
 /// Peridynamics for batch jobs: cracks that start, run and branch by themselves.
@@ -234,10 +235,14 @@ enum Verbosity {
 
 /// Parses the command line, runs the command and turns its outcome into an exit code.
 pub fn main() -> ExitCode {
-    let speaks = launch::rank_from_environment() == 0;
+    let rank = launch::rank_from_environment();
+    let speaks = rank.unwrap_or(0) == 0;
     let line = match CommandLine::try_parse() {
         Ok(line) => line,
         Err(error) => {
+            // A rank that fails first has the launcher kill rank 0 before it has spoken; within
+            // MPI they leave together.
+            let _together = (error.exit_code() != 0 && rank.is_some()).then(World::start);
             if speaks {
                 // Nothing can be done about an output that is closed.
                 let _ = error.print();
