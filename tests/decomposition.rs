@@ -193,6 +193,12 @@ fn a_plate_of_two_materials() {
 }
 
 #[test]
+fn a_plate_of_two_materials_with_listed_bonds() {
+    let deck = PLATE.replace("[grid]", "[grid]\nfamily = 'list'");
+    same_everywhere("listed", &deck, true);
+}
+
+#[test]
 fn blocks_of_different_laws() {
     same_everywhere("laws", LAWS, true);
 }

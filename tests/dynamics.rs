@@ -261,7 +261,7 @@ fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
         let (usual, growth) =
             simulate::<D, _>(&rattled(dimension, 0.98 * stable), |mut simulation| {
                 let displacement = &simulation.state.displacement;
-                let stiffness = simulation.forces.stiffness(&simulation.model, displacement);
+                let stiffness = simulation.forces.stiffness(&simulation.model);
                 let trace = |entries: &[f64; 6]| entries[0] + entries[1] + entries[2];
                 let stiffest = stiffness.iter().map(trace).fold(0.0, f64::max);
                 let mut observer = HistoryObserver::new(&simulation).unwrap();

@@ -42,6 +42,15 @@ impl Halo {
         }
     }
 
+    /// Follows the owned points to another order; `place` has the new local index of each.
+    pub fn renumber(&mut self, place: &[u32]) {
+        for neighbour in &mut self.neighbours {
+            for index in &mut neighbour.send {
+                *index = place[*index as usize];
+            }
+        }
+    }
+
     /// Copies the values that other ranks need into the messages: `components` arrays over the local
     /// points, each sent for every point.
     pub fn pack(&mut self, components: &[&[f64]]) {

@@ -112,6 +112,26 @@ pub struct Grid {
     /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
+    /// How bonds are kept: `"lattice"`, one bit each, for points at the centres of lattice cells,
+    /// `"list"` for any, or `"auto"`, a lattice where possible. Results differ by rounding only.
+    #[serde(default = "automatic")]
+    pub family: Spanned<Family>,
+}
+
+fn automatic() -> Spanned<Family> {
+    Spanned::new(0..0, Family::Auto)
+}
+
+/// How bonds are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// As lattices where bodies have them, else in lists.
+    Auto,
+    /// A list for each point.
+    List,
+    /// Fixed offsets for all points.
+    Lattice,
 }
 
 fn no_correction() -> Spanned<VolumeCorrection> {

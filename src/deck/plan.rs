@@ -26,6 +26,8 @@ pub struct Plan {
     pub volume_correction: VolumeCorrection,
     /// Where the points of a lattice cell lie.
     pub quadrature: Quadrature,
+    /// How bonds are kept.
+    pub family: FamilyRule,
     /// The bonds between blocks.
     pub interface: InterfaceRule,
     /// Bodies in the order of the deck; the index is the block number.
@@ -146,6 +148,15 @@ pub enum Quadrature {
     Midpoint,
     /// Two by direction, at ±√3/3 of half the edge.
     Gauss,
+}
+
+/// How bonds are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FamilyRule {
+    /// As bits for bodies on a lattice, in lists for others.
+    Auto,
+    /// In lists.
+    List,
 }
 
 /// What constants the bonds between blocks have.

@@ -1,6 +1,6 @@
 //! From the grammar to the plan: every value checked, every name resolved.
 
-use super::grammar::{Deck, DimensionName, Quadrature, Rule, VolumeCorrection};
+use super::grammar::{Deck, DimensionName, Family, Quadrature, Rule, VolumeCorrection};
 use super::number::{Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
@@ -27,6 +27,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     })?;
     let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(&scope, deck, &bodies)?;
+    let family = family(&scope, deck, &bodies)?;
     let interface = interface(&scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| {
         shapes::crack(&scope, name, table)
@@ -42,6 +43,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
             Quadrature::Midpoint => plan::Quadrature::Midpoint,
             Quadrature::Gauss => plan::Quadrature::Gauss,
         },
+        family,
         interface,
         bodies,
         cracks: cracks.into_values().collect(),
@@ -117,19 +119,42 @@ fn volume_correction(
         VolumeCorrection::Linear => plan::VolumeCorrection::Linear,
         VolumeCorrection::Exact => plan::VolumeCorrection::Exact,
     };
-    let from_file = |body: &&plan::Body| matches!(body.points, plan::PointSource::File { .. });
-    let reason = match bodies.iter().find(from_file) {
-        Some(body) => format!("and [body.{}] has its points from a file", body.name),
-        None if grid.quadrature == Quadrature::Gauss => {
-            "not with `quadrature = \"gauss\"`".to_owned()
-        }
-        None => return Ok(correction),
+    let Some(reason) = not_at_centres(deck, bodies) else {
+        return Ok(correction);
     };
     let message = format!(
         "[grid] volume_correction: only points at the centres of lattice cells have cells to \
          correct, {reason}"
     );
     Err(scope.error(grid.volume_correction.span(), message))
+}
+
+/// Why some points do not lie at the centres of lattice cells, if any do not.
+fn not_at_centres(deck: &Deck, bodies: &[plan::Body]) -> Option<String> {
+    let from_file = |body: &&plan::Body| matches!(body.points, plan::PointSource::File { .. });
+    if let Some(body) = bodies.iter().find(from_file) {
+        return Some(format!(
+            "and [body.{}] has its points from a file",
+            body.name
+        ));
+    }
+    (deck.grid.get_ref().quadrature == Quadrature::Gauss)
+        .then(|| "not with `quadrature = \"gauss\"`".to_owned())
+}
+
+fn family(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::FamilyRule> {
+    let family = &deck.grid.get_ref().family;
+    match (family.get_ref(), not_at_centres(deck, bodies)) {
+        (Family::List, _) => Ok(plan::FamilyRule::List),
+        (Family::Auto, _) | (Family::Lattice, None) => Ok(plan::FamilyRule::Auto),
+        (Family::Lattice, Some(reason)) => {
+            let message = format!(
+                "[grid] family: only points at the centres of lattice cells have the same \
+                 neighbours all over, {reason}; take \"auto\" or \"list\""
+            );
+            Err(scope.error(family.span(), message))
+        }
+    }
 }
 
 fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::InterfaceRule> {

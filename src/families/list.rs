@@ -80,6 +80,11 @@ impl BondList {
         self.points.len()
     }
 
+    /// Groups of a row, on average.
+    pub fn groups_a_row(&self) -> usize {
+        self.neighbours.len().div_ceil(self.points.len().max(1))
+    }
+
     /// Whether there is no bond.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
@@ -268,26 +273,5 @@ impl Row<'_> {
             bits |= u8::from(*there as usize != self.point) << k;
         }
         bits
-    }
-
-    /// What the volumes of a group's neighbours are multiplied by in the own end's sums.
-    #[inline(always)]
-    pub fn weight_here(&self, group: usize) -> Lanes {
-        self.weights[0].map_or(Lanes::splat(1.0), |weights| weights[group])
-    }
-
-    /// What the volumes of a group's neighbours are multiplied by in the far ends' forces.
-    #[inline(always)]
-    pub fn weight_there(&self, group: usize) -> Lanes {
-        match self.weights {
-            [_, Some(weights)] | [Some(weights), None] => weights[group],
-            [None, None] => Lanes::splat(1.0),
-        }
-    }
-
-    /// A bit for each bond of a group that counts in the own end's sums, if it is intact.
-    #[inline(always)]
-    pub fn family(&self, group: usize) -> u8 {
-        self.weights[0].map_or(u8::MAX, |weights| weights[group].above(0.0))
     }
 }

@@ -7,6 +7,7 @@
 //! found anew before each sum of forces.
 
 mod any;
+pub mod arithmetic;
 mod influence;
 pub mod lanes;
 mod linear_microelastic;
@@ -15,6 +16,7 @@ mod ordinary;
 mod pmb;
 
 pub use any::AnyLaw;
+pub use arithmetic::Arithmetic;
 pub use influence::Influence;
 pub use lanes::Lanes;
 pub use linear_microelastic::LinearMicroelastic;

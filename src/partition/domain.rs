@@ -19,3 +19,18 @@ pub struct Domain {
     /// The halo plan.
     pub halo: Halo,
 }
+
+impl Domain {
+    /// Puts the owned points into another order, of which the first `interior` are interior points;
+    /// `order` has the present local index of each.
+    pub fn reorder(&mut self, order: &[u32], interior: usize) {
+        let mut place = vec![0; order.len()];
+        for (new, old) in order.iter().zip(0..) {
+            place[*new as usize] = old;
+        }
+        let owned: Vec<Point> = order.iter().map(|k| self.points[*k as usize]).collect();
+        self.points[..self.owned].copy_from_slice(&owned);
+        self.halo.renumber(&place);
+        self.interior = interior;
+    }
+}

@@ -2,16 +2,20 @@
 
 use crate::damage::CriticalStretch;
 use crate::deck::plan::{
-    Body, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Toughness, VolumeCorrection,
+    Body, FamilyRule, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Quadrature, Toughness,
+    VolumeCorrection,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::families::{BondList, CellShare};
+use crate::families::{CellShare, Family, GridFrame};
 use crate::material::{AnyLaw, Influence, LinearMicroelastic, Normalised, Ordinary, Pmb};
 use crate::partition::Domain;
 use crate::points::distance_squared;
 
-use super::laws::{BlockLaws, Bonds, ListFailure, ListLaw};
+use super::laws::{BlockLaws, Bonds, FamilyFailure, FamilyLaw};
+
+/// The share of a cell's edge by which two grids may be apart and still be one.
+const ON_GRID: f64 = 1e-6;
 
 /// The elastic constants and the horizon (m) that an end of bonds has.
 #[derive(Clone, Copy)]
@@ -142,6 +146,47 @@ pub fn cutoffs(plan: &Plan) -> Vec<f64> {
         .collect()
 }
 
+/// The grids on which the points of bodies lie. Bodies are on the same one if their cells have the
+/// same edge and coincide.
+pub fn grids(plan: &Plan) -> Vec<GridFrame> {
+    let mut grids: Vec<GridFrame> = Vec::new();
+    let midpoint = plan.quadrature == Quadrature::Midpoint;
+    if plan.family == FamilyRule::List || !midpoint {
+        return grids;
+    }
+    for (index, body) in plan.bodies.iter().enumerate() {
+        let PointSource::Lattice {
+            spacing, origin, ..
+        } = body.points
+        else {
+            continue;
+        };
+        let centre = origin.map(|x| x + 0.5 * spacing);
+        let coincides = |frame: &&mut GridFrame| {
+            let apart = |k: usize| (centre[k] - frame.origin[k]) / spacing;
+            let steps = |k: usize| {
+                k >= plan.dimension.count() || (apart(k) - apart(k).round()).abs() < ON_GRID
+            };
+            frame.spacing == spacing && (0..3).all(steps)
+        };
+        match grids.iter_mut().find(coincides) {
+            Some(frame) => frame.blocks[index] = true,
+            None => grids.push(GridFrame {
+                origin: std::array::from_fn(|k| {
+                    if k < plan.dimension.count() {
+                        centre[k]
+                    } else {
+                        0.0
+                    }
+                }),
+                spacing,
+                blocks: (0..plan.bodies.len()).map(|other| other == index).collect(),
+            }),
+        }
+    }
+    grids
+}
+
 /// What the points of a block follow.
 pub fn block_laws(plan: &Plan, body: &Body) -> BlockLaws {
     let constants = constants(plan, body, body);
@@ -185,35 +230,35 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<CriticalStre
     })
 }
 
-/// Gives each list its law, failure rule and weights. A bond between blocks breaks at the smaller of
+/// Gives each family its law, failure rule and weights. A bond between blocks breaks at the smaller of
 /// the two thresholds, of which a block without damage has none.
 pub fn assign(
     plan: &Plan,
     domain: &Domain,
     blocks: &[BlockLaws],
-    lists: Vec<BondList>,
+    families: Vec<Family>,
 ) -> Vec<Bonds> {
     let per_point = blocks
         .iter()
         .any(|block| block.damage.is_some_and(|law| law.alpha > 0.0));
     let with_states = blocks.iter().any(|block| block.law.has_state());
-    let give = |mut list: BondList| {
-        let ends = [list.here, list.there];
+    let give = |mut family: Family| {
+        let ends = family.blocks();
         let critical = ends.map(|block| blocks[block].damage.map(|law| law.critical));
         let failure = match critical.into_iter().flatten().reduce(f64::min) {
-            None => ListFailure::Never,
+            None => FamilyFailure::Never,
             Some(_) if per_point => {
-                ListFailure::PerPoint(critical.map(|critical| critical.unwrap_or(0.0)))
+                FamilyFailure::PerPoint(critical.map(|critical| critical.unwrap_or(0.0)))
             }
-            Some(smallest) => ListFailure::Uniform(smallest),
+            Some(smallest) => FamilyFailure::Uniform(smallest),
         };
         let [here, there] = ends.map(|block| &plan.bodies[block]);
         let [own, far] = [(here, there), (there, here)]
             .map(|(body, other)| (body, other, constants(plan, body, other)));
-        weigh(plan, domain, &mut list, [own, far]);
+        weigh(plan, domain, &mut family, [own, far]);
         Bonds {
-            list,
-            law: ListLaw::new(
+            family,
+            law: FamilyLaw::new(
                 law(plan, own.0, own.2),
                 law(plan, far.0, far.2),
                 with_states,
@@ -221,12 +266,12 @@ pub fn assign(
             failure,
         }
     };
-    lists.into_iter().map(give).collect()
+    families.into_iter().map(give).collect()
 }
 
-/// Sets the weights of a list, unless they are all 1. An end is its body, the other body and the
+/// Sets the weights of a family, unless they are all 1. An end is its body, the other body and the
 /// constants there.
-fn weigh(plan: &Plan, domain: &Domain, list: &mut BondList, ends: [(&Body, &Body, Constants); 2]) {
+fn weigh(plan: &Plan, domain: &Domain, family: &mut Family, ends: [(&Body, &Body, Constants); 2]) {
     let [own, far] = &ends;
     let same_horizon = own.2.horizon == far.2.horizon;
     let plain = plan.volume_correction == VolumeCorrection::None
@@ -236,16 +281,22 @@ fn weigh(plan: &Plan, domain: &Domain, list: &mut BondList, ends: [(&Body, &Body
     if plain {
         return;
     }
-    // The far end of a list within a block has the same weights.
-    let count = if list.here == list.there { 1 } else { 2 };
+    // The far end of a family within a block has the same weights.
+    let [here, there] = family.blocks();
+    let count = if here == there { 1 } else { 2 };
     for (end, (body, other, constants)) in ends.iter().enumerate().take(count) {
         let horizon = constants.horizon;
         let share = cell_share(plan, other, horizon);
-        list.weigh(end, |here, there| {
-            let [a, b] = [here, there].map(|point| domain.points[point].position);
-            let length = distance_squared(a, b).sqrt();
-            let offset = std::array::from_fn(|k| b[k] - a[k]);
+        let weight = |offset: [f64; 3]| {
+            let length = distance_squared([0.0; 3], offset).sqrt();
             share.at(offset) * influence(body, horizon, length)
-        });
+        };
+        match family {
+            Family::Lattice(lattice) => lattice.weigh(end, weight),
+            Family::List(list) => list.weigh(end, |here, there| {
+                let [a, b] = [here, there].map(|point| domain.points[point].position);
+                weight(std::array::from_fn(|k| b[k] - a[k]))
+            }),
+        }
     }
 }

@@ -4,21 +4,23 @@
 //! first the displacements, then what the pass before has found. Interior points are worked on while
 //! messages are in flight.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::comm::{Communicator, Halo};
+use crate::families::{Grid, Which};
 use crate::material::Law;
 
-use super::geometry::{Geometry, Shared};
-use super::kernels::{Bonded, Energy, Response, Stored};
-use super::laws::{BlockLaws, Bonds, with_laws};
+use super::instructions::Instructions;
+use super::kernels::{Energy, Response, Stored};
+use super::laws::{BlockLaws, Bonds, FamilyLaw, with_laws};
 use super::measures::{Constant, Dilatation, Expansion, Stiffness, Stress};
 use super::model::Model;
-use super::passes::{Passes, sweep_all};
+use super::passes::{Pass, Passes, sweep_all};
 
 /// The bonds of a rank and what it takes to sum over them.
 pub struct Forces<const D: usize> {
-    passes: Passes,
+    passes: Passes<D>,
     halo: Halo,
 }
 
@@ -38,11 +40,12 @@ impl<const D: usize> Forces<D> {
         comm: &dyn Communicator,
         model: &Model<D>,
         bonds: Vec<Bonds>,
+        grids: Vec<Arc<Grid>>,
         halo: Halo,
         blocks: Vec<BlockLaws>,
     ) -> Self {
-        let local = model.volume.len();
-        let passes = Passes::new(bonds, blocks, model.owned(), local);
+        let instructions = Instructions::of_all(comm);
+        let passes = Passes::new(bonds, grids, blocks, model, instructions);
         let mut forces = Self { passes, halo };
         if !forces.passes.constants.is_empty() {
             forces.find_constants(comm, model);
@@ -53,24 +56,20 @@ impl<const D: usize> Forces<D> {
     fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let Self { passes, halo } = self;
         let owned = model.owned();
-        let still = vec![0.0; model.volume.len()];
-        let geometry = Geometry {
-            reference: components(&model.reference),
-            displacement: [&still[..]; D],
-            volume: &model.volume,
-        };
-        for Bonds { list, law, .. } in &mut passes.bonds {
-            with_laws!(*law, laws => {
-                let law = laws[0];
-                sweep_all(list, &mut passes.constants[..owned], &Constant { geometry, law });
+        let sums = passes.sum(owned, |bonds, sums, source| {
+            with_laws!(bonds.law, laws => {
+                let kernel = Constant { law: laws[0] };
+                sweep_all(&mut bonds.family, sums, &kernel, source);
             });
-        }
-        for (constant, block) in passes.constants.iter_mut().zip(&model.block) {
-            *constant = passes.blocks[usize::from(*block)].law.constant(*constant);
+        });
+        for (point, sum) in sums.into_iter().enumerate() {
+            let law = passes.blocks[usize::from(model.block[point])].law;
+            passes.constants[point] = law.constant(sum);
         }
         halo.pack(&[&passes.constants]);
         halo.exchange(comm, &mut || {});
         halo.unpack(&mut [&mut passes.constants]);
+        passes.bring_constants();
     }
 
     /// Bonds of the rank's points, each counted from its end here, broken ones included.
@@ -78,17 +77,14 @@ impl<const D: usize> Forces<D> {
         self.passes
             .bonds
             .iter()
-            .map(|bonds| bonds.list.bonds())
+            .map(|bonds| bonds.family.bonds())
             .sum()
     }
 
-    /// Memory of the bonds, bytes.
+    /// Memory of the bonds and of what they read of the points, bytes.
     pub fn bytes(&self) -> usize {
-        self.passes
-            .bonds
-            .iter()
-            .map(|bonds| bonds.list.bytes())
-            .sum()
+        let families = self.passes.bonds.iter().map(|bonds| bonds.family.bytes());
+        families.sum::<usize>() + self.passes.bytes()
     }
 
     /// The halo plan.
@@ -99,27 +95,23 @@ impl<const D: usize> Forces<D> {
     /// Breaks the bonds for which `crosses` (of the two local indices) holds.
     pub fn cut(&mut self, crosses: impl Fn(usize, usize) -> bool) {
         for bonds in &mut self.passes.bonds {
-            bonds.list.cut(&crosses);
+            bonds.family.cut(&crosses);
         }
     }
 
     /// Calls `found` with the local indices of both ends of every intact bond of the owned points.
     pub fn for_each_intact(&self, mut found: impl FnMut(usize, usize)) {
         for bonds in &self.passes.bonds {
-            bonds.list.for_each_intact(&mut found);
+            bonds.family.for_each_intact(&mut found);
         }
     }
 
     /// How many bytes of bits the bonds of each owned point take.
     pub fn intact_lengths(&self, owned: usize) -> Vec<u32> {
         let mut lengths = vec![0; owned];
-        for (point, row) in self
-            .passes
-            .bonds
-            .iter()
-            .flat_map(|bonds| bonds.list.intact_rows())
-        {
-            lengths[point] += row.len() as u32;
+        for bonds in &self.passes.bonds {
+            let add = |point: usize, length: usize| lengths[point] += length as u32;
+            bonds.family.row_lengths(add);
         }
         lengths
     }
@@ -128,14 +120,8 @@ impl<const D: usize> Forces<D> {
     pub fn intact(&self, lengths: &[u32]) -> Vec<u8> {
         let (mut next, total) = starts(lengths);
         let mut bytes = vec![0; total];
-        for (point, row) in self
-            .passes
-            .bonds
-            .iter()
-            .flat_map(|bonds| bonds.list.intact_rows())
-        {
-            bytes[next[point]..next[point] + row.len()].copy_from_slice(row);
-            next[point] += row.len();
+        for bonds in &self.passes.bonds {
+            bonds.family.save(&mut next, &mut bytes);
         }
         bytes
     }
@@ -144,10 +130,7 @@ impl<const D: usize> Forces<D> {
     pub fn set_intact(&mut self, lengths: &[u32], bytes: &[u8]) {
         let (mut next, _) = starts(lengths);
         for bonds in &mut self.passes.bonds {
-            for (point, row) in bonds.list.intact_rows_mut() {
-                row.copy_from_slice(&bytes[next[point]..next[point] + row.len()]);
-                next[point] += row.len();
-            }
+            bonds.family.restore(&mut next, bytes);
         }
     }
 
@@ -165,7 +148,7 @@ impl<const D: usize> Forces<D> {
         self.halo.exchange(comm, &mut || {});
         self.halo.unpack(&mut [protected]);
         for bonds in &mut self.passes.bonds {
-            bonds.list.protect(|point| protected[point] == 1.0);
+            bonds.family.protect(|point| protected[point] == 1.0);
         }
     }
 
@@ -191,7 +174,8 @@ impl<const D: usize> Forces<D> {
             response.force = [0.0; D];
         }
         let mut before = None;
-        for pass in passes.order.clone() {
+        for turn in 0..passes.order.len() {
+            let pass = passes.order[turn];
             match before.and_then(|pass| passes.found(pass)) {
                 None => halo.pack(&components(displacement)),
                 Some(found) => halo.pack(&[found]),
@@ -199,8 +183,8 @@ impl<const D: usize> Forces<D> {
             passes.start(pass, owned);
             halo.exchange(comm, &mut || {
                 timed(&mut || {
-                    let geometry = geometry(model, displacement);
-                    passes.run(pass, geometry, 0..model.interior, responses);
+                    passes.bring(before, Which::Owned, model, displacement);
+                    passes.run(pass, 0..model.interior, responses);
                 });
             });
             match before.and_then(|pass| passes.found(pass)) {
@@ -208,8 +192,8 @@ impl<const D: usize> Forces<D> {
                 Some(found) => halo.unpack(&mut [found]),
             }
             timed(&mut || {
-                let geometry = geometry(model, displacement);
-                passes.run(pass, geometry, model.interior..owned, responses);
+                passes.bring(before, Which::Ghosts, model, displacement);
+                passes.run(pass, model.interior..owned, responses);
                 passes.finish(pass, model, responses);
             });
             before = Some(pass);
@@ -220,19 +204,17 @@ impl<const D: usize> Forces<D> {
 
     /// What the intact bonds of each owned point hold, at displacements whose ghosts are up to date.
     pub fn stored(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<Stored> {
-        let geometry = geometry(model, displacement);
-        let mut stored = self.sum(
-            |bonds, shared, stored| {
-                with_laws!(bonds.law, laws => {
-                    let bonded = Bonded { geometry, shared, laws };
-                    sweep_all(&mut bonds.list, stored, &Energy { bonded });
-                });
-            },
-            model,
-        );
+        let passes = &mut self.passes;
+        passes.bring(None, Which::All, model, displacement);
+        let mut stored: Vec<Stored> = passes.sum(model.owned(), |bonds, stored, source| {
+            with_laws!(bonds.law, laws => {
+                let kernel = Energy { law: laws[0] };
+                sweep_all(&mut bonds.family, stored, &kernel, source);
+            });
+        });
         for (point, stored) in stored.iter_mut().enumerate() {
-            let constant = self.passes.constants.get(point).copied().unwrap_or(0.0);
-            let law = self.passes.blocks[usize::from(model.block[point])].law;
+            let constant = passes.constants.get(point).copied().unwrap_or(0.0);
+            let law = passes.blocks[usize::from(model.block[point])].law;
             stored.energy += law.point_energy(stored.state_sum, constant);
         }
         stored
@@ -242,77 +224,44 @@ impl<const D: usize> Forces<D> {
     /// breaking bonds.
     pub fn refresh_states(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) {
         let stored = self.stored(model, displacement);
-        let Passes {
-            states,
-            constants,
-            blocks,
-            ..
-        } = &mut self.passes;
-        for (point, state) in states.iter_mut().enumerate().take(stored.len()) {
-            let law = blocks[usize::from(model.block[point])].law;
-            *state = law.state(stored[point].state_sum, constants[point]);
+        let passes = &mut self.passes;
+        for (point, state) in passes.states.iter_mut().enumerate().take(stored.len()) {
+            let law = passes.blocks[usize::from(model.block[point])].law;
+            *state = law.state(stored[point].state_sum, passes.constants[point]);
         }
+        passes.bring(Some(Pass::States), Which::Owned, model, displacement);
     }
 
     /// D = Σ V C n⊗n of each owned point (N/m⁴): xx, yy, zz, xy, yz, xz.
-    pub fn stiffness(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<[f64; 6]> {
-        let geometry = geometry(model, displacement);
-        self.sum(
-            |bonds, shared, stiffness| {
-                with_laws!(bonds.law, laws => {
-                    let bonded = Bonded { geometry, shared, laws };
-                    sweep_all(&mut bonds.list, stiffness, &Stiffness { bonded });
-                });
-            },
-            model,
-        )
+    pub fn stiffness(&mut self, model: &Model<D>) -> Vec<[f64; 6]> {
+        self.passes.sum(model.owned(), |bonds, stiffness, source| {
+            with_laws!(bonds.law, laws => {
+                sweep_all(&mut bonds.family, stiffness, &Stiffness { laws }, source);
+            });
+        })
     }
 
     /// Stress of each owned point (Pa): xx, yy, zz, xy, yz, xz; at the displacements of the last
     /// [evaluation](Self::evaluate).
     pub fn stress(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<[f64; 6]> {
-        let geometry = geometry(model, displacement);
-        self.sum(
-            |bonds, shared, stress| {
-                with_laws!(bonds.law, laws => {
-                    let bonded = Bonded { geometry, shared, laws };
-                    sweep_all(&mut bonds.list, stress, &Stress { bonded });
-                });
-            },
-            model,
-        )
+        let passes = &mut self.passes;
+        passes.bring(None, Which::All, model, displacement);
+        passes.sum(model.owned(), |bonds, stress, source| {
+            with_laws!(bonds.law, laws => {
+                let kernel = Stress { law: laws[0] };
+                sweep_all(&mut bonds.family, stress, &kernel, source);
+            });
+        })
     }
 
     /// What gives the dilatation of each owned point, at displacements whose ghosts are up to date.
     pub fn expansion(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) -> Vec<Expansion> {
-        let geometry = geometry(model, displacement);
-        self.sum(
-            |bonds, _, expansion| {
-                let linear = matches!(bonds.law, super::laws::ListLaw::LinearMicroelastic(_));
-                sweep_all(&mut bonds.list, expansion, &Dilatation { geometry, linear });
-            },
-            model,
-        )
-    }
-
-    /// Sums over all bonds of the owned points.
-    fn sum<T: Default + Clone>(
-        &mut self,
-        sweep: impl Fn(&mut Bonds, Shared<'_>, &mut [T]),
-        model: &Model<D>,
-    ) -> Vec<T> {
-        let mut sums = vec![T::default(); model.owned()];
-        let Passes {
-            bonds,
-            constants,
-            states,
-            ..
-        } = &mut self.passes;
-        let shared = Shared { constants, states };
-        for bonds in bonds {
-            sweep(bonds, shared, &mut sums);
-        }
-        sums
+        let passes = &mut self.passes;
+        passes.bring(None, Which::All, model, displacement);
+        passes.sum(model.owned(), |bonds, expansion, source| {
+            let linear = matches!(bonds.law, FamilyLaw::LinearMicroelastic(_));
+            sweep_all(&mut bonds.family, expansion, &Dilatation { linear }, source);
+        })
     }
 }
 
@@ -335,15 +284,4 @@ fn components<const D: usize>(field: &[Vec<f64>; D]) -> [&[f64]; D] {
 
 fn components_mut<const D: usize>(field: &mut [Vec<f64>; D]) -> [&mut [f64]; D] {
     field.each_mut().map(Vec::as_mut_slice)
-}
-
-fn geometry<'a, const D: usize>(
-    model: &'a Model<D>,
-    displacement: &'a [Vec<f64>; D],
-) -> Geometry<'a, D> {
-    Geometry {
-        reference: components(&model.reference),
-        displacement: components(displacement),
-        volume: &model.volume,
-    }
 }

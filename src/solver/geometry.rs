@@ -1,29 +1,32 @@
-//! What the kernels read of the points, and eight bonds loaded from it.
+//! Eight bonds as the kernels see them: what is read of both ends, and the geometry between them.
 
-use crate::material::lanes::WIDTH;
-use crate::material::{Bond, End, Lanes, Law};
+use crate::material::{Arithmetic, Bond, End, Lanes};
 
-/// What kernels read of the local points, ghosts included.
-#[derive(Clone, Copy)]
-pub struct Geometry<'a, const D: usize> {
-    /// Reference positions by component, m.
-    pub reference: [&'a [f64]; D],
-    /// Displacements by component, m.
-    pub displacement: [&'a [f64]; D],
-    /// Volumes, m³.
-    pub volume: &'a [f64],
+/// The influence and the share of the volume that a bond has in the sums of its two ends.
+#[derive(Debug, Clone, Copy)]
+pub enum Weights {
+    /// 1.
+    One,
+    /// The same at both ends.
+    Same(Lanes),
+    /// Those of the own and of the far end.
+    Each([Lanes; 2]),
 }
 
-/// What bonds know of the families of their ends, over the local points; empty where no law has it.
-#[derive(Clone, Copy)]
-pub struct Shared<'a> {
-    /// [`Law::constant`] of each point.
-    pub constants: &'a [f64],
-    /// [`Law::state`] of each point.
-    pub states: &'a [f64],
+/// ξ of eight bonds.
+#[derive(Debug, Clone, Copy)]
+pub struct Reference<const D: usize> {
+    /// By component, m.
+    pub along: [Lanes; D],
+    /// |ξ|², m².
+    pub square: Lanes,
+    /// |ξ|, m.
+    pub length: Lanes,
+    /// 1/|ξ|, 1/m.
+    pub inverse: Lanes,
 }
 
-/// Eight bonds of one point as the kernels see them.
+/// Eight bonds.
 pub struct Loaded<const D: usize> {
     /// What laws see.
     pub bond: Bond,
@@ -33,123 +36,157 @@ pub struct Loaded<const D: usize> {
     pub along: [Lanes; D],
     /// Its inverse length, 1/m.
     pub inverse_length: Lanes,
-    /// Volumes of the neighbours, m³.
+    /// Volumes of the own ends, m³.
+    pub own_volume: Lanes,
+    /// Volumes of the far ends, m³.
     pub volume: Lanes,
+    /// What volumes are multiplied by.
+    pub weights: Weights,
+    /// What the own and the far ends know of their families.
+    pub ends: [End; 2],
+    /// Stretches at which the bonds of the own and the far ends break.
+    pub thresholds: [Lanes; 2],
+    /// A bit for each bond that is intact.
+    pub intact: u8,
+    /// A bit for each bond, broken or not; only for kernels that want it.
+    pub filled: u8,
+    /// A bit for each bond that can break.
+    pub breakable: u8,
 }
 
-/// # Safety
-/// `values` must be longer than every index.
-#[inline(always)]
-unsafe fn gather(values: &[f64], indices: &[u32; WIDTH]) -> Lanes {
-    let mut lanes = Lanes::splat(0.0);
-    for k in 0..WIDTH {
-        // SAFETY: passed on to the caller.
-        lanes.0[k] = unsafe { *values.get_unchecked(indices[k] as usize) };
-    }
-    lanes
-}
-
-impl<const D: usize> Geometry<'_, D> {
-    /// The number of local points that every array covers.
-    pub fn points(&self) -> usize {
-        let lengths = self.reference.iter().chain(&self.displacement);
-        let shortest = lengths.map(|component| component.len()).min();
-        shortest.unwrap_or(0).min(self.volume.len())
-    }
-
-    /// Loads the bonds of a group. The stretch is (η·(2ξ + η)) / (|ξ| (|Y| + |ξ|)), which loses no
-    /// digits when |Y| is close to |ξ|, and is the same to the bit from both ends; `linear` takes
-    /// what is linear in η instead.
-    ///
-    /// # Safety
-    /// All arrays must be longer than every index.
+impl Weights {
+    /// That of the own end.
     #[inline(always)]
-    pub unsafe fn load(&self, point: usize, neighbours: &[u32; WIDTH], linear: bool) -> Loaded<D> {
-        let mut reference = [Lanes::splat(0.0); D];
-        let mut deformed = [Lanes::splat(0.0); D];
-        let mut length_squared = Lanes::splat(0.0);
-        let mut deformed_squared = Lanes::splat(0.0);
-        let mut growth = Lanes::splat(0.0);
-        for d in 0..D {
-            let here = self.reference[d][point];
-            // SAFETY: passed on to the caller.
-            let there = unsafe { gather(self.reference[d], neighbours) };
-            let xi = there - Lanes::splat(here);
-            let here = self.displacement[d][point];
-            // SAFETY: as above.
-            let there = unsafe { gather(self.displacement[d], neighbours) };
-            let eta = there - Lanes::splat(here);
-            let y = xi + eta;
-            length_squared += xi * xi;
-            deformed_squared += y * y;
-            growth += eta * if linear { xi } else { xi + y };
-            reference[d] = xi;
-            deformed[d] = y;
+    pub fn own(self) -> Lanes {
+        match self {
+            Self::One => Lanes::splat(1.0),
+            Self::Same(own) | Self::Each([own, _]) => own,
         }
-        // SAFETY: as above.
-        let volume = unsafe { gather(self.volume, neighbours) };
-        let length = length_squared.sqrt();
-        if linear {
-            return Loaded {
-                bond: Bond {
-                    length,
-                    stretch: growth / length_squared,
-                },
-                reference,
-                along: reference,
-                inverse_length: Lanes::splat(1.0) / length,
-                volume,
-            };
+    }
+
+    /// That of the far end.
+    #[inline(always)]
+    pub fn far(self) -> Lanes {
+        match self {
+            Self::One => Lanes::splat(1.0),
+            Self::Same(far) | Self::Each([_, far]) => far,
         }
-        let deformed_length = deformed_squared.sqrt();
-        let product = length * (deformed_length + length);
-        // One division serves both 1/product and 1/|Y|.
-        let inverse = Lanes::splat(1.0) / (product * deformed_length);
-        Loaded {
+    }
+}
+
+impl<const D: usize> Loaded<D> {
+    /// A bit for each intact bond that counts in the own end's sums.
+    #[inline(always)]
+    pub fn family(&self) -> u8 {
+        match self.weights {
+            Weights::One => self.intact,
+            weights => self.intact & weights.own().above(0.0),
+        }
+    }
+}
+
+/// What bonds look like whose ends move by η (m) against one another.
+#[derive(Debug, Clone, Copy)]
+pub struct Deformed<const D: usize> {
+    /// What laws see.
+    pub bond: Bond,
+    /// See [`Loaded::along`].
+    pub along: [Lanes; D],
+    /// See [`Loaded::inverse_length`].
+    pub inverse_length: Lanes,
+}
+
+/// |Y|² = |ξ|² + γ with γ = η·(2ξ + η), and the stretch solves s² + 2s = γ/|ξ|²: its value from |Y| is
+/// improved by a Newton step on that, so that it loses no digits when |Y| is close to |ξ|. All of it is
+/// the same to the bit from both ends. `linear` takes what is linear in η instead.
+#[inline(always)]
+pub fn deform<A: Arithmetic, const D: usize>(
+    reference: &Reference<D>,
+    eta: [Lanes; D],
+    linear: bool,
+) -> Deformed<D> {
+    let Reference {
+        along: xi,
+        square,
+        length,
+        inverse,
+    } = *reference;
+    let inverse_square = inverse * inverse;
+    if linear {
+        let mut growth = eta[0] * xi[0];
+        for d in 1..D {
+            growth = A::multiply_add(eta[d], xi[d], growth);
+        }
+        return Deformed {
             bond: Bond {
                 length,
-                stretch: growth * deformed_length * inverse,
+                stretch: growth * inverse_square,
             },
-            reference,
-            along: deformed,
-            inverse_length: inverse * product,
-            volume,
-        }
+            along: xi,
+            inverse_length: inverse,
+        };
+    }
+    let along: [Lanes; D] = std::array::from_fn(|d| xi[d] + eta[d]);
+    let mut growth = eta[0] * (xi[0] + along[0]);
+    for d in 1..D {
+        growth = A::multiply_add(eta[d], xi[d] + along[d], growth);
+    }
+    let deformed = square + growth;
+    let inverse_length = A::inverse_sqrt(deformed);
+    let rough = A::multiply_add(deformed * inverse_length, inverse, Lanes::splat(-1.0));
+    let wanted = growth * inverse_square;
+    // s² + 2s − γ/|ξ|², where 2s − γ/|ξ|² is small.
+    let excess = A::multiply_add(rough, rough, rough + rough - wanted);
+    // −1/(2 (1 + s)) = −|ξ|/(2|Y|).
+    let slope = length * inverse_length * -0.5;
+    Deformed {
+        bond: Bond {
+            length,
+            stretch: A::multiply_add(excess, slope, rough),
+        },
+        along,
+        inverse_length,
     }
 }
 
-impl Shared<'_> {
-    /// The number of local points that the arrays a law needs cover.
-    pub fn points<L: Law>(&self) -> usize {
-        let of = |needed: bool, values: &[f64]| if needed { values.len() } else { usize::MAX };
-        of(L::CONSTANT, self.constants).min(of(L::STATE, self.states))
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::arithmetic::{Fused, Plain};
 
-    /// What the own end of a point's bonds knows.
-    #[inline(always)]
-    pub fn here<L: Law>(&self, point: usize) -> End {
-        let of =
-            |needed: bool, values: &[f64]| Lanes::splat(if needed { values[point] } else { 0.0 });
-        End {
-            constant: of(L::CONSTANT, self.constants),
-            state: of(L::STATE, self.states),
+    fn reference(xi: [f64; 2]) -> Reference<2> {
+        let square = xi[0] * xi[0] + xi[1] * xi[1];
+        Reference {
+            along: xi.map(Lanes::splat),
+            square: Lanes::splat(square),
+            length: Lanes::splat(square.sqrt()),
+            inverse: Lanes::splat(1.0 / square.sqrt()),
         }
     }
 
-    /// What the far ends of eight bonds know.
-    ///
-    /// # Safety
-    /// The arrays that the law needs must be longer than every index.
-    #[inline(always)]
-    pub unsafe fn there<L: Law>(&self, neighbours: &[u32; WIDTH]) -> End {
-        let of = |needed: bool, values: &[f64]| match needed {
-            // SAFETY: passed on to the caller.
-            true => unsafe { gather(values, neighbours) },
-            false => Lanes::splat(0.0),
-        };
-        End {
-            constant: of(L::CONSTANT, self.constants),
-            state: of(L::STATE, self.states),
+    fn stretch<A: Arithmetic>(xi: [f64; 2], eta: [f64; 2]) -> f64 {
+        let deformed = deform::<A, 2>(&reference(xi), eta.map(Lanes::splat), false);
+        deformed.bond.stretch.0[0]
+    }
+
+    #[test]
+    fn small_and_large_stretches_keep_their_digits() {
+        for s in [1e-14, -1e-9, 1e-5, -0.3, 0.5, 10.0_f64] {
+            let xi = [0.3, 0.4];
+            let eta = xi.map(|x| s * x);
+            for found in [stretch::<Plain>(xi, eta), stretch::<Fused>(xi, eta)] {
+                assert!((found / s - 1.0).abs() < 1e-15 * 4.0, "{s} {found}");
+            }
         }
+    }
+
+    #[test]
+    fn both_ends_see_the_same_bits() {
+        let (xi, eta) = ([0.123, -0.456], [0.001, 0.0234]);
+        let opposite = [xi.map(|x| -x), eta.map(|x| -x)];
+        assert_eq!(
+            stretch::<Fused>(xi, eta),
+            stretch::<Fused>(opposite[0], opposite[1])
+        );
     }
 }

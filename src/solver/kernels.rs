@@ -1,76 +1,87 @@
 //! What is summed over a family in every step: bond forces, states, energies, the smallest stretch.
 //!
-//! A kernel sees one row at a time and adds to the point's outputs. It is written once for any
-//! dimension, law and failure rule; the bonds of a row are evaluated eight at a time.
+//! A kernel sees eight bonds at a time and adds to eight sums. It is written once for any dimension,
+//! law, failure rule and family: the bonds may be those of one point or those of eight.
 
-use crate::families::Row;
-use crate::material::{End, Lanes, Law};
+use crate::material::{Arithmetic, Lanes, Law};
 
 use super::failure::{Ends, Failure};
-use super::geometry::{Geometry, Loaded, Shared};
+use super::geometry::{Loaded, Weights};
 
-/// Something that is summed over rows.
-pub trait Kernel: Sync {
+/// What of eight sums belongs to a point.
+pub trait Pick {
+    /// The sum.
+    fn sum(&self, lanes: Lanes) -> f64;
+
+    /// The smallest value.
+    fn smallest(&self, lanes: Lanes) -> f64;
+}
+
+/// Something that is summed over the bonds of points.
+pub trait Kernel<const D: usize>: Sync {
+    /// Eight sums of each quantity.
+    type Sums: Copy;
+
     /// What is summed for each point.
     type Output: Send;
 
     /// Whether it is worth a version for each set of vector instructions.
     const HOT: bool = false;
 
-    /// The number of local points that every array it reads by index covers.
-    fn points(&self) -> usize;
+    /// Whether it reads the constants of the ends.
+    const CONSTANT: bool = false;
 
-    /// Adds a row's share to its point's output.
-    ///
-    /// # Safety
-    /// Every index of the row must be below [`Self::points`].
-    unsafe fn row(&self, row: Row<'_>, output: &mut Self::Output);
+    /// Whether it reads the states of the ends.
+    const STATE: bool = false;
+
+    /// Whether it reads the thresholds of the ends.
+    const THRESHOLD: bool = false;
+
+    /// Whether it wants to know of broken bonds.
+    const FILLED: bool = false;
+
+    /// Whether it takes what is linear in η.
+    fn linear(&self) -> bool;
+
+    /// The sums over no bond.
+    fn start(&self) -> Self::Sums;
+
+    /// Adds eight bonds; returns which are still intact.
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut Self::Sums) -> u8;
+
+    /// Adds a point's part of the sums to its output.
+    fn finish(&self, sums: &Self::Sums, pick: &impl Pick, output: &mut Self::Output);
 }
 
-/// The bonds of a list: the points, their shared numbers and the laws of both ends.
-#[derive(Clone, Copy)]
-pub struct Bonded<'a, L, const D: usize> {
-    /// The points.
-    pub geometry: Geometry<'a, D>,
-    /// What bonds know of the families of their ends.
-    pub shared: Shared<'a>,
-    /// Laws of the own and of the far end.
-    pub laws: [L; 2],
-}
-
-impl<L: Law, const D: usize> Bonded<'_, L, D> {
-    /// The number of local points that every array covers.
-    pub fn points(&self) -> usize {
-        self.geometry.points().min(self.shared.points::<L>())
+/// The intact bonds that must break, and their energy at the own end (J).
+#[inline(always)]
+fn failing<A: Arithmetic, L: Law, F: Failure, const D: usize>(
+    laws: &[L; 2],
+    failure: F,
+    bonds: &Loaded<D>,
+) -> (u8, Lanes) {
+    let ends = Ends {
+        laws,
+        ends: &bonds.ends,
+        thresholds: &bonds.thresholds,
+    };
+    let broken = bonds.intact & failure.breaks::<A, L>(bonds.bond.stretch, ends);
+    if broken == 0 {
+        return (0, Lanes::splat(0.0));
     }
+    let broken = broken & bonds.breakable;
+    let energy = laws[0].bond_energy(&bonds.bond, &bonds.ends[0]) * bonds.volume;
+    let energy = energy * bonds.weights.own() * bonds.own_volume;
+    (broken, A::select(energy, broken, 0.0))
+}
 
-    /// The intact bonds of a group that must break, and their energy at the own end (J).
-    #[inline(always)]
-    fn failing<F: Failure>(
-        &self,
-        row: &Row<'_>,
-        group: usize,
-        loaded: &Loaded<D>,
-        [here, there]: [&End; 2],
-        failure: F,
-    ) -> (u8, f64) {
-        let ends = Ends {
-            here_law: &self.laws[0],
-            there_law: &self.laws[1],
-            here,
-            there,
-        };
-        let stretch = loaded.bond.stretch;
-        let neighbours = &row.neighbours[group];
-        let mut broken = row.intact[group] & failure.breaks(row.point, neighbours, stretch, ends);
-        if broken == 0 {
-            return (0, 0.0);
-        }
-        broken &= row.breakable.map_or(u8::MAX, |breakable| breakable[group]);
-        let energy = self.laws[0].bond_energy(&loaded.bond, here) * loaded.volume;
-        let energy = energy * row.weight_here(group);
-        let volume = self.geometry.volume[row.point];
-        (broken, volume * energy.select(broken, 0.0).sum())
+/// A share in the sums of the own end, by volume.
+#[inline(always)]
+fn own_share<const D: usize>(share: Lanes, bonds: &Loaded<D>) -> Lanes {
+    let share = share * bonds.volume;
+    match bonds.weights {
+        Weights::One => share,
+        weights => share * weights.own(),
     }
 }
 
@@ -93,59 +104,71 @@ impl<const D: usize> Default for Response<D> {
 }
 
 /// Breaks bonds, unless that has been done, and sums their forces.
-pub struct Force<'a, L, F, const D: usize> {
-    /// The bonds.
-    pub bonded: Bonded<'a, L, D>,
+pub struct Force<L, F> {
+    /// Laws of the own and of the far end.
+    pub laws: [L; 2],
     /// The failure rule; none where bonds have been broken already.
     pub failure: Option<F>,
 }
 
-impl<L: Law, F: Failure, const D: usize> Kernel for Force<'_, L, F, D> {
+/// Sums of [`Force`].
+#[derive(Clone, Copy)]
+pub struct ForceSums<const D: usize> {
+    force: [Lanes; D],
+    set_free: Lanes,
+}
+
+impl<L: Law, F: Failure, const D: usize> Kernel<D> for Force<L, F> {
+    type Sums = ForceSums<D>;
     type Output = Response<D>;
     const HOT: bool = true;
+    const CONSTANT: bool = L::CONSTANT;
+    const STATE: bool = L::STATE;
+    const THRESHOLD: bool = F::PER_POINT;
 
-    fn points(&self) -> usize {
-        self.bonded.points()
+    fn linear(&self) -> bool {
+        L::LINEAR
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut Response<D>) {
-        let bonded = &self.bonded;
-        let [law, other] = &bonded.laws;
-        let here = bonded.shared.here::<L>(row.point);
-        let mut force = [Lanes::splat(0.0); D];
-        for group in 0..row.neighbours.len() {
-            let neighbours = &row.neighbours[group];
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { bonded.geometry.load(row.point, neighbours, L::LINEAR) };
-            // SAFETY: as above.
-            let there = unsafe { bonded.shared.there::<L>(neighbours) };
-            let mut bits = row.intact[group];
-            if let Some(failure) = self.failure {
-                let ends = [&here, &there];
-                let (broken, energy) = bonded.failing(&row, group, &loaded, ends, failure);
-                if broken != 0 {
-                    output.set_free += energy;
-                    bits &= !broken;
-                    row.intact[group] = bits;
-                }
-            }
-            let bond = &loaded.bond;
-            let (pull, push) = (law.force(bond, &here), other.force(bond, &there));
-            let strength = match row.weights {
-                [None, _] => pull + push,
-                [Some(weights), None] => (pull + push) * weights[group],
-                [Some(own), Some(far)] => pull * own[group] + push * far[group],
-            };
-            let strength = strength * loaded.volume * loaded.inverse_length;
-            let strength = strength.select(bits, 0.0);
-            for d in 0..D {
-                force[d] += strength * loaded.along[d];
+    fn start(&self) -> ForceSums<D> {
+        ForceSums {
+            force: [Lanes::splat(0.0); D],
+            set_free: Lanes::splat(0.0),
+        }
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut ForceSums<D>) -> u8 {
+        let mut bits = bonds.intact;
+        if let Some(failure) = self.failure {
+            let (broken, energy) = failing::<A, L, F, D>(&self.laws, failure, bonds);
+            if broken != 0 {
+                bits &= !broken;
+                sums.set_free += energy;
             }
         }
+        let [here, there] = &bonds.ends;
+        let pull = self.laws[0].force(&bonds.bond, here);
+        let push = self.laws[1].force(&bonds.bond, there);
+        let strength = match bonds.weights {
+            Weights::One => pull + push,
+            Weights::Same(weight) => (pull + push) * weight,
+            Weights::Each([own, far]) => pull * own + push * far,
+        };
+        let strength = A::select(strength * bonds.volume * bonds.inverse_length, bits, 0.0);
         for d in 0..D {
-            output.force[d] += force[d].sum();
+            sums.force[d] = A::multiply_add(strength, bonds.along[d], sums.force[d]);
         }
+        bits
+    }
+
+    #[inline(always)]
+    fn finish(&self, sums: &ForceSums<D>, pick: &impl Pick, output: &mut Response<D>) {
+        for d in 0..D {
+            output.force[d] += pick.sum(sums.force[d]);
+        }
+        output.set_free += pick.sum(sums.set_free);
     }
 }
 
@@ -161,75 +184,83 @@ pub struct StateSums {
 }
 
 /// Breaks bonds and sums the states of points.
-pub struct State<'a, L, F, const D: usize> {
-    /// The bonds; states are not read.
-    pub bonded: Bonded<'a, L, D>,
+pub struct State<L, F> {
+    /// Laws of the own and of the far end.
+    pub laws: [L; 2],
     /// The failure rule.
     pub failure: F,
 }
 
-impl<L: Law, F: Failure, const D: usize> Kernel for State<'_, L, F, D> {
+/// Before, after, set free.
+pub type StateLanes = [Lanes; 3];
+
+impl<L: Law, F: Failure, const D: usize> Kernel<D> for State<L, F> {
+    type Sums = StateLanes;
     type Output = StateSums;
     const HOT: bool = true;
+    const CONSTANT: bool = L::CONSTANT;
+    const THRESHOLD: bool = F::PER_POINT;
 
-    fn points(&self) -> usize {
-        self.bonded.points()
+    fn linear(&self) -> bool {
+        L::LINEAR
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut StateSums) {
-        let bonded = &self.bonded;
-        let here = bonded.shared.here::<L>(row.point);
-        let mut before = Lanes::splat(0.0);
-        let mut after = Lanes::splat(0.0);
-        for group in 0..row.neighbours.len() {
-            let neighbours = &row.neighbours[group];
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { bonded.geometry.load(row.point, neighbours, L::LINEAR) };
-            // SAFETY: as above.
-            let there = unsafe { bonded.shared.there::<L>(neighbours) };
-            let share = bonded.laws[0].state_share(&loaded.bond) * loaded.volume;
-            let share = share * row.weight_here(group);
-            let bits = row.intact[group];
-            let ends = [&here, &there];
-            let (broken, energy) = bonded.failing(&row, group, &loaded, ends, self.failure);
-            output.set_free += energy;
-            row.intact[group] = bits & !broken;
-            before += share.select(bits, 0.0);
-            after += share.select(bits & !broken, 0.0);
+    fn start(&self) -> StateLanes {
+        [Lanes::splat(0.0); 3]
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut StateLanes) -> u8 {
+        let [before, after, set_free] = sums;
+        let share = own_share(self.laws[0].state_share(&bonds.bond), bonds);
+        let (broken, energy) = failing::<A, L, F, D>(&self.laws, self.failure, bonds);
+        let bits = bonds.intact & !broken;
+        if broken != 0 {
+            // Kept apart, so that `after` is the same sum as if the bonds had been broken before.
+            *before += A::select(share, broken, 0.0);
+            *set_free += energy;
         }
-        output.before += before.sum();
-        output.after += after.sum();
+        *after += A::select(share, bits, 0.0);
+        bits
+    }
+
+    #[inline(always)]
+    fn finish(&self, sums: &StateLanes, pick: &impl Pick, output: &mut StateSums) {
+        let [broken, after, set_free] = sums.map(|lanes| pick.sum(lanes));
+        output.before += broken + after;
+        output.after += after;
+        output.set_free += set_free;
     }
 }
 
 /// The smallest stretch s_min of the intact bonds; outputs start at +∞.
-pub struct SmallestStretch<'a, const D: usize> {
-    /// The points.
-    pub geometry: Geometry<'a, D>,
-}
+pub struct SmallestStretch;
 
-impl<const D: usize> Kernel for SmallestStretch<'_, D> {
+impl<const D: usize> Kernel<D> for SmallestStretch {
+    type Sums = Lanes;
     type Output = f64;
     const HOT: bool = true;
 
-    fn points(&self) -> usize {
-        self.geometry.points()
+    fn linear(&self) -> bool {
+        false
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut f64) {
-        let mut smallest = Lanes::splat(f64::INFINITY);
-        for (neighbours, bits) in row.neighbours.iter().zip(row.intact.iter()) {
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { self.geometry.load(row.point, neighbours, false) };
-            smallest = loaded
-                .bond
-                .stretch
-                .select(*bits, f64::INFINITY)
-                .min(smallest);
-        }
-        *output = output.min(smallest.smallest());
+    fn start(&self) -> Lanes {
+        Lanes::splat(f64::INFINITY)
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, smallest: &mut Lanes) -> u8 {
+        let stretch = A::select(bonds.bond.stretch, bonds.intact, f64::INFINITY);
+        *smallest = stretch.min(*smallest);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, smallest: &Lanes, pick: &impl Pick, output: &mut f64) {
+        *output = output.min(pick.smallest(*smallest));
     }
 }
 
@@ -247,39 +278,47 @@ pub struct Stored {
 }
 
 /// Sums up what the intact bonds hold.
-pub struct Energy<'a, L, const D: usize> {
-    /// The bonds; states are not read.
-    pub bonded: Bonded<'a, L, D>,
+pub struct Energy<L> {
+    /// Law of the own end.
+    pub law: L,
 }
 
-impl<L: Law, const D: usize> Kernel for Energy<'_, L, D> {
+/// Energy, state, volume, number.
+pub type StoredLanes = [Lanes; 4];
+
+impl<L: Law, const D: usize> Kernel<D> for Energy<L> {
+    type Sums = StoredLanes;
     type Output = Stored;
     const HOT: bool = true;
+    const CONSTANT: bool = L::CONSTANT;
 
-    fn points(&self) -> usize {
-        self.bonded.points()
+    fn linear(&self) -> bool {
+        L::LINEAR
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut Stored) {
-        let bonded = &self.bonded;
-        let law = &bonded.laws[0];
-        let here = bonded.shared.here::<L>(row.point);
-        let mut energy = Lanes::splat(0.0);
-        let mut state = Lanes::splat(0.0);
-        let mut volume = Lanes::splat(0.0);
-        for (group, neighbours) in row.neighbours.iter().enumerate() {
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { bonded.geometry.load(row.point, neighbours, L::LINEAR) };
-            let bits = row.intact[group] & row.family(group);
-            let weighted = loaded.volume * row.weight_here(group);
-            energy += (law.bond_energy(&loaded.bond, &here) * weighted).select(bits, 0.0);
-            state += (law.state_share(&loaded.bond) * weighted).select(bits, 0.0);
-            volume += loaded.volume.select(bits, 0.0);
-            output.neighbours += row.intact[group].count_ones();
-        }
-        output.energy += energy.sum();
-        output.state_sum += state.sum();
-        output.volume += volume.sum();
+    fn start(&self) -> StoredLanes {
+        [Lanes::splat(0.0); 4]
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut StoredLanes) -> u8 {
+        let family = bonds.family();
+        let energy = own_share(self.law.bond_energy(&bonds.bond, &bonds.ends[0]), bonds);
+        let state = own_share(self.law.state_share(&bonds.bond), bonds);
+        sums[0] += A::select(energy, family, 0.0);
+        sums[1] += A::select(state, family, 0.0);
+        sums[2] += A::select(bonds.volume, family, 0.0);
+        sums[3] += A::select(Lanes::splat(1.0), bonds.intact, 0.0);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, sums: &StoredLanes, pick: &impl Pick, output: &mut Stored) {
+        let [energy, state, volume, neighbours] = sums.map(|lanes| pick.sum(lanes));
+        output.energy += energy;
+        output.state_sum += state;
+        output.volume += volume;
+        output.neighbours += neighbours as u32;
     }
 }

@@ -1,12 +1,12 @@
-//! Which law and failure rule the bonds of a list have.
+//! Which law and failure rule the bonds of a family have.
 
 use crate::damage::CriticalStretch;
-use crate::families::BondList;
+use crate::families::Family;
 use crate::material::{AnyLaw, LinearMicroelastic, Normalised, Ordinary, Pmb};
 
-/// The laws of a list's bonds, at the own and at the far end.
+/// The laws of a family's bonds, at the own and at the far end.
 #[derive(Debug, Clone, Copy)]
-pub enum ListLaw {
+pub enum FamilyLaw {
     /// Prototype or proportional microelastic.
     Pmb([Pmb; 2]),
     /// With a micromodulus for each point.
@@ -19,7 +19,7 @@ pub enum ListLaw {
     Any([AnyLaw; 2]),
 }
 
-impl ListLaw {
+impl FamilyLaw {
     /// From the laws of the own and the far end. Where any block has states, laws without are taken
     /// as [`AnyLaw`], so that fewer versions of the loops suffice.
     pub fn new(here: AnyLaw, there: AnyLaw, with_states: bool) -> Self {
@@ -38,9 +38,9 @@ impl ListLaw {
     }
 }
 
-/// When a list's bonds break.
+/// When a family's bonds break.
 #[derive(Debug, Clone, Copy)]
-pub enum ListFailure {
+pub enum FamilyFailure {
     /// Never.
     Never,
     /// At this stretch.
@@ -50,14 +50,14 @@ pub enum ListFailure {
     PerPoint([f64; 2]),
 }
 
-/// A list with its law and failure.
+/// A family with its law and failure.
 pub struct Bonds {
     /// The bonds.
-    pub list: BondList,
+    pub family: Family,
     /// Their law.
-    pub law: ListLaw,
+    pub law: FamilyLaw,
     /// When they break.
-    pub failure: ListFailure,
+    pub failure: FamilyFailure,
 }
 
 /// What a block's points follow.
@@ -69,15 +69,15 @@ pub struct BlockLaws {
     pub damage: Option<CriticalStretch>,
 }
 
-/// Runs code for whichever law a list has; monomorphised for each.
+/// Runs code for whichever law a family has; monomorphised for each.
 macro_rules! with_laws {
     ($law:expr, $laws:ident => $body:expr) => {
         match $law {
-            $crate::solver::laws::ListLaw::Pmb($laws) => $body,
-            $crate::solver::laws::ListLaw::Normalised($laws) => $body,
-            $crate::solver::laws::ListLaw::LinearMicroelastic($laws) => $body,
-            $crate::solver::laws::ListLaw::Ordinary($laws) => $body,
-            $crate::solver::laws::ListLaw::Any($laws) => $body,
+            $crate::solver::laws::FamilyLaw::Pmb($laws) => $body,
+            $crate::solver::laws::FamilyLaw::Normalised($laws) => $body,
+            $crate::solver::laws::FamilyLaw::LinearMicroelastic($laws) => $body,
+            $crate::solver::laws::FamilyLaw::Ordinary($laws) => $body,
+            $crate::solver::laws::FamilyLaw::Any($laws) => $body,
         }
     };
 }

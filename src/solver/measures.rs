@@ -1,75 +1,101 @@
 //! What is summed over a family at set-up and for output: constants, stiffness, stress, dilatation.
 
-use crate::families::Row;
-use crate::material::{Lanes, Law};
+use crate::material::{Arithmetic, Lanes, Law};
 
-use super::geometry::Geometry;
-use super::kernels::{Bonded, Kernel};
+use super::geometry::Loaded;
+use super::kernels::{Kernel, Pick};
 
 /// Sums what gives a point's constant, over its whole family.
-pub struct Constant<'a, L, const D: usize> {
-    /// The points.
-    pub geometry: Geometry<'a, D>,
+pub struct Constant<L> {
     /// The law of the own end.
     pub law: L,
 }
 
-impl<L: Law, const D: usize> Kernel for Constant<'_, L, D> {
+impl<L: Law, const D: usize> Kernel<D> for Constant<L> {
+    type Sums = Lanes;
     type Output = f64;
+    const FILLED: bool = true;
 
-    fn points(&self) -> usize {
-        self.geometry.points()
+    fn linear(&self) -> bool {
+        L::LINEAR
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut f64) {
-        for (group, neighbours) in row.neighbours.iter().enumerate() {
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { self.geometry.load(row.point, neighbours, L::LINEAR) };
-            let share = self.law.constant_share(loaded.bond.length) * loaded.volume;
-            let share = share * row.weight_here(group);
-            *output += share.select(row.filled(group), 0.0).sum();
-        }
+    fn start(&self) -> Lanes {
+        Lanes::splat(0.0)
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sum: &mut Lanes) -> u8 {
+        let share = self.law.constant_share(bonds.bond.length) * bonds.volume;
+        *sum += A::select(share * bonds.weights.own(), bonds.filled, 0.0);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, sum: &Lanes, pick: &impl Pick, output: &mut f64) {
+        *output += pick.sum(*sum);
     }
 }
 
 /// Entries of a symmetric tensor in the order xx, yy, zz, xy, yz, xz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// Sums D = Σ V C n⊗n over the intact bonds, undeformed (N/m⁴), as xx, yy, zz, xy, yz, xz; C adds up
-/// [`Law::stiffness`] of both ends.
-pub struct Stiffness<'a, L, const D: usize> {
-    /// The bonds; states are not read.
-    pub bonded: Bonded<'a, L, D>,
+/// Adds strength · a⊗a of the intact bonds to the entries of a symmetric tensor.
+#[inline(always)]
+fn add_dyads<A: Arithmetic, const D: usize>(
+    sums: &mut [Lanes; 6],
+    strength: Lanes,
+    along: &[Lanes; D],
+    intact: u8,
+) {
+    for (sum, (a, b)) in sums.iter_mut().zip(PAIRS) {
+        if a < D && b < D {
+            *sum += A::select(strength * along[a] * along[b], intact, 0.0);
+        }
+    }
 }
 
-impl<L: Law, const D: usize> Kernel for Stiffness<'_, L, D> {
-    type Output = [f64; 6];
+fn finish_tensor(sums: &[Lanes; 6], pick: &impl Pick, output: &mut [f64; 6]) {
+    for (output, sum) in output.iter_mut().zip(sums) {
+        *output += pick.sum(*sum);
+    }
+}
 
-    fn points(&self) -> usize {
-        self.bonded.points()
+/// Sums D = Σ V C n⊗n over the intact bonds, undeformed (N/m⁴), as xx, yy, zz, xy, yz, xz; C adds up
+/// [`Law::stiffness`] of both ends.
+pub struct Stiffness<L> {
+    /// Laws of the own and of the far end.
+    pub laws: [L; 2],
+}
+
+impl<L: Law, const D: usize> Kernel<D> for Stiffness<L> {
+    type Sums = [Lanes; 6];
+    type Output = [f64; 6];
+    const CONSTANT: bool = L::CONSTANT;
+
+    fn linear(&self) -> bool {
+        L::LINEAR
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut [f64; 6]) {
-        let bonded = &self.bonded;
-        let here = bonded.shared.here::<L>(row.point);
-        for (group, neighbours) in row.neighbours.iter().enumerate() {
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { bonded.geometry.load(row.point, neighbours, L::LINEAR) };
-            // SAFETY: as above.
-            let there = unsafe { bonded.shared.there::<L>(neighbours) };
-            let length = loaded.bond.length;
-            let own = bonded.laws[0].stiffness(length, &here) * row.weight_here(group);
-            let far = bonded.laws[1].stiffness(length, &there) * row.weight_there(group);
-            let weight = (own + far) * loaded.volume / (length * length);
-            for (sum, (a, b)) in output.iter_mut().zip(PAIRS) {
-                if a < D && b < D {
-                    let entry = weight * loaded.reference[a] * loaded.reference[b];
-                    *sum += entry.select(row.intact[group], 0.0).sum();
-                }
-            }
-        }
+    fn start(&self) -> [Lanes; 6] {
+        [Lanes::splat(0.0); 6]
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut [Lanes; 6]) -> u8 {
+        let length = bonds.bond.length;
+        let own = self.laws[0].stiffness(length, &bonds.ends[0]) * bonds.weights.own();
+        let far = self.laws[1].stiffness(length, &bonds.ends[1]) * bonds.weights.far();
+        let weight = (own + far) * bonds.volume / (length * length);
+        add_dyads::<A, D>(sums, weight, &bonds.reference, bonds.intact);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, sums: &[Lanes; 6], pick: &impl Pick, output: &mut [f64; 6]) {
+        finish_tensor(sums, pick, output);
     }
 }
 
@@ -78,34 +104,37 @@ impl<L: Law, const D: usize> Kernel for Stiffness<'_, L, D> {
 /// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as
 /// Σ T⊗ξ Ṽ; times Fᵀ it is this, the Kirchhoff stress, symmetric and turning with the body. Linear
 /// laws have ξ in place of Y.
-pub struct Stress<'a, L, const D: usize> {
-    /// The bonds.
-    pub bonded: Bonded<'a, L, D>,
+pub struct Stress<L> {
+    /// Law of the own end.
+    pub law: L,
 }
 
-impl<L: Law, const D: usize> Kernel for Stress<'_, L, D> {
+impl<L: Law, const D: usize> Kernel<D> for Stress<L> {
+    type Sums = [Lanes; 6];
     type Output = [f64; 6];
+    const CONSTANT: bool = L::CONSTANT;
+    const STATE: bool = L::STATE;
 
-    fn points(&self) -> usize {
-        self.bonded.points()
+    fn linear(&self) -> bool {
+        L::LINEAR
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut [f64; 6]) {
-        let bonded = &self.bonded;
-        let here = bonded.shared.here::<L>(row.point);
-        for (group, neighbours) in row.neighbours.iter().enumerate() {
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { bonded.geometry.load(row.point, neighbours, L::LINEAR) };
-            let strength = bonded.laws[0].force(&loaded.bond, &here) * row.weight_here(group);
-            let strength = strength * loaded.volume * loaded.inverse_length;
-            for (sum, (a, b)) in output.iter_mut().zip(PAIRS) {
-                if a < D && b < D {
-                    let entry = strength * loaded.along[a] * loaded.along[b];
-                    *sum += entry.select(row.intact[group], 0.0).sum();
-                }
-            }
-        }
+    fn start(&self) -> [Lanes; 6] {
+        [Lanes::splat(0.0); 6]
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut [Lanes; 6]) -> u8 {
+        let strength = self.law.force(&bonds.bond, &bonds.ends[0]) * bonds.weights.own();
+        let strength = strength * bonds.volume * bonds.inverse_length;
+        add_dyads::<A, D>(sums, strength, &bonds.along, bonds.intact);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, sums: &[Lanes; 6], pick: &impl Pick, output: &mut [f64; 6]) {
+        finish_tensor(sums, pick, output);
     }
 }
 
@@ -119,30 +148,38 @@ pub struct Expansion {
 }
 
 /// Sums what gives the dilatation θ = (d/m) Σ ω|ξ|εṼ.
-pub struct Dilatation<'a, const D: usize> {
-    /// The points.
-    pub geometry: Geometry<'a, D>,
+pub struct Dilatation {
     /// Whether to take ε linear in η.
     pub linear: bool,
 }
 
-impl<const D: usize> Kernel for Dilatation<'_, D> {
+impl<const D: usize> Kernel<D> for Dilatation {
+    type Sums = [Lanes; 2];
     type Output = Expansion;
+    const FILLED: bool = true;
 
-    fn points(&self) -> usize {
-        self.geometry.points()
+    fn linear(&self) -> bool {
+        self.linear
     }
 
     #[inline(always)]
-    unsafe fn row(&self, row: Row<'_>, output: &mut Expansion) {
-        for (group, neighbours) in row.neighbours.iter().enumerate() {
-            // SAFETY: passed on to the caller.
-            let loaded = unsafe { self.geometry.load(row.point, neighbours, self.linear) };
-            let length = loaded.bond.length;
-            let weight: Lanes = length * length * loaded.volume * row.weight_here(group);
-            let growth = weight * loaded.bond.stretch;
-            output.weighted_volume += weight.select(row.filled(group), 0.0).sum();
-            output.growth += growth.select(row.intact[group], 0.0).sum();
-        }
+    fn start(&self) -> [Lanes; 2] {
+        [Lanes::splat(0.0); 2]
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sums: &mut [Lanes; 2]) -> u8 {
+        let length = bonds.bond.length;
+        let weight = length * length * bonds.volume * bonds.weights.own();
+        let growth = weight * bonds.bond.stretch;
+        sums[0] += A::select(weight, bonds.filled, 0.0);
+        sums[1] += A::select(growth, bonds.intact, 0.0);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, sums: &[Lanes; 2], pick: &impl Pick, output: &mut Expansion) {
+        output.weighted_volume += pick.sum(sums[0]);
+        output.growth += pick.sum(sums[1]);
     }
 }

@@ -1,17 +1,20 @@
 //! The solver: state, bond loops, time integration, conditions and what is observed.
 
 pub mod assign;
+mod cloud;
 pub mod conditions;
 pub mod damping;
 mod failure;
 pub mod forces;
 mod geometry;
+pub mod instructions;
 mod kernels;
 pub mod laws;
 mod measures;
 pub mod model;
 pub mod observe;
 mod passes;
+mod places;
 mod saved;
 pub mod schedule;
 pub mod simulation;

@@ -6,18 +6,21 @@
 //! the last one, so that states and forces know the same bonds.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::families::BondList;
+use crate::families::{Family, Grid, Which};
 use crate::material::Law;
 
+use super::cloud::{self, Cloud, Node};
 use super::failure::{PerPoint, Uniform};
-use super::geometry::{Geometry, Shared};
-use super::kernels::{Bonded, Force, Kernel, Response, SmallestStretch, State, StateSums};
-use super::laws::{BlockLaws, Bonds, ListFailure, ListLaw, with_laws};
+use super::instructions::Instructions;
+use super::kernels::{Force, Kernel, Response, SmallestStretch, State, StateSums};
+use super::laws::{BlockLaws, Bonds, FamilyFailure, FamilyLaw, with_laws};
 use super::model::Model;
-use super::sweep::sweep;
+use super::places::Places;
+use super::sweep::{Source, sweep};
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
@@ -34,9 +37,14 @@ pub enum Pass {
 }
 
 /// The bonds of a rank and what they know of their points.
-pub struct Passes {
+pub struct Passes<const D: usize> {
     /// The bonds.
     pub bonds: Vec<Bonds>,
+    /// The points as lists of bonds read them; empty if there is no list.
+    nodes: Vec<Node>,
+    /// The points as lattices read them, by grid.
+    places: Vec<Places<D>>,
+    instructions: Instructions,
     /// The laws of each block.
     pub blocks: Vec<BlockLaws>,
     /// Constant of each local point; empty if no law reads it.
@@ -50,14 +58,16 @@ pub struct Passes {
     pub order: Vec<Pass>,
 }
 
-/// The rows of a list whose points have local indices in a range.
-fn rows_of(list: &BondList, points: &Range<usize>) -> Range<usize> {
-    list.rows_below(points.start)..list.rows_below(points.end)
-}
-
-impl Passes {
-    /// For `owned` of `local` points.
-    pub fn new(bonds: Vec<Bonds>, blocks: Vec<BlockLaws>, owned: usize, local: usize) -> Self {
+impl<const D: usize> Passes<D> {
+    /// For the points of a rank, at rest.
+    pub fn new(
+        bonds: Vec<Bonds>,
+        grids: Vec<Arc<Grid>>,
+        blocks: Vec<BlockLaws>,
+        model: &Model<D>,
+        instructions: Instructions,
+    ) -> Self {
+        let (owned, local) = (model.owned(), model.volume.len());
         let with_constants = blocks.iter().any(|block| block.law.has_constant());
         let with_states = blocks.iter().any(|block| block.law.has_state());
         let with_thresholds =
@@ -65,22 +75,82 @@ impl Passes {
         // `AnyLaw` reads constants and states whether its laws have any or not.
         let any = bonds
             .iter()
-            .any(|bonds| matches!(bonds.law, ListLaw::Any(_)));
+            .any(|bonds| matches!(bonds.law, FamilyLaw::Any(_)));
         let order = [
             with_thresholds.then_some(Pass::Thresholds),
             with_states.then_some(Pass::States),
             Some(Pass::Forces),
         ];
+        let lists = bonds
+            .iter()
+            .any(|bonds| matches!(bonds.family, Family::List(_)));
         let zeros = |needed: bool, count: usize| vec![0.0; if needed { count } else { 0 }];
-        Self {
+        let mut passes = Self {
             bonds,
+            nodes: if lists {
+                cloud::nodes(model)
+            } else {
+                Vec::new()
+            },
+            places: grids.into_iter().map(Places::new).collect(),
+            instructions,
             blocks,
             constants: zeros(with_constants || any, local),
             states: zeros(with_states || any, local),
             thresholds: zeros(with_thresholds, local),
             sums: vec![StateSums::default(); if with_states { owned } else { 0 }],
             order: order.into_iter().flatten().collect(),
+        };
+        for places in &mut passes.places {
+            if !passes.states.is_empty() {
+                places.bring_states(Which::All, &passes.states);
+            }
+            if !passes.thresholds.is_empty() {
+                places.bring_thresholds(Which::All, &passes.thresholds);
+            }
         }
+        passes
+    }
+
+    /// Shows the constants to the families, now that they are known.
+    pub fn bring_constants(&mut self) {
+        for places in &mut self.places {
+            places.bring_constants(&self.constants);
+        }
+    }
+
+    /// Shows the families what a pass has found of some of the points; before the first pass, their
+    /// displacements.
+    pub fn bring(
+        &mut self,
+        before: Option<Pass>,
+        which: Which,
+        model: &Model<D>,
+        displacement: &[Vec<f64>; D],
+    ) {
+        for places in &mut self.places {
+            match before {
+                None => places.bring_displacement(which, displacement),
+                Some(Pass::Thresholds) => places.bring_thresholds(which, &self.thresholds),
+                Some(Pass::States) => places.bring_states(which, &self.states),
+                Some(Pass::Forces) => {}
+            }
+        }
+        if before.is_none() && !self.nodes.is_empty() {
+            let (owned, local) = (model.owned(), model.volume.len());
+            let points = match which {
+                Which::Owned => 0..owned,
+                Which::Ghosts => owned..local,
+                Which::All => 0..local,
+            };
+            cloud::bring(&mut self.nodes, points, displacement);
+        }
+    }
+
+    /// Memory of what the families read of the points, bytes.
+    pub fn bytes(&self) -> usize {
+        let places: usize = self.places.iter().map(Places::bytes).sum();
+        size_of_val(&self.nodes[..]) + places
     }
 
     /// What a pass finds and the next one reads; `None` for the last one.
@@ -102,59 +172,78 @@ impl Passes {
     }
 
     /// Makes a pass over a range of the owned points.
-    pub fn run<const D: usize>(
-        &mut self,
-        pass: Pass,
-        geometry: Geometry<'_, D>,
-        points: Range<usize>,
-        responses: &mut [Response<D>],
-    ) {
+    pub fn run(&mut self, pass: Pass, points: Range<usize>, responses: &mut [Response<D>]) {
         let broken_already = !self.sums.is_empty();
-        let Self {
-            bonds: all,
-            constants,
-            states,
-            thresholds,
-            sums,
-            ..
-        } = self;
-        let shared = Shared { constants, states };
         let owned = responses.len();
+        // Taken out while they are written: no kernel reads what its own pass finds.
+        let mut sums = std::mem::take(&mut self.sums);
+        let mut thresholds = match pass {
+            Pass::Thresholds => std::mem::take(&mut self.thresholds),
+            _ => Vec::new(),
+        };
+        let (all, source) = self.split();
         for bonds in all {
-            let rows = rows_of(&bonds.list, &points);
-            let (list, failure) = (&mut bonds.list, bonds.failure);
+            let (family, failure, points) = (&mut bonds.family, bonds.failure, points.clone());
             match pass {
                 Pass::Thresholds => {
-                    let kernel = SmallestStretch { geometry };
-                    sweep(list, rows, &mut thresholds[..owned], &kernel);
+                    let found = &mut thresholds[..owned];
+                    sweep(family, points, found, &SmallestStretch, source);
                 }
                 Pass::States => match bonds.law {
-                    ListLaw::Ordinary(laws) => {
-                        let bonded = bonded(geometry, shared, laws);
-                        sum_states(list, rows, bonded, failure, thresholds, sums);
+                    FamilyLaw::Ordinary(laws) => {
+                        sum_states(family, points, laws, failure, &mut sums, source);
                     }
-                    ListLaw::Any(laws) => {
-                        let bonded = bonded(geometry, shared, laws);
-                        sum_states(list, rows, bonded, failure, thresholds, sums);
+                    FamilyLaw::Any(laws) => {
+                        sum_states(family, points, laws, failure, &mut sums, source);
                     }
                     _ => unreachable!("where there are states, other laws are taken as any law"),
                 },
                 Pass::Forces => with_laws!(bonds.law, laws => {
-                    let bonded = bonded(geometry, shared, laws);
-                    let failure = if broken_already { ListFailure::Never } else { failure };
-                    sum_forces(list, rows, bonded, failure, thresholds, responses);
+                    let failure = match broken_already {
+                        true => FamilyFailure::Never,
+                        false => failure,
+                    };
+                    sum_forces(family, points, laws, failure, responses, source);
                 }),
             }
         }
+        self.sums = sums;
+        if pass == Pass::Thresholds {
+            self.thresholds = thresholds;
+        }
+    }
+
+    /// The bonds, and what kernels read of the points.
+    fn split(&mut self) -> (&mut [Bonds], Source<'_, D>) {
+        let source = Source {
+            cloud: Cloud {
+                nodes: &self.nodes,
+                constants: &self.constants,
+                states: &self.states,
+                thresholds: &self.thresholds,
+            },
+            places: &self.places,
+            instructions: self.instructions,
+        };
+        (&mut self.bonds, source)
+    }
+
+    /// Runs a kernel, made for the law of each family, over all bonds of `owned` points.
+    pub fn sum<T: Default + Clone + Send>(
+        &mut self,
+        owned: usize,
+        sweep: impl Fn(&mut Bonds, &mut [T], Source<'_, D>),
+    ) -> Vec<T> {
+        let mut sums = vec![T::default(); owned];
+        let (all, source) = self.split();
+        for bonds in all {
+            sweep(bonds, &mut sums, source);
+        }
+        sums
     }
 
     /// Ends a pass over the owned points.
-    pub fn finish<const D: usize>(
-        &mut self,
-        pass: Pass,
-        model: &Model<D>,
-        responses: &mut [Response<D>],
-    ) {
+    pub fn finish(&mut self, pass: Pass, model: &Model<D>, responses: &mut [Response<D>]) {
         let blocks = &self.blocks;
         match pass {
             Pass::Thresholds => {
@@ -193,74 +282,61 @@ impl Passes {
     }
 }
 
-fn bonded<'a, L, const D: usize>(
-    geometry: Geometry<'a, D>,
-    shared: Shared<'a>,
-    laws: [L; 2],
-) -> Bonded<'a, L, D> {
-    Bonded {
-        geometry,
-        shared,
-        laws,
-    }
-}
-
 fn sum_states<L: Law, const D: usize>(
-    list: &mut BondList,
-    rows: Range<usize>,
-    bonded: Bonded<'_, L, D>,
-    failure: ListFailure,
-    thresholds: &[f64],
+    family: &mut Family,
+    points: Range<usize>,
+    laws: [L; 2],
+    failure: FamilyFailure,
     sums: &mut [StateSums],
+    source: Source<'_, D>,
 ) {
     match failure {
-        ListFailure::Never => {
+        FamilyFailure::Never => {
             let failure = Uniform(f64::INFINITY);
-            sweep(list, rows, sums, &State { bonded, failure });
+            sweep(family, points, sums, &State { laws, failure }, source);
         }
-        ListFailure::Uniform(critical) => {
+        FamilyFailure::Uniform(critical) => {
             let failure = Uniform(critical);
-            sweep(list, rows, sums, &State { bonded, failure });
+            sweep(family, points, sums, &State { laws, failure }, source);
         }
-        ListFailure::PerPoint(critical) => {
-            let failure = PerPoint {
-                thresholds,
-                critical,
-            };
-            sweep(list, rows, sums, &State { bonded, failure });
+        FamilyFailure::PerPoint(critical) => {
+            let failure = PerPoint { critical };
+            sweep(family, points, sums, &State { laws, failure }, source);
         }
     }
 }
 
 fn sum_forces<L: Law, const D: usize>(
-    list: &mut BondList,
-    rows: Range<usize>,
-    bonded: Bonded<'_, L, D>,
-    failure: ListFailure,
-    thresholds: &[f64],
+    family: &mut Family,
+    points: Range<usize>,
+    laws: [L; 2],
+    failure: FamilyFailure,
     responses: &mut [Response<D>],
+    source: Source<'_, D>,
 ) {
     match failure {
-        ListFailure::Never => {
+        FamilyFailure::Never => {
             let failure = None::<Uniform>;
-            sweep(list, rows, responses, &Force { bonded, failure });
+            sweep(family, points, responses, &Force { laws, failure }, source);
         }
-        ListFailure::Uniform(critical) => {
+        FamilyFailure::Uniform(critical) => {
             let failure = Some(Uniform(critical));
-            sweep(list, rows, responses, &Force { bonded, failure });
+            sweep(family, points, responses, &Force { laws, failure }, source);
         }
-        ListFailure::PerPoint(critical) => {
-            let failure = Some(PerPoint {
-                thresholds,
-                critical,
-            });
-            sweep(list, rows, responses, &Force { bonded, failure });
+        FamilyFailure::PerPoint(critical) => {
+            let failure = Some(PerPoint { critical });
+            sweep(family, points, responses, &Force { laws, failure }, source);
         }
     }
 }
 
-/// Runs a kernel over all bonds of one list.
-pub fn sweep_all<K: Kernel>(list: &mut BondList, outputs: &mut [K::Output], kernel: &K) {
-    let rows = 0..list.len();
-    sweep(list, rows, outputs, kernel);
+/// Runs a kernel over all bonds of one family.
+pub fn sweep_all<K: Kernel<D>, const D: usize>(
+    family: &mut Family,
+    outputs: &mut [K::Output],
+    kernel: &K,
+    source: Source<'_, D>,
+) {
+    let points = 0..outputs.len();
+    sweep(family, points, outputs, kernel, source);
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::partition::{Domain, distribute};
 use crate::{families, points};
 
-use super::assign::{assign, block_laws, cutoffs};
+use super::assign::{assign, block_laws, cutoffs, grids};
 use super::conditions::{Conditions, apply_initials, members};
 use super::damping::Damping;
 use super::forces::{ForceTimes, Forces};
@@ -79,17 +79,20 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let cutoffs = cutoffs(plan);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         let mut domain = distribute(comm, pieces, total, longest)?;
-        let lists = families::search(&domain, plan.bodies.len(), &cutoffs);
-        let lists = agree(comm, lists)?;
+        let frames = grids(plan);
+        families::arrange(&mut domain, &frames);
+        let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
+        let found = families::find(&domain, &frames, bodies, &cutoffs, dimension);
+        let (families, grids) = agree(comm, found)?;
         let model = Model::new(plan, &domain);
         let bodies = plan.bodies.iter();
         let blocks: Vec<_> = bodies.map(|body| block_laws(plan, body)).collect();
         let halo = std::mem::take(&mut domain.halo);
-        let bonds = assign(plan, &domain, &blocks, lists);
-        let mut forces = Forces::new(comm, &model, bonds, halo, blocks);
+        let bonds = assign(plan, &domain, &blocks, families);
+        let mut forces = Forces::new(comm, &model, bonds, grids, halo, blocks);
         let mut state = State::new(&model);
 
-        let stiffness = forces.stiffness(&model, &state.displacement);
+        let stiffness = forces.stiffness(&model);
         let stable = stable_step(comm, &model, &stiffness);
         let (step, last) = choose_step(plan, stable)?;
         let stored = forces.stored(&model, &state.displacement);

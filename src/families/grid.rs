@@ -1,0 +1,212 @@
+//! The local points of a regular grid, line by line: the layout in which the neighbours of adjacent
+//! points are adjacent.
+//!
+//! A line holds the points with the same y and z, x fastest, from the first to the last one here;
+//! places without a point are holes. Lines follow one another without gaps, so a place is one number.
+
+use std::collections::HashMap;
+
+use crate::material::lanes::WIDTH;
+use crate::partition::Domain;
+
+/// A block number for holes.
+pub(super) const HOLE: u16 = u16::MAX;
+
+/// Places copied by one task.
+const CHUNK: usize = 4096;
+
+/// Which blocks lie on a grid, and where the grid lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridFrame {
+    /// Centre of a cell, m.
+    pub origin: [f64; 3],
+    /// Edge of the cells, m.
+    pub spacing: f64,
+    /// Whether each block's points lie on it.
+    pub blocks: Vec<bool>,
+}
+
+impl GridFrame {
+    /// The cell whose centre is at a position (m).
+    pub fn cell(&self, position: [f64; 3]) -> [i64; 3] {
+        std::array::from_fn(|k| ((position[k] - self.origin[k]) / self.spacing).round() as i64)
+    }
+}
+
+/// Points that lie in a row both in the grid and among the local points.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    place: u32,
+    point: u32,
+    length: u32,
+}
+
+/// A line of places.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line {
+    /// y and z.
+    pub(super) at: [i64; 2],
+    /// x of the first place.
+    pub(super) first: i64,
+    /// The first place.
+    pub(super) start: usize,
+    /// Number of places.
+    pub(super) length: usize,
+}
+
+/// The layout of a grid's points on a rank, ghosts included. Before the first and after the last
+/// place there are [`WIDTH`] more without a point, so that vectors can reach over the ends.
+#[derive(Debug)]
+pub struct Grid {
+    /// The grid.
+    pub frame: GridFrame,
+    pub(super) lines: Vec<Line>,
+    /// Local index of the point in each place.
+    pub(super) points: Vec<u32>,
+    /// Block of the point in each place, or [`HOLE`].
+    pub(super) blocks: Vec<u16>,
+    /// Owned points and ghosts, and where each chunk's runs start.
+    runs: [(Vec<Run>, Vec<u32>); 2],
+    by_line: HashMap<[i64; 2], u32>,
+}
+
+impl Grid {
+    /// Lays out the points of a domain that lie on a grid.
+    pub fn new(frame: GridFrame, domain: &Domain) -> Self {
+        let mut cells: Vec<([i64; 3], u32)> = domain
+            .points
+            .iter()
+            .zip(0..)
+            .filter(|(point, _)| frame.blocks[point.block as usize])
+            .map(|(point, index)| {
+                let [x, y, z] = frame.cell(point.position);
+                ([z, y, x], index)
+            })
+            .collect();
+        cells.sort_unstable();
+        let mut lines = Vec::new();
+        let mut points = vec![0; WIDTH];
+        let mut blocks = vec![HOLE; WIDTH];
+        for line in cells.chunk_by(|a, b| a.0[..2] == b.0[..2]) {
+            let ([z, y, first], _) = line[0];
+            let start = points.len();
+            for ([_, _, x], index) in line {
+                let place = start + (x - first) as usize;
+                points.resize(place, 0);
+                blocks.resize(place, HOLE);
+                points.push(*index);
+                blocks.push(domain.points[*index as usize].block as u16);
+            }
+            lines.push(Line {
+                at: [y, z],
+                first,
+                start,
+                length: points.len() - start,
+            });
+        }
+        points.resize(points.len() + WIDTH, 0);
+        blocks.resize(blocks.len() + WIDTH, HOLE);
+        let by_line = lines.iter().map(|line| line.at).zip(0..).collect();
+        let runs = [true, false].map(|owned| {
+            let wanted = |place: usize| {
+                blocks[place] != HOLE && ((points[place] as usize) < domain.owned) == owned
+            };
+            runs(&points, wanted)
+        });
+        Self {
+            frame,
+            lines,
+            points,
+            blocks,
+            runs,
+            by_line,
+        }
+    }
+
+    /// Number of places, those at the ends included.
+    pub fn places(&self) -> usize {
+        self.points.len()
+    }
+
+    /// The line with this y and z, if there is one.
+    pub(super) fn line(&self, at: [i64; 2]) -> Option<&Line> {
+        let index = self.by_line.get(&at)?;
+        Some(&self.lines[*index as usize])
+    }
+
+    /// Copies the values of the local points, or of the ghosts among them only, to their places.
+    pub fn bring(&self, which: Which, values: &[f64], places: &mut [f64]) {
+        use rayon::prelude::*;
+        let kinds = match which {
+            Which::Owned => 0..1,
+            Which::Ghosts => 1..2,
+            Which::All => 0..2,
+        };
+        places
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(chunk, places)| {
+                for (runs, starts) in &self.runs[kinds.clone()] {
+                    for run in &runs[starts[chunk] as usize..starts[chunk + 1] as usize] {
+                        let place = run.place as usize - chunk * CHUNK;
+                        let (point, length) = (run.point as usize, run.length as usize);
+                        places[place..place + length]
+                            .copy_from_slice(&values[point..point + length]);
+                    }
+                }
+            });
+    }
+
+    /// Memory, bytes.
+    pub fn bytes(&self) -> usize {
+        let runs: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
+        self.points.len() * (4 + 2)
+            + size_of_val(&self.lines[..])
+            + runs * size_of::<Run>()
+            + self.by_line.capacity() * 24
+    }
+}
+
+/// Which of the local points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    /// Those that the rank owns.
+    Owned,
+    /// Those of other ranks.
+    Ghosts,
+    /// Both.
+    All,
+}
+
+/// The longest runs of wanted places whose points follow one another, cut at the ends of chunks, and
+/// the first of each chunk.
+fn runs(points: &[u32], wanted: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
+    let mut runs: Vec<Run> = Vec::new();
+    let mut starts = Vec::new();
+    for place in 0..points.len() {
+        if place % CHUNK == 0 {
+            starts.push(runs.len() as u32);
+        }
+        if !wanted(place) {
+            continue;
+        }
+        let (point, place) = (points[place], place as u32);
+        match runs.last_mut() {
+            Some(run)
+                if place as usize % CHUNK != 0
+                    && run.place + run.length == place
+                    && run.point + run.length == point =>
+            {
+                run.length += 1;
+            }
+            _ => runs.push(Run {
+                place,
+                point,
+                length: 1,
+            }),
+        }
+    }
+    starts.push(runs.len() as u32);
+    runs.shrink_to_fit();
+    (runs, starts)
+}

@@ -1,0 +1,582 @@
+//! The lattice family: points of a regular grid, whose neighbours lie at fixed offsets. No list of
+//! neighbours is kept: a bond is one bit, and eight adjacent points along x are worked on together.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::material::lanes::WIDTH;
+use crate::partition::Domain;
+
+use super::grid::{Grid, HOLE};
+
+/// Vectors set up by one task.
+const CHUNK: usize = 256;
+
+/// A bond of every point: where its far end lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Offset {
+    /// ξ, m.
+    pub reference: [f64; 3],
+    /// |ξ|, m.
+    pub length: f64,
+    /// |ξ|², m².
+    pub square: f64,
+    /// 1/|ξ|, 1/m.
+    pub inverse: f64,
+    /// What volumes are multiplied by in the sums of the own and of the far end.
+    pub weights: [f64; 2],
+    /// Steps along x.
+    pub(super) x: i32,
+    /// Which of the lines around.
+    pub(super) line: u32,
+}
+
+/// Up to eight adjacent points: the first one's place and local index; the others follow.
+#[derive(Debug, Clone, Copy)]
+struct Vector {
+    place: u32,
+    point: u32,
+    line: u32,
+    /// A bit for each of the points that has a neighbour.
+    members: u8,
+}
+
+/// The bonds from points of one block to points of one block on the same grid.
+#[derive(Debug, Clone)]
+pub struct BondLattice {
+    /// Block of the points that sum over these bonds.
+    pub here: usize,
+    /// Block of their neighbours.
+    pub there: usize,
+    /// Which of the rank's grids they lie on.
+    pub index: usize,
+    /// That grid.
+    pub grid: Arc<Grid>,
+    /// Volume of each neighbour, m³.
+    pub volume: f64,
+    /// Volume of each point itself, m³.
+    pub own_volume: f64,
+    offsets: Vec<Offset>,
+    /// Whether any weight of an offset is not 1, and whether those of the ends differ.
+    weighted: [bool; 2],
+    /// By local index.
+    vectors: Vec<Vector>,
+    /// y and z of the lines around, in steps.
+    around: Vec<[i64; 2]>,
+    /// For each line of the grid: how far from a place the place with the same x lies on each of the
+    /// lines around.
+    shifts: Vec<i32>,
+    /// For each vector and offset a byte with a bit for each of the points, clear where there is no
+    /// bond or it is broken.
+    intact: Vec<u8>,
+    /// As `intact`, clear where a bond can never break; all can break if there is none.
+    breakable: Option<Vec<u8>>,
+    bonds: u64,
+}
+
+/// The bonds of up to eight adjacent points.
+pub struct Adjacent<'a> {
+    /// The first point's place on the grid.
+    pub place: usize,
+    /// Its local index.
+    pub point: usize,
+    /// A bit for each of the points that has a neighbour.
+    pub members: u8,
+    /// Where its bits stand among those of all vectors.
+    pub bits: Range<usize>,
+    /// The offsets.
+    pub offsets: &'a [Offset],
+    /// Which bonds are still there; a byte for each offset.
+    pub intact: &'a mut [u8],
+    /// Which bonds can break.
+    pub breakable: Option<&'a [u8]>,
+    /// Whether any weight is not 1, and whether those of the ends differ.
+    pub weighted: [bool; 2],
+    shifts: &'a [i32],
+    last: isize,
+}
+
+/// A range of vectors that can be split between threads.
+pub struct Vectors<'a> {
+    lattice: Shared<'a>,
+    vectors: &'a [Vector],
+    first: usize,
+    intact: &'a mut [u8],
+    breakable: Option<&'a [u8]>,
+}
+
+/// What all vectors of a lattice share.
+#[derive(Clone, Copy)]
+struct Shared<'a> {
+    offsets: &'a [Offset],
+    weighted: [bool; 2],
+    shifts: &'a [i32],
+    around: usize,
+    last: isize,
+}
+
+impl BondLattice {
+    /// The bonds between two blocks on a grid of `dimension` dimensions; `cutoff` (m) is the longest.
+    pub fn new(
+        index: usize,
+        grid: Arc<Grid>,
+        domain: &Domain,
+        blocks: [usize; 2],
+        cutoff: f64,
+        dimension: usize,
+    ) -> Self {
+        let (offsets, around) = offsets(grid.frame.spacing, cutoff, dimension);
+        let mut shifts = vec![0; grid.lines.len() * around.len()];
+        let origin = |line: &super::grid::Line| line.start as i64 - line.first;
+        for (line, shifts) in grid.lines.iter().zip(shifts.chunks_mut(around.len())) {
+            for ([y, z], shift) in around.iter().zip(shifts) {
+                // Where there is no line there is no bond either, so any place will do.
+                if let Some(other) = grid.line([line.at[0] + y, line.at[1] + z]) {
+                    *shift = (origin(other) - origin(line)).clamp(-(1 << 30), 1 << 30) as i32;
+                }
+            }
+        }
+        let volume = |block: usize| {
+            let of_block = |point: &&crate::points::Point| point.block as usize == block;
+            let point = domain.points.iter().find(of_block);
+            point.map_or(0.0, |point| point.volume)
+        };
+        let [here, there] = blocks;
+        let mut lattice = Self {
+            here,
+            there,
+            index,
+            volume: volume(there),
+            own_volume: volume(here),
+            offsets,
+            weighted: [false; 2],
+            vectors: vectors(&grid, domain.owned),
+            around,
+            shifts,
+            intact: Vec::new(),
+            breakable: None,
+            bonds: 0,
+            grid,
+        };
+        lattice.find_bonds();
+        lattice
+    }
+
+    /// Sets all bits of bonds and keeps the vectors that have any.
+    fn find_bonds(&mut self) {
+        let count = self.offsets.len();
+        let mut intact = vec![0; self.vectors.len() * count];
+        intact
+            .par_chunks_mut(CHUNK * count)
+            .zip(self.vectors.par_chunks(CHUNK))
+            .for_each(|(bits, vectors)| {
+                for (bits, vector) in bits.chunks_mut(count).zip(vectors) {
+                    self.family(vector, bits);
+                }
+            });
+        self.bonds = intact.iter().map(|bits| u64::from(bits.count_ones())).sum();
+        let mut kept = 0;
+        for k in 0..self.vectors.len() {
+            let bits = k * count..(k + 1) * count;
+            let members = intact[bits.clone()].iter().fold(0, |all, bits| all | bits);
+            if members != 0 {
+                intact.copy_within(bits, kept * count);
+                self.vectors[kept] = Vector {
+                    members,
+                    ..self.vectors[k]
+                };
+                kept += 1;
+            }
+        }
+        self.vectors.truncate(kept);
+        self.vectors.shrink_to_fit();
+        intact.truncate(kept * count);
+        intact.shrink_to_fit();
+        self.intact = intact;
+    }
+
+    /// The bits of a vector's bonds, broken ones included.
+    fn family(&self, vector: &Vector, bits: &mut [u8]) {
+        let grid = &*self.grid;
+        let line = &grid.lines[vector.line as usize];
+        let x = line.first + vector.place as i64 - line.start as i64;
+        let own = vector.members & mask(grid, vector.place as usize, self.here);
+        let mut around = usize::MAX;
+        let mut target = None;
+        for (offset, bits) in self.offsets.iter().zip(bits) {
+            if offset.line as usize != around {
+                around = offset.line as usize;
+                let [y, z] = self.around[around];
+                target = grid.line([line.at[0] + y, line.at[1] + z]);
+            }
+            *bits = 0;
+            let Some(target) = target else { continue };
+            let first = x + i64::from(offset.x) - target.first;
+            if first <= -(WIDTH as i64) || first >= target.length as i64 {
+                continue;
+            }
+            let within = |k: i64| (0..target.length as i64).contains(&(first + k));
+            let bit = |k: usize| u8::from(within(k as i64)) << k;
+            let inside = (0..WIDTH).fold(0, |all, k| all | bit(k));
+            let place = (target.start as i64 + first) as usize;
+            *bits = own & inside & mask(grid, place, self.there);
+        }
+    }
+
+    /// All bonds, broken ones included.
+    pub fn bonds(&self) -> u64 {
+        self.bonds
+    }
+
+    /// Number of vectors.
+    pub fn len(&self) -> usize {
+        self.vectors.len()
+    }
+
+    /// Whether there is no bond.
+    pub fn is_empty(&self) -> bool {
+        self.vectors.is_empty()
+    }
+
+    /// Number of bonds of a point with a whole family.
+    pub fn offsets(&self) -> usize {
+        self.offsets.len()
+    }
+
+    /// Number of vectors whose points have local indices below `limit`.
+    pub fn vectors_below(&self, limit: usize) -> usize {
+        self.vectors
+            .partition_point(|vector| (vector.point as usize) < limit)
+    }
+
+    /// One more than the largest local index of a point that sums over these bonds.
+    pub fn reach(&self) -> usize {
+        let last = self.vectors.last();
+        last.map_or(0, |vector| vector.point as usize + WIDTH)
+    }
+
+    /// The vectors of a range.
+    pub fn vectors(&mut self, range: Range<usize>) -> Vectors<'_> {
+        let count = self.offsets.len();
+        let bits = range.start * count..range.end * count;
+        Vectors {
+            lattice: Shared {
+                offsets: &self.offsets,
+                weighted: self.weighted,
+                shifts: &self.shifts,
+                around: self.around.len(),
+                last: (self.grid.places() - WIDTH) as isize,
+            },
+            first: range.start,
+            vectors: &self.vectors[range],
+            breakable: self.breakable.as_ref().map(|all| &all[bits.clone()]),
+            intact: &mut self.intact[bits],
+        }
+    }
+
+    /// As [`super::BondList::weigh`], where `weight` is that of an offset ξ (m).
+    pub fn weigh(&mut self, end: usize, weight: impl Fn([f64; 3]) -> f64) {
+        for offset in &mut self.offsets {
+            offset.weights[end] = weight(offset.reference);
+            if end == 0 {
+                offset.weights[1] = offset.weights[0];
+            }
+        }
+        self.weighted[end] = true;
+    }
+
+    /// Calls `found` with the index of each byte of bits, the bit, and the local indices of both
+    /// ends, for the bits that `which` picks from that byte's index.
+    fn for_each(
+        &self,
+        which: impl Fn(usize) -> u8,
+        mut found: impl FnMut(usize, usize, [usize; 2]),
+    ) {
+        let count = self.offsets.len();
+        for (k, vector) in self.vectors.iter().enumerate() {
+            let shifts = &self.shifts[vector.line as usize * self.around.len()..];
+            for (o, offset) in self.offsets.iter().enumerate() {
+                let byte = k * count + o;
+                let mut bits = which(byte);
+                while bits != 0 {
+                    let lane = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let shift = shifts[offset.line as usize] + offset.x;
+                    let place = vector.place as i64 + i64::from(shift) + lane as i64;
+                    let there = self.grid.points[place as usize] as usize;
+                    found(byte, lane, [vector.point as usize + lane, there]);
+                }
+            }
+        }
+    }
+
+    /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
+    pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
+        let mut breakable = vec![u8::MAX; self.intact.len()];
+        self.for_each(
+            |byte| self.intact[byte],
+            |byte, lane, ends| {
+                if ends.into_iter().any(&protected) {
+                    breakable[byte] &= !(1 << lane);
+                }
+            },
+        );
+        self.breakable = Some(breakable);
+    }
+
+    /// Breaks the bonds for which `cut` (of the two local indices) holds.
+    pub fn cut(&mut self, cut: impl Fn(usize, usize) -> bool) {
+        let mut intact = self.intact.clone();
+        self.for_each(
+            |byte| self.intact[byte],
+            |byte, lane, [here, there]| {
+                if cut(here, there) {
+                    intact[byte] &= !(1 << lane);
+                }
+            },
+        );
+        self.intact = intact;
+    }
+
+    /// Calls `found` with the local indices of both ends of every intact bond.
+    pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
+        self.for_each(
+            |byte| self.intact[byte],
+            |_, _, [here, there]| found(here, there),
+        );
+    }
+
+    /// Bytes of bits a point.
+    pub fn row_length(&self) -> usize {
+        self.offsets.len().div_ceil(8)
+    }
+
+    /// Calls `row` with the local index of each point and the number of the vector and lane that it
+    /// is.
+    pub fn for_each_point(&self, mut row: impl FnMut(usize, usize, usize)) {
+        for (k, vector) in self.vectors.iter().enumerate() {
+            for lane in (0..WIDTH).filter(|lane| vector.members >> lane & 1 == 1) {
+                row(vector.point as usize + lane, k, lane);
+            }
+        }
+    }
+
+    /// Copies the bits of a point's bonds to a row of bytes.
+    pub fn save_row(&self, vector: usize, lane: usize, row: &mut [u8]) {
+        let count = self.offsets.len();
+        row.fill(0);
+        for (o, bits) in self.intact[vector * count..(vector + 1) * count]
+            .iter()
+            .enumerate()
+        {
+            row[o / 8] |= (bits >> lane & 1) << (o % 8);
+        }
+    }
+
+    /// Takes the bits of a point's bonds from a row of bytes.
+    pub fn restore_row(&mut self, vector: usize, lane: usize, row: &[u8]) {
+        let count = self.offsets.len();
+        let all = &mut self.intact[vector * count..(vector + 1) * count];
+        for (o, bits) in all.iter_mut().enumerate() {
+            let bit = row[o / 8] >> (o % 8) & 1;
+            *bits = *bits & !(1 << lane) | bit << lane;
+        }
+    }
+
+    /// A byte for each vector and offset with a bit for each bond, broken or not.
+    pub fn filled(&self) -> Vec<u8> {
+        let count = self.offsets.len();
+        let mut filled = vec![0; self.intact.len()];
+        for (bits, vector) in filled.chunks_mut(count).zip(&self.vectors) {
+            self.family(vector, bits);
+        }
+        filled
+    }
+
+    /// Memory that the lattice takes beside its grid, bytes.
+    pub fn bytes(&self) -> usize {
+        let bits = self.intact.len();
+        bits + self.breakable.as_ref().map_or(0, Vec::len)
+            + size_of_val(&self.vectors[..])
+            + size_of_val(&self.shifts[..])
+    }
+}
+
+/// The offsets up to a length (m) by z, y and x, and the lines that they lead to.
+fn offsets(spacing: f64, cutoff: f64, dimension: usize) -> (Vec<Offset>, Vec<[i64; 2]>) {
+    let reach = (cutoff / spacing).floor() as i64;
+    let range = |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
+    let (mut offsets, mut around) = (Vec::new(), Vec::new());
+    for z in range(2) {
+        for y in range(1) {
+            let mut used = false;
+            for x in range(0) {
+                let square = (x * x + y * y + z * z) as f64 * spacing * spacing;
+                let length = square.sqrt();
+                if square == 0.0 || length > cutoff {
+                    continue;
+                }
+                used = true;
+                offsets.push(Offset {
+                    reference: [x, y, z].map(|steps| steps as f64 * spacing),
+                    length,
+                    square,
+                    inverse: 1.0 / length,
+                    weights: [1.0; 2],
+                    x: x as i32,
+                    line: around.len() as u32,
+                });
+            }
+            if used {
+                around.push([y, z]);
+            }
+        }
+    }
+    (offsets, around)
+}
+
+/// A bit for each of eight places with a point of a block.
+fn mask(grid: &Grid, place: usize, block: usize) -> u8 {
+    let blocks = &grid.blocks[place..place + WIDTH];
+    let bit = |k: usize| u8::from(blocks[k] as usize == block) << k;
+    (0..WIDTH).fold(0, |all, k| all | bit(k))
+}
+
+/// The vectors of a grid by local index; all their points are members.
+fn vectors(grid: &Grid, owned: usize) -> Vec<Vector> {
+    let mut vectors = Vec::new();
+    for (line, index) in grid.lines.iter().zip(0..) {
+        let mut open: Option<(Vector, u32)> = None;
+        for place in line.start..line.start + line.length {
+            let point = grid.points[place];
+            if grid.blocks[place] == HOLE || point as usize >= owned {
+                vectors.extend(open.take().map(|(vector, _)| vector));
+                continue;
+            }
+            match &mut open {
+                Some((vector, length))
+                    if (*length as usize) < WIDTH && vector.point + *length == point =>
+                {
+                    vector.members |= 1 << *length;
+                    *length += 1;
+                }
+                _ => {
+                    let first = Vector {
+                        place: place as u32,
+                        point,
+                        line: index,
+                        members: 1,
+                    };
+                    vectors.extend(open.replace((first, 1)).map(|(vector, _)| vector));
+                }
+            }
+        }
+        vectors.extend(open.map(|(vector, _)| vector));
+    }
+    vectors.sort_unstable_by_key(|vector| vector.point);
+    vectors
+}
+
+impl<'a> Vectors<'a> {
+    /// Number of vectors.
+    pub fn len(&self) -> usize {
+        self.vectors.len()
+    }
+
+    /// Whether there is no vector.
+    pub fn is_empty(&self) -> bool {
+        self.vectors.is_empty()
+    }
+
+    /// The local index of a vector's first point.
+    pub fn point(&self, vector: usize) -> usize {
+        self.vectors[vector].point as usize
+    }
+
+    /// The vectors before `vector` and those from it on.
+    pub fn split_at(self, vector: usize) -> (Self, Self) {
+        let bits = vector * self.lattice.offsets.len();
+        let (vectors_a, vectors_b) = self.vectors.split_at(vector);
+        let (intact_a, intact_b) = self.intact.split_at_mut(bits);
+        let breakable = self.breakable.map(|all| all.split_at(bits));
+        let first = Self {
+            lattice: self.lattice,
+            vectors: vectors_a,
+            first: self.first,
+            intact: intact_a,
+            breakable: breakable.map(|(a, _)| a),
+        };
+        let second = Self {
+            lattice: self.lattice,
+            vectors: vectors_b,
+            first: self.first + vector,
+            intact: intact_b,
+            breakable: breakable.map(|(_, b)| b),
+        };
+        (first, second)
+    }
+
+    /// The bonds of one vector.
+    #[inline(always)]
+    pub fn vector(&mut self, vector: usize) -> Adjacent<'_> {
+        let Shared {
+            offsets,
+            weighted,
+            shifts,
+            around,
+            last,
+        } = self.lattice;
+        let count = offsets.len();
+        let all = (self.first + vector) * count..(self.first + vector + 1) * count;
+        let bits = vector * count..(vector + 1) * count;
+        let vector = &self.vectors[vector];
+        Adjacent {
+            place: vector.place as usize,
+            point: vector.point as usize,
+            members: vector.members,
+            bits: all,
+            offsets,
+            breakable: self.breakable.map(|all| &all[bits.clone()]),
+            intact: &mut self.intact[bits],
+            weighted,
+            shifts: &shifts[vector.line as usize * around..(vector.line as usize + 1) * around],
+            last,
+        }
+    }
+}
+
+impl Adjacent<'_> {
+    /// The place of the first of the eight far ends at an offset. Always one from which eight places
+    /// can be read; where none of the bonds exists it is meaningless.
+    #[inline(always)]
+    pub fn far(&self, offset: &Offset) -> usize {
+        let shift = self.shifts[offset.line as usize] + offset.x;
+        (self.place as isize + shift as isize).clamp(0, self.last) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_of_known_horizons() {
+        let count = |cutoff, dimension| offsets(1.0, cutoff, dimension).0.len();
+        assert_eq!(count(3.015, 3), 122);
+        assert_eq!(count(2.52, 3), 80);
+        assert_eq!(count(3.0, 2), 28);
+        assert_eq!(count(3.0, 1), 6);
+    }
+
+    #[test]
+    fn both_ends_of_a_bond_have_the_same_length() {
+        let (offsets, _) = offsets(0.1, 0.35, 3);
+        for offset in &offsets {
+            let opposite = offset.reference.map(|x| -x);
+            let other = offsets.iter().find(|other| other.reference == opposite);
+            assert_eq!(other.unwrap().length, offset.length);
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Bonds kept as lattices and in lists give the same physics, up to rounding.
+
+mod support;
+
+use fissure::deck::plan::Field;
+use fissure::solver::Simulation;
+use fissure::solver::observe::Snapshot;
+use support::{plan, simulate_on};
+
+/// Two bodies on one grid, with a hole, a crack, a zone without failure and supports; `LAW` and
+/// `GRID` stand for what differs.
+const SOLID: &str = "
+dimension = '3d'
+[grid]
+spacing = 1
+GRID
+[material]
+one.LAW = { density = 2, youngs_modulus = 5 RATIO }
+two.LAW = { density = 3, youngs_modulus = 8 RATIO }
+[damage.brittle.critical_stretch]
+fracture_energy = 0.004
+alpha = ALPHA
+no_failure = ['end']
+[body.left]
+material = 'one'
+damage = 'brittle'
+shape.difference = [
+    { box = { lower = [0, 0, 0], upper = [9, 7, 6] } },
+    { sphere = { centre = [4, 3, 3], radius = 1.6 } },
+]
+[body.right]
+material = 'two'
+damage = 'brittle'
+shape.box = { lower = [9, 0, 0], upper = [16, 7, 6] }
+[crack.notch.rectangle]
+corner = [5, 0, 0]
+edge_a = [0, 3, 0]
+edge_b = [0, 0, 6]
+[set]
+end.where = 'x > 14'
+start.where = 'x < 1'
+[condition.hold]
+set = 'start'
+displacement = [0, 'free', 0]
+[initial.burst]
+velocity = ['0.02*x', '0.02*y + 0.003*sin(x)', '0.002*z*x']
+[time]
+end = 6
+";
+
+/// A disc with a file's regular points beside it and two grids that do not match, in the plane.
+const PLANE: &str = "
+dimension = 'plane-strain'
+[grid]
+spacing = 1
+GRID
+[material]
+one.LAW = { density = 2, youngs_modulus = 5 RATIO }
+[damage.brittle.critical_stretch]
+fracture_energy = 0.01
+alpha = ALPHA
+[body.disc]
+material = 'one'
+damage = 'brittle'
+shape.disc = { centre = [0.2, 0.1], radius = 9 }
+[body.fine]
+material = 'one'
+spacing = 0.7
+damage = 'brittle'
+shape.box = { lower = [10, -5], upper = [16, 5] }
+[initial.burst]
+velocity = ['0.02*x', '0.02*y + 0.003*sin(x)']
+[time]
+end = 6
+";
+
+/// Everything that bonds determine, by global id.
+fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
+    let fields = [
+        Field::Displacement,
+        Field::ForceDensity,
+        Field::Damage,
+        Field::StrainEnergyDensity,
+        Field::Dilatation,
+        Field::WeightedVolume,
+        Field::Stress,
+        Field::Neighbours,
+    ];
+    let pieces = simulate_on(ranks, deck, |mut simulation: Simulation<D>| {
+        while simulation.number < simulation.last {
+            simulation.advance();
+        }
+        simulation.check().unwrap();
+        let snapshot = Snapshot::new(&mut simulation);
+        let values = fields.map(|field| snapshot.field(&mut simulation, field));
+        (
+            simulation.model.ids[..simulation.model.owned()].to_vec(),
+            values,
+        )
+    });
+    let order = |k: usize| {
+        let mut rows: Vec<(u64, &[f64])> = Vec::new();
+        for (ids, values) in &pieces {
+            let width = values[k].len() / ids.len().max(1);
+            let chunks = values[k].chunks(width.max(1));
+            rows.extend(ids.iter().copied().zip(chunks));
+        }
+        rows.sort_by_key(|row| row.0);
+        rows.into_iter().flat_map(|row| row.1.to_vec()).collect()
+    };
+    (0..fields.len()).map(|k| (fields[k], order(k))).collect()
+}
+
+fn compare<const D: usize>(deck: &str) {
+    let with = |family: &str| deck.replace("[grid]", &format!("[grid]\nfamily = '{family}'"));
+    plan(&with("lattice"));
+    let list = measure::<D>(1, &with("list"));
+    let lattice = measure::<D>(1, &with("lattice"));
+    let broken: f64 = list[2].1.iter().sum();
+    assert!(broken > 1.0, "hardly anything broke: {broken}");
+    for ((field, list), (_, lattice)) in list.iter().zip(&lattice) {
+        assert_eq!(list.len(), lattice.len());
+        let largest = list.iter().fold(0.0_f64, |all, value| all.max(value.abs()));
+        for (a, b) in list.iter().zip(lattice) {
+            let error = (a - b).abs() / largest;
+            assert!(error < 1e-9, "{field:?}: {a} {b}");
+        }
+    }
+    // On ranks that share the grid the lattice gives the same bits.
+    for ((field, one), (_, three)) in lattice.iter().zip(&measure::<D>(3, &with("lattice"))) {
+        assert_eq!(one, three, "{field:?}");
+    }
+}
+
+fn deck(template: &str, law: &str, ratio: &str, grid: &str, alpha: &str) -> String {
+    template
+        .replace("LAW", law)
+        .replace("RATIO", ratio)
+        .replace("GRID", grid)
+        .replace("ALPHA", alpha)
+}
+
+#[test]
+fn prototype_microelastic_bonds() {
+    let grid = "horizon = 3.015";
+    compare::<3>(&deck(SOLID, "pmb", "", grid, "0.25"));
+    compare::<2>(&deck(PLANE, "pmb", "", grid, "0"));
+}
+
+#[test]
+fn ordinary_bonds() {
+    let ratio = ", poisson_ratio = 0.3, influence = 'inverse'";
+    let grid = "horizon = 2\nvolume_correction = 'exact'";
+    compare::<3>(&deck(SOLID, "ordinary", ratio, grid, "0"));
+    compare::<2>(&deck(PLANE, "ordinary", ratio, grid, "0.25"));
+}
+
+#[test]
+fn normalised_bonds() {
+    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
+    compare::<3>(&deck(SOLID, "normalised_pmb", "", grid, "0"));
+    compare::<2>(&deck(PLANE, "normalised_pmb", "", grid, "0.25"));
+}
