@@ -1,6 +1,28 @@
 //! How this process was launched: its rank before MPI has started, its cores and its threads.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::ExitCode;
+
+use fissure::comm::Communicator;
+use fissure::comm::mpi::World;
 use fissure::error::{Error, Result};
+use fissure::output;
+
+use super::{finish, tell};
+
+/// Starts MPI, runs `body` on all ranks, and ends MPI. Its errors must be the same on all ranks.
+pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
+    output::initialise();
+    let world = match World::start() {
+        Ok(world) => world,
+        Err(error) => return finish(Err(error), true),
+    };
+    let speaks = world.rank() == 0;
+    // A panic on one rank would leave the others waiting; its message has been printed.
+    catch_unwind(AssertUnwindSafe(|| body(&world)))
+        .unwrap_or_else(|_| world.abort(1))
+        .unwrap_or_else(|error| finish(Err(error), speaks))
+}
 
 /// The first of some environment variables that holds a number.
 fn number(names: &[&str]) -> Option<usize> {
@@ -53,26 +75,30 @@ fn is_bound() -> bool {
     let Ok(list) = std::fs::read_to_string("/sys/devices/system/cpu/online") else {
         return false;
     };
-    let online: usize = list
-        .trim()
-        .split(',')
-        .map(|range| match range.split_once('-') {
-            Some((first, last)) => {
-                let bounds = (first.parse::<usize>(), last.parse::<usize>());
-                if let (Ok(first), Ok(last)) = bounds {
-                    last + 1 - first
-                } else {
-                    1
-                }
-            }
-            None => 1,
-        })
-        .sum();
-    cores() < online
+    cores() < cores_in(&list)
 }
 
-/// What is wrong with the way that threads and cores fit together, if anything.
-pub fn warning(threads: usize) -> Option<String> {
+/// The number of cores in a list such as `0-3,8`, as Linux writes them; 0 of an empty one.
+pub fn cores_in(list: &str) -> usize {
+    let range = |range: &str| match range.split_once('-') {
+        Some((first, last)) => match (first.parse::<usize>(), last.parse::<usize>()) {
+            (Ok(first), Ok(last)) => last + 1 - first,
+            _ => 1,
+        },
+        None => 1,
+    };
+    let ranges = list.trim().split(',').filter(|range| !range.is_empty());
+    ranges.map(range).sum()
+}
+
+/// Says what is wrong with the way that threads and cores fit together, if anything.
+pub fn warn(threads: usize) {
+    if let Some(warning) = warning(threads) {
+        tell!("warning: {warning}");
+    }
+}
+
+fn warning(threads: usize) -> Option<String> {
     let (cores, ranks) = (cores(), ranks_on_host());
     if threads > cores {
         return Some(format!(
@@ -97,4 +123,16 @@ pub fn start_threads(threads: usize) -> Result<()> {
         .num_threads(threads)
         .build_global()
         .map_err(|error| Error::run(format!("cannot start {threads} threads: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_of_cores() {
+        assert_eq!(cores_in("0-3,8\n"), 5);
+        assert_eq!(cores_in("2"), 1);
+        assert_eq!(cores_in(""), 0);
+    }
 }

@@ -1,11 +1,15 @@
 //! The command line: one subcommand a file.
 
+mod bench;
+mod bench_report;
 mod check;
 mod explain;
 mod files;
 mod format;
 mod init;
 mod launch;
+mod machine_limits;
+mod memory;
 mod plot;
 mod progress;
 mod recorder;
@@ -53,6 +57,7 @@ Examples:
   fissure run plate.toml                        run it; the result goes to out/plate/
   mpirun -n 4 fissure run plate.toml            the same on 4 ranks
   fissure plot out/plate/result.vtkhdf          a picture of the damage at the end
+  fissure bench                                 how fast this machine is at it
 
 Exit codes: 0 done, 1 the run failed, 2 the deck or the arguments are wrong, 75 the run was
 stopped by a signal or the wall-clock limit and can be continued with --restart.")]
@@ -76,6 +81,7 @@ enum Command {
     Plot(PlotArguments),
     Explain(DeckArguments),
     Init(InitArguments),
+    Bench(BenchArguments),
 }
 
 /// Run a deck, alone or under mpirun.
@@ -225,6 +231,50 @@ struct InitArguments {
     name: PathBuf,
 }
 
+/// Measure the speed of the time loop on a fixed problem, alone or under mpirun.
+///
+/// A cubic lattice with 122 neighbours within the horizon, a fixed step, no output. Prints the bond
+/// updates per second and core, the time by phase, the memory of the whole process, the halo, and
+/// which part of what the machine can do that is: its bandwidth and its rate of arithmetic are
+/// measured on the same threads. docs/performance.md says what each figure means.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure bench                                 262 144 points, PMB, bonds can break
+  fissure bench --law lps --no-failure --threads 1
+  fissure bench --points 128,128,64             edges of a block
+  mpirun -n 2 --bind-to none fissure bench --threads 1
+  fissure bench --json                          one line for scripts")]
+struct BenchArguments {
+    /// The law of the bonds.
+    #[arg(long, value_enum, default_value_t = bench::Law::Pmb)]
+    law: bench::Law,
+
+    /// Bonds cannot break; otherwise each is tested in every step, and none breaks.
+    #[arg(long)]
+    no_failure: bool,
+
+    /// Points of a cube (the nearest one is taken), or the edges of a block: X,Y,Z.
+    #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
+    points: [u64; 3],
+
+    /// Time steps that are measured; a tenth as many go before them.
+    #[arg(short, long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: u32,
+
+    /// Threads of each rank [default: the cores of the rank].
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+
+    /// Leave out the limits of the machine, which take some 100 MiB and seconds of their own.
+    #[arg(long)]
+    no_limits: bool,
+
+    /// Print one line of JSON with every figure in SI units.
+    #[arg(long)]
+    json: bool,
+}
+
 /// How much is printed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Verbosity {
@@ -257,6 +307,7 @@ pub fn main() -> ExitCode {
     };
     let outcome = match line.command {
         Command::Run(arguments) => return run::run(&arguments, verbosity),
+        Command::Bench(arguments) => return bench::bench(&arguments, verbosity),
         // Under mpirun these are done once.
         _ if !speaks => Ok(()),
         Command::Check(arguments) => check::check(&arguments, verbosity),

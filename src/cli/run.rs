@@ -1,7 +1,6 @@
 //! `fissure run`: from a deck to a result.
 
 use crate::cli::{say, tell};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -20,7 +19,7 @@ use super::recorder::{Recorder, Start, can_continue};
 use super::restart::{Keeper, Restart, restart};
 use super::summary::Summary;
 use super::watch::{Reason, STOPPED, Signals, Watch};
-use super::{RunArguments, Verbosity, finish, launch};
+use super::{RunArguments, Verbosity, launch};
 
 /// How a run ended.
 enum Ending {
@@ -31,22 +30,13 @@ enum Ending {
 /// Runs a deck on all ranks and ends MPI.
 pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
     let start = Instant::now();
-    output::initialise();
-    let world = match World::start() {
-        Ok(world) => world,
-        Err(error) => return finish(Err(error), true),
-    };
-    let speaks = world.rank() == 0;
-    // A panic on one rank would leave the others waiting; its message has been printed.
-    let outcome = catch_unwind(AssertUnwindSafe(|| {
-        run_deck(&world, arguments, verbosity, start)
-    }))
-    .unwrap_or_else(|_| world.abort(1));
-    match outcome {
-        Ok(Ending::Stopped) => ExitCode::from(STOPPED),
-        Ok(Ending::Complete) => ExitCode::SUCCESS,
-        Err(error) => finish(Err(error), speaks),
-    }
+    launch::on_all_ranks(|world| {
+        let ending = run_deck(world, arguments, verbosity, start)?;
+        Ok(match ending {
+            Ending::Stopped => ExitCode::from(STOPPED),
+            Ending::Complete => ExitCode::SUCCESS,
+        })
+    })
 }
 
 fn run_deck(
@@ -61,12 +51,8 @@ fn run_deck(
     let explained = agree(world, deck.explain())?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;
-    if let (Some(warning), true, true) = (
-        launch::warning(threads),
-        world.rank() == 0,
-        verbosity > Verbosity::Quiet,
-    ) {
-        tell!("warning: {warning}");
+    if world.rank() == 0 && verbosity > Verbosity::Quiet {
+        launch::warn(threads);
     }
     let stem = arguments.deck.file_stem().unwrap_or_default();
     let folder = arguments.output.clone();

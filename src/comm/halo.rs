@@ -18,11 +18,22 @@ pub struct Neighbour {
     pub receive: Range<usize>,
 }
 
+/// What a rank has sent so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Messages.
+    pub messages: u64,
+    /// Bytes in them.
+    pub bytes: u64,
+}
+
 /// The plan with its message buffers, all allocated once.
 #[derive(Debug, Default)]
 pub struct Halo {
     neighbours: Vec<Neighbour>,
     messages: Vec<Message>,
+    /// What has been sent by [`Self::exchange`].
+    pub sent: Traffic,
 }
 
 impl Halo {
@@ -39,6 +50,7 @@ impl Halo {
         Self {
             neighbours,
             messages,
+            sent: Traffic::default(),
         }
     }
 
@@ -68,6 +80,10 @@ impl Halo {
 
     /// Sends what was packed, and calls `during` while the messages are in flight.
     pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut dyn FnMut()) {
+        self.sent.messages += self.messages.len() as u64;
+        for message in &self.messages {
+            self.sent.bytes += size_of_val(&message.send[..]) as u64;
+        }
         comm.exchange(&mut self.messages, during);
     }
 

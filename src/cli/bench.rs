@@ -1,0 +1,236 @@
+//! `fissure bench`: the speed of the time loop on a fixed problem.
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use fissure::comm::mpi::World;
+use fissure::comm::{self, Communicator, agree};
+use fissure::deck::{self, Source};
+use fissure::error::Result;
+use fissure::solver::Simulation;
+
+use super::bench_report::{Figures, Limited, Phase};
+use super::memory::{Resident, resident};
+use super::{BenchArguments, Verbosity, launch, machine_limits};
+
+/// The laws that are measured.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Law {
+    /// Prototype microelastic: bond-based, one pass over the bonds.
+    Pmb,
+    /// Linear peridynamic solid, the deck's `ordinary`: state-based, two passes.
+    Lps,
+}
+
+impl Law {
+    /// Its table in the deck.
+    fn in_deck(self) -> &'static str {
+        match self {
+            Self::Pmb => "pmb = { density = 2440, youngs_modulus = 72e9 }",
+            Self::Lps => {
+                "ordinary = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.25 }"
+            }
+        }
+    }
+
+    /// Passes over the bonds in a step.
+    fn passes(self) -> u64 {
+        match self {
+            Self::Pmb => 1,
+            Self::Lps => 2,
+        }
+    }
+
+    /// Additions, multiplications, divisions and roots that the equations want for a bond of known
+    /// ξ and |ξ|, seen from one end; docs/performance.md counts them.
+    fn operations(self, failure: bool) -> u64 {
+        match self {
+            Self::Pmb => 23 + u64::from(failure),
+            Self::Lps => 41 + 2 * u64::from(failure),
+        }
+    }
+}
+
+/// Bytes of a point that a step cannot but read or write beside its bonds, in three dimensions:
+/// motion (displacement and velocity read and written, response and block read, twice), and in each
+/// pass over the bonds (reference, displacement and volume read, response read and written).
+const MOTION_BYTES: u64 = 212;
+const PASS_BYTES: u64 = 120;
+
+/// Parses `N` or `X,Y,Z` into the edges of a block in points.
+pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
+    let numbers: Option<Vec<u64>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|number| *number > 0))
+        .collect();
+    match numbers.as_deref() {
+        Some([points]) => Ok([(*points as f64).cbrt().round() as u64; 3]),
+        Some([x, y, z]) => Ok([*x, *y, *z]),
+        _ => Err(format!(
+            "`{text}` must be a number of points such as 262144, or edges such as 128,64,64"
+        )),
+    }
+}
+
+/// The deck of the problem. The bonds are stretched a little, so that no time is saved on zeros.
+fn deck(arguments: &BenchArguments) -> String {
+    let law = arguments.law.in_deck();
+    let [x, y, z] = arguments.points;
+    let last = warm_up(arguments) + u64::from(arguments.steps);
+    let damage = match arguments.no_failure {
+        true => "",
+        false => "damage = 'block'",
+    };
+    format!(
+        "title = 'Benchmark'
+        dimension = '3d'
+        grid = {{ spacing = 1e-3, horizon = 3.015e-3 }}
+        material.block.{law}
+        damage.block.critical_stretch = {{ critical_stretch = 1e3, alpha = 0 }}
+        [body.block]
+        material = 'block'
+        {damage}
+        shape.box = {{ lower = [0, 0, 0], upper = ['{x}*1e-3', '{y}*1e-3', '{z}*1e-3'] }}
+        [initial.wave]
+        displacement = ['1e-9*sin(400*x)', '1e-9*sin(300*y)', '1e-9*sin(200*z)']
+        [time]
+        step = 1e-8
+        end = '{last}*1e-8'
+        "
+    )
+}
+
+/// Steps before those that are measured: caches, page tables and clock rates settle.
+fn warm_up(arguments: &BenchArguments) -> u64 {
+    u64::from(arguments.steps).div_ceil(10)
+}
+
+/// Measures and prints on all ranks.
+pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
+    launch::on_all_ranks(|world| {
+        let threads = launch::threads(arguments.threads);
+        agree(world, launch::start_threads(threads))?;
+        if world.rank() == 0 && verbosity > Verbosity::Quiet {
+            launch::warn(threads);
+        }
+        let figures = measure(world, arguments, threads)?;
+        if world.rank() == 0 {
+            figures.print(arguments.json);
+        }
+        Ok(ExitCode::SUCCESS)
+    })
+}
+
+fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<Figures> {
+    let before = resident();
+    let source = Source {
+        path: "benchmark.toml".into(),
+        text: deck(arguments),
+    };
+    let plan = deck::parse(&source)?;
+    let mut simulation = Simulation::<3>::new(&plan, world)?;
+    for _ in 0..warm_up(arguments) {
+        simulation.advance();
+    }
+    let set_up = simulation.times.set_up;
+    let halo = simulation.forces.halo().sent;
+    simulation.times = Default::default();
+    // All ranks begin together.
+    world.sum(&mut [0]);
+    let start = Instant::now();
+    for _ in 0..arguments.steps {
+        simulation.advance();
+    }
+    let whole = start.elapsed();
+    simulation.check()?;
+    let after = resident();
+
+    let total = |value: u64| comm::total(world, value) as f64;
+    let largest = |value: f64| {
+        let mut largest = [value];
+        world.max(&mut largest);
+        largest[0]
+    };
+    let phase = |name, time: Duration| Phase {
+        name,
+        mean: total(time.as_nanos() as u64) / 1e9 / world.size() as f64,
+        slowest: largest(time.as_secs_f64()),
+    };
+    let times = simulation.times;
+    let steps = f64::from(arguments.steps);
+    let sent = simulation.forces.halo().sent;
+    let messages = (sent.messages - halo.messages) as f64 / steps;
+    let ghosts = simulation.model.volume.len() - simulation.model.owned();
+    let points = simulation.model.total;
+    let bonds = total(simulation.forces.directed_bonds());
+    let bonds_bytes = total(simulation.forces.bytes() as u64);
+    let halo_bytes = total(sent.bytes - halo.bytes) / steps;
+    let phases = vec![
+        phase("bonds", times.forces.bonds),
+        phase("halo", times.forces.halo),
+        phase("motion", times.motion),
+        phase("loop", whole),
+    ];
+    let seconds = phases[3].slowest;
+    let resident = |of: fn(Resident) -> f64, at: Resident| total(of(at) as u64);
+    let memory = vec![
+        ("before set-up", resident(|r| r.now, before)),
+        ("bonds", bonds_bytes),
+        ("after the loop", resident(|r| r.now, after)),
+        ("peak", resident(|r| r.peak, after)),
+    ];
+    drop(simulation);
+    let limits = match arguments.no_limits {
+        true => None,
+        false => {
+            let limits = machine_limits::measure(world, threads);
+            let (law, failure) = (arguments.law, !arguments.no_failure);
+            let by_points = points * (MOTION_BYTES + law.passes() * PASS_BYTES);
+            let moved = law.passes() as f64 * bonds_bytes + by_points as f64;
+            let operations = bonds * law.operations(failure) as f64;
+            Some(Limited {
+                bandwidth: total(limits.bandwidth as u64),
+                moved: moved * steps / seconds,
+                arithmetic: total(limits.arithmetic as u64),
+                done: operations * steps / seconds,
+            })
+        }
+    };
+    Ok(Figures {
+        law: arguments.law,
+        failure: !arguments.no_failure,
+        edges: arguments.points,
+        points: points as f64,
+        bonds,
+        ranks: world.size(),
+        threads,
+        cores: total(threads as u64),
+        steps,
+        warm_up: warm_up(arguments) as f64,
+        set_up: largest(set_up.as_secs_f64()),
+        phases,
+        memory,
+        halo_bytes,
+        messages: total((messages * steps) as u64) / steps,
+        most_messages: largest(messages),
+        ghosts: total(ghosts as u64),
+        most_ghosts: largest(ghosts as f64),
+        limits,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_those_of_the_nearest_cube_or_of_a_block() {
+        assert_eq!(edges("262144"), Ok([64; 3]));
+        assert_eq!(edges("1000000"), Ok([100; 3]));
+        assert_eq!(edges("4, 3,2"), Ok([4, 3, 2]));
+        for wrong in ["0", "4,3", "a", "1,0,1", ""] {
+            assert!(edges(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The figures of `fissure bench`, for people and for scripts.
+
+use clap::ValueEnum;
+
+use crate::cli::say;
+
+use super::bench::Law;
+use super::format::{bytes, count, si};
+
+/// Time of a phase of the loop over the ranks, s.
+pub struct Phase {
+    /// What was done.
+    pub name: &'static str,
+    /// Mean over the ranks.
+    pub mean: f64,
+    /// Of the slowest rank.
+    pub slowest: f64,
+}
+
+/// Measured limits of all cores, and what the loop reaches of them.
+pub struct Limited {
+    /// Triad, bytes/s.
+    pub bandwidth: f64,
+    /// What the loop must read and write, bytes/s.
+    pub moved: f64,
+    /// Multiply-adds, operations/s.
+    pub arithmetic: f64,
+    /// What the equations want of the loop, operations/s.
+    pub done: f64,
+}
+
+/// What was measured, over all ranks; s and bytes.
+pub struct Figures {
+    /// The law of the bonds.
+    pub law: Law,
+    /// Whether bonds can break.
+    pub failure: bool,
+    /// Points along each edge.
+    pub edges: [u64; 3],
+    /// Points.
+    pub points: f64,
+    /// Neighbours of all points.
+    pub bonds: f64,
+    /// Ranks.
+    pub ranks: usize,
+    /// Threads of rank 0.
+    pub threads: usize,
+    /// Threads of all ranks.
+    pub cores: f64,
+    /// Steps measured.
+    pub steps: f64,
+    /// Steps before.
+    pub warm_up: f64,
+    /// Set-up of the slowest rank.
+    pub set_up: f64,
+    /// Phases of the loop; the last is all of it.
+    pub phases: Vec<Phase>,
+    /// Memory of all ranks; the last is the peak.
+    pub memory: Vec<(&'static str, f64)>,
+    /// Sent in a step.
+    pub halo_bytes: f64,
+    /// Messages in a step.
+    pub messages: f64,
+    /// Those of the rank that sends most.
+    pub most_messages: f64,
+    /// Ghosts.
+    pub ghosts: f64,
+    /// Those of the rank that has most.
+    pub most_ghosts: f64,
+    /// Limits of the machine, if they were measured.
+    pub limits: Option<Limited>,
+}
+
+impl Figures {
+    /// Time of the loop on the slowest rank, s.
+    fn seconds(&self) -> f64 {
+        self.phases.last().map_or(f64::NAN, |phase| phase.slowest)
+    }
+
+    /// Neighbours visited in a second.
+    fn updates(&self) -> f64 {
+        self.bonds * self.steps / self.seconds()
+    }
+
+    fn law_name(&self) -> String {
+        let value = self.law.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// Prints a table, or one line of JSON.
+    pub fn print(&self, json: bool) {
+        match json {
+            true => say!("{}", self.json()),
+            false => self.table(),
+        }
+    }
+
+    fn table(&self) {
+        let line = |name: &str, value: String| say!("  {name:<17}{value}");
+        let failure = match self.failure {
+            true => "bonds can break",
+            false => "bonds cannot break",
+        };
+        say!("benchmark: {}, {failure}", self.law_name());
+        let [x, y, z] = self.edges;
+        let points = count(self.points as u64);
+        line("points", format!("{points}   ({x} × {y} × {z})"));
+        let neighbours = self.bonds / self.points;
+        line("neighbours", format!("{neighbours:.1} a point"));
+        line(
+            "ranks × threads",
+            format!("{} × {}", self.ranks, self.threads),
+        );
+        let (steps, warm_up) = (self.steps, self.warm_up);
+        line("steps", format!("{steps} after {warm_up} to warm up"));
+        say!("speed");
+        let updates = si(self.updates(), "/s");
+        let each = si(self.updates() / self.cores, "/s");
+        line("bond updates", format!("{updates}   ({each} a core)"));
+        line("set-up", si(self.set_up, "s"));
+        say!("time by phase      mean of ranks   slowest");
+        for Phase {
+            name,
+            mean,
+            slowest,
+        } in &self.phases
+        {
+            let share = 100.0 * mean / self.seconds();
+            say!("  {name:<12}{mean:9.3} s {share:5.1} %{slowest:8.3} s");
+        }
+        say!("memory             of all ranks   a point");
+        for (name, all) in &self.memory {
+            let each = all / self.points;
+            say!("  {name:<17}{:>12}   {each:.0} B", bytes(*all));
+        }
+        say!("halo, each step");
+        let most = self.most_messages;
+        line(
+            "messages",
+            format!("{}   (at most {most} of a rank)", self.messages),
+        );
+        line("sent", bytes(self.halo_bytes));
+        let most = count(self.most_ghosts as u64);
+        line(
+            "ghosts",
+            format!("{}   (at most {most} of a rank)", count(self.ghosts as u64)),
+        );
+        if let Some(limits) = &self.limits {
+            say!("limits of these cores, measured");
+            let reached = |part: f64, whole: f64| format!("reached: {:.0} %", 100.0 * part / whole);
+            let share = reached(limits.moved, limits.bandwidth);
+            line(
+                "triad",
+                format!("{}   {share}", si(limits.bandwidth, "B/s")),
+            );
+            let share = reached(limits.done, limits.arithmetic);
+            line(
+                "multiply-adds",
+                format!("{}   {share}", si(limits.arithmetic, "FLOP/s")),
+            );
+        }
+    }
+
+    /// One object; names say the unit.
+    fn json(&self) -> String {
+        let [x, y, z] = self.edges;
+        let mut entries = vec![
+            ("law".to_owned(), format!("\"{}\"", self.law_name())),
+            ("failure".to_owned(), self.failure.to_string()),
+            ("edges".to_owned(), format!("[{x}, {y}, {z}]")),
+        ];
+        let mut number = |name: &str, value: f64| {
+            let text = match value.is_finite() {
+                true => format!("{value:?}"),
+                false => "null".to_owned(),
+            };
+            entries.push((name.replace(['-', ' '], "_"), text));
+        };
+        number("points", self.points);
+        number("directed_bonds", self.bonds);
+        number("ranks", self.ranks as f64);
+        number("threads", self.threads as f64);
+        number("cores", self.cores);
+        number("steps", self.steps);
+        number("warm_up_steps", self.warm_up);
+        number("updates_per_second", self.updates());
+        number("updates_per_second_and_core", self.updates() / self.cores);
+        number("set_up_seconds", self.set_up);
+        for Phase {
+            name,
+            mean,
+            slowest,
+        } in &self.phases
+        {
+            number(&format!("{name}_seconds"), *mean);
+            number(&format!("{name}_seconds_slowest"), *slowest);
+        }
+        for (name, all) in &self.memory {
+            number(&format!("memory_{name}_bytes"), *all);
+        }
+        number("halo_bytes_per_step", self.halo_bytes);
+        number("halo_messages_per_step", self.messages);
+        number("halo_messages_per_step_most", self.most_messages);
+        number("ghosts", self.ghosts);
+        number("ghosts_most", self.most_ghosts);
+        if let Some(limits) = &self.limits {
+            number("triad_bytes_per_second", limits.bandwidth);
+            number("moved_bytes_per_second", limits.moved);
+            number("multiply_add_operations_per_second", limits.arithmetic);
+            number("operations_per_second", limits.done);
+        }
+        let entries = entries
+            .iter()
+            .map(|(name, value)| format!("\"{name}\": {value}"));
+        format!("{{{}}}", entries.collect::<Vec<_>>().join(", "))
+    }
+}
