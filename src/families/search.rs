@@ -1,10 +1,13 @@
 //! Finding the neighbours of every owned point.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::material::lanes::WIDTH;
 use crate::partition::Domain;
+use crate::points::Point;
 use crate::points::bins::Bins;
 
 use super::list::BondList;
@@ -13,25 +16,61 @@ use super::list::BondList;
 const HORIZON_TOLERANCE: f64 = 1e-9;
 
 /// Points searched by one task.
-const CHUNK: usize = 1024;
+const CHUNK: usize = 512;
 
 /// Chunks that are searched before their rows are appended; bounds the memory that they take.
-const WAVE: usize = 64;
+const WAVE: usize = 32;
 
 /// The longest bond (m) for a horizon (m).
 pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }
 
-/// A neighbour on its way into a row: block, global id, local index.
-type Found = (u32, u64, u32);
+/// The points of a domain in the order of rows, by block and then by global id. Neighbours are found
+/// by their place in it, so that sorting places sorts a row.
+struct Order {
+    /// Local index of each place.
+    local: Vec<u32>,
+    /// The first place of each block, and the number of places.
+    first: Vec<u32>,
+    bins: Bins,
+}
 
-/// The rows that one task found: for each point with neighbours, in order, its local index and how
-/// many of the entries are its own.
+impl Order {
+    fn new(points: &[Point], blocks: usize, longest: f64) -> Self {
+        let mut keys: Vec<(u32, u64, u32)> = points
+            .iter()
+            .zip(0..)
+            .map(|(point, index)| (point.block, point.id, index))
+            .collect();
+        keys.par_sort_unstable();
+        let before = |block: u32| keys.partition_point(|key| key.0 < block) as u32;
+        let first = (0..=blocks as u32).map(before).collect();
+        let local: Vec<u32> = keys.iter().map(|key| key.2).collect();
+        drop(keys);
+        let positions: Vec<[f64; 3]> = local.iter().map(|k| points[*k as usize].position).collect();
+        Self {
+            bins: Bins::new(&positions, longest),
+            local,
+            first,
+        }
+    }
+
+    /// The block of a place.
+    fn block(&self, place: u32) -> usize {
+        self.first.partition_point(|first| *first <= place) - 1
+    }
+}
+
+/// The rows that one task found.
 #[derive(Default)]
 struct Chunk {
-    rows: Vec<(u32, usize)>,
-    entries: Vec<Found>,
+    /// Local index of the point, block of the neighbours and number of groups.
+    rows: Vec<(u32, u32, u32)>,
+    neighbours: Vec<[u32; WIDTH]>,
+    intact: Vec<u8>,
+    /// Places of one point's neighbours.
+    places: Vec<u32>,
 }
 
 /// The bond lists of a domain, for blocks 0 … `blocks` − 1; `cutoffs` has the longest bond (m) of each
@@ -40,9 +79,8 @@ struct Chunk {
 /// # Errors
 /// When two points lie at the same place.
 pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>> {
-    let positions: Vec<[f64; 3]> = domain.points.iter().map(|point| point.position).collect();
     let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-    let bins = Bins::new(&positions, longest);
+    let order = Order::new(&domain.points, blocks, longest);
     let squares: Vec<f64> = cutoffs.iter().map(|cutoff| cutoff * cutoff).collect();
     let mut lists: Vec<BondList> = (0..blocks * blocks)
         .map(|pair| BondList {
@@ -52,17 +90,16 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
             ..BondList::default()
         })
         .collect();
-    let chunks = domain.owned.div_ceil(CHUNK);
-    for wave in (0..chunks).step_by(WAVE) {
-        let found: Vec<Result<Chunk>> = (wave..(wave + WAVE).min(chunks))
-            .into_par_iter()
-            .map(|chunk| {
-                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(domain.owned);
-                search_chunk(domain, &bins, range, blocks, &squares)
-            })
-            .collect();
-        for chunk in found {
-            append(&mut lists, domain, blocks, chunk?);
+    // Made once, so that they do not come from the system anew for each wave.
+    let mut wave: Vec<Chunk> = (0..WAVE).map(|_| Chunk::default()).collect();
+    for first in (0..domain.owned).step_by(WAVE * CHUNK) {
+        wave.par_iter_mut().enumerate().try_for_each(|(k, chunk)| {
+            let start = (first + k * CHUNK).min(domain.owned);
+            let end = (start + CHUNK).min(domain.owned);
+            chunk.search(domain, &order, start..end, &squares)
+        })?;
+        for chunk in &wave {
+            append(&mut lists, domain, blocks, chunk);
         }
     }
     lists.retain(|list| !list.is_empty());
@@ -71,69 +108,82 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
         list.starts.shrink_to_fit();
         list.neighbours.shrink_to_fit();
         list.intact.shrink_to_fit();
-        let largest = list.neighbours.iter().flatten().max();
-        list.reach = largest.map_or(0, |index| *index as usize + 1);
+        let groups = list.neighbours.par_iter();
+        let largest = groups.map(|group| group.iter().copied().fold(0, u32::max));
+        list.reach = largest.max().map_or(0, |index| index as usize + 1);
     }
     Ok(lists)
 }
 
-fn search_chunk(
-    domain: &Domain,
-    bins: &Bins,
-    range: std::ops::Range<usize>,
-    blocks: usize,
-    squares: &[f64],
-) -> Result<Chunk> {
-    let mut chunk = Chunk::default();
-    for index in range {
-        let here = &domain.points[index];
-        let first = chunk.entries.len();
-        let mut coincident = None;
-        bins.within(here.position, |other, squared| {
-            let there = &domain.points[other as usize];
-            if other as usize == index {
-                return;
+impl Chunk {
+    /// Replaces the rows by those of a range of points.
+    fn search(
+        &mut self,
+        domain: &Domain,
+        order: &Order,
+        range: Range<usize>,
+        squares: &[f64],
+    ) -> Result<()> {
+        self.rows.clear();
+        self.neighbours.clear();
+        self.intact.clear();
+        let blocks = order.first.len() - 1;
+        for index in range {
+            let here = &domain.points[index];
+            let squares = &squares[here.block as usize * blocks..];
+            let mut coincident = None;
+            self.places.clear();
+            order.bins.within(here.position, |place, squared| {
+                if squared == 0.0 {
+                    let other = order.local[place as usize] as usize;
+                    if other != index {
+                        coincident = Some(domain.points[other].id);
+                    }
+                } else if blocks == 1 || squared <= squares[order.block(place)] {
+                    self.places.push(place);
+                }
+            });
+            if let Some(other) = coincident {
+                return Err(Error::input(format!(
+                    "points {} and {other} lie at the same place, {:?} m; do two bodies overlap?",
+                    here.id.min(other),
+                    here.position,
+                )));
             }
-            if squared == 0.0 {
-                coincident = Some(there.id);
+            self.places.sort_unstable();
+            let mut rest = &self.places[..];
+            while let Some(first) = rest.first() {
+                let there = order.block(*first);
+                let end = order.first[there + 1];
+                let (row, others) = rest.split_at(rest.partition_point(|place| *place < end));
+                rest = others;
+                let groups = row.len().div_ceil(WIDTH) as u32;
+                self.rows.push((index as u32, there as u32, groups));
+                for group in row.chunks(WIDTH) {
+                    let mut neighbours = [index as u32; WIDTH];
+                    for (slot, place) in neighbours.iter_mut().zip(group) {
+                        *slot = order.local[*place as usize];
+                    }
+                    self.neighbours.push(neighbours);
+                    self.intact.push((0xff_u16 >> (WIDTH - group.len())) as u8);
+                }
             }
-            if squared > squares[here.block as usize * blocks + there.block as usize] {
-                return;
-            }
-            chunk.entries.push((there.block, there.id, other));
-        });
-        if let Some(other) = coincident {
-            return Err(Error::input(format!(
-                "points {} and {other} lie at the same place, {:?} m; do two bodies overlap?",
-                here.id.min(other),
-                here.position,
-            )));
         }
-        chunk.entries[first..].sort_unstable();
-        chunk.rows.push((index as u32, chunk.entries.len() - first));
+        Ok(())
     }
-    Ok(chunk)
 }
 
-fn append(lists: &mut [BondList], domain: &Domain, blocks: usize, chunk: Chunk) {
-    let mut entries = &chunk.entries[..];
-    for (point, count) in chunk.rows {
-        let (row, rest) = entries.split_at(count);
-        entries = rest;
-        let here = domain.points[point as usize].block as usize;
-        for part in row.chunk_by(|a, b| a.0 == b.0) {
-            let list = &mut lists[here * blocks + part[0].0 as usize];
-            list.points.push(point);
-            for group in part.chunks(WIDTH) {
-                let mut neighbours = [point; WIDTH];
-                for (slot, found) in neighbours.iter_mut().zip(group) {
-                    *slot = found.2;
-                }
-                list.neighbours.push(neighbours);
-                list.intact.push((0xff_u16 >> (WIDTH - group.len())) as u8);
-            }
-            list.starts.push(list.neighbours.len());
-        }
+fn append(lists: &mut [BondList], domain: &Domain, blocks: usize, chunk: &Chunk) {
+    let mut group = 0;
+    for (point, there, groups) in &chunk.rows {
+        let here = domain.points[*point as usize].block as usize;
+        let list = &mut lists[here * blocks + *there as usize];
+        let groups = group..group + *groups as usize;
+        group = groups.end;
+        list.points.push(*point);
+        list.neighbours.extend(&chunk.neighbours[groups.clone()]);
+        list.intact.extend(&chunk.intact[groups]);
+        list.starts.push(list.neighbours.len());
     }
 }
 
