@@ -35,8 +35,9 @@ impl IdOrder {
         let mut owned = vec![Vec::new(); comm.size()];
         let mut outgoing = vec![Vec::new(); comm.size()];
         for (index, id) in ids.iter().enumerate() {
-            owned[home(*id)].push(index as u32);
-            outgoing[home(*id)].extend_from_slice(&id.to_ne_bytes());
+            let home = home(*id);
+            owned[home].push(index as u32);
+            outgoing[home].extend_from_slice(&id.to_ne_bytes());
         }
         let row = |id: &u64| (id - first) as u32;
         let rows = comm

@@ -4,6 +4,7 @@
 //! within the cut-off of one of its own.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use crate::comm::halo::Neighbour;
 use crate::comm::{Communicator, Halo};
@@ -12,6 +13,7 @@ use crate::points::bins::Bins;
 
 use super::cells::Cells;
 use super::domain::Domain;
+use super::received;
 
 /// The widest message: three components a point.
 const HALO_WIDTH: usize = 3;
@@ -28,95 +30,113 @@ pub fn domain(
     total: u64,
     cutoff: f64,
 ) -> Domain {
-    let rank = comm.rank();
-    let mut offers = vec![Vec::new(); comm.size()];
-    let mut touching = BTreeSet::new();
-    for point in &owned {
-        let cell = cells.of(point.position);
-        touching.clear();
-        touching.extend(
-            cells
-                .adjacent(cell)
-                .map(|(other, _)| owner[other] as usize)
-                .filter(|other| *other != rank),
-        );
-        for other in &touching {
-            offers[*other].extend_from_slice(bytemuck::bytes_of(point));
-        }
-    }
-    let offered: Vec<Vec<Point>> = comm
-        .all_to_all(offers)
-        .iter()
-        .map(|bytes| bytemuck::pod_collect_to_vec(bytes))
-        .collect();
+    owned.sort_by_cached_key(|point| (cells.of(point.position), point.id));
+    let (offers, edge) = offers(comm, cells, owner, &owned);
+    let offered = comm.all_to_all(offers);
 
-    let positions: Vec<[f64; 3]> = owned.iter().map(|point| point.position).collect();
+    let positions: Vec<[f64; 3]> = edge.iter().map(|k| owned[*k as usize].position).collect();
     let bins = Bins::new(&positions, cutoff);
     let mut border = vec![false; owned.len()];
     let mut ghosts = Vec::new();
-    let mut requests = vec![Vec::new(); comm.size()];
-    let mut received_from = Vec::new();
-    for (other, mut candidates) in offered.into_iter().enumerate() {
+    // The ids of the ghosts of each rank, and where they will lie.
+    let mut wanted = Vec::new();
+    for bytes in offered {
+        let mut candidates: Vec<Point> = received(&bytes).collect();
         candidates.retain(|candidate| {
             let mut needed = false;
             bins.within(candidate.position, |index, _| {
-                border[index as usize] = true;
+                border[edge[index as usize] as usize] = true;
                 needed = true;
             });
             needed
         });
-        if candidates.is_empty() {
-            continue;
-        }
         candidates.sort_unstable_by_key(|ghost| ghost.id);
-        let ids: Vec<u64> = candidates.iter().map(|ghost| ghost.id).collect();
-        requests[other] = bytemuck::cast_slice(&ids).to_vec();
         let first = owned.len() + ghosts.len();
-        received_from.push((other, first..first + candidates.len()));
+        let ids: Vec<u64> = candidates.iter().map(|ghost| ghost.id).collect();
+        wanted.push((ids, first..first + candidates.len()));
         ghosts.extend(candidates);
     }
 
-    let mut order: Vec<u32> = (0..owned.len() as u32).collect();
-    order.sort_unstable_by_key(|k| {
-        let point = &owned[*k as usize];
-        (border[*k as usize], cells.of(point.position), point.id)
-    });
-    let interior = border.iter().filter(|border| !**border).count();
-    owned = order.iter().map(|k| owned[*k as usize]).collect();
+    // Interior points, then those on the border, each part in the order that it had.
+    let mut on_border = border.iter();
+    let last: Vec<Point> = owned
+        .extract_if(.., |_| *on_border.next().expect("one for each point"))
+        .collect();
+    let interior = owned.len();
+    let halo = halo(comm, wanted, &last, interior);
+    owned.extend(last);
+    let count = owned.len();
+    owned.extend(ghosts);
+    Domain {
+        points: owned,
+        interior,
+        owned: count,
+        total,
+        halo,
+    }
+}
 
-    let mut by_id: Vec<(u64, u32)> = owned[interior..]
+/// For each rank the points of the cells that touch one of its own, and the indices of all points
+/// that are offered to any: no others can have ghosts for neighbours. Points lie cell by cell.
+fn offers(
+    comm: &dyn Communicator,
+    cells: &Cells,
+    owner: &[u32],
+    owned: &[Point],
+) -> (Vec<Vec<u8>>, Vec<u32>) {
+    let mut offers = vec![Vec::new(); comm.size()];
+    let mut edge = Vec::new();
+    let mut first = 0;
+    let cell = |point: &Point| cells.of(point.position);
+    for points in owned.chunk_by(|a, b| cell(a) == cell(b)) {
+        let adjacent = cells.adjacent(cell(&points[0]));
+        let touching: BTreeSet<usize> = adjacent
+            .map(|(other, _)| owner[other] as usize)
+            .filter(|other| *other != comm.rank())
+            .collect();
+        for other in &touching {
+            offers[*other].extend_from_slice(bytemuck::cast_slice(points));
+        }
+        let end = first + points.len() as u32;
+        if !touching.is_empty() {
+            edge.extend(first..end);
+        }
+        first = end;
+    }
+    (offers, edge)
+}
+
+/// The halo plan: what this rank wants of each rank, by id, and where that lies; `border` are the
+/// points that others can want, the first of which has the local index `interior`. Collective.
+fn halo(
+    comm: &dyn Communicator,
+    wanted: Vec<(Vec<u64>, Range<usize>)>,
+    border: &[Point],
+    interior: usize,
+) -> Halo {
+    let mut by_id: Vec<(u64, u32)> = border
         .iter()
         .zip(interior as u32..)
         .map(|(point, index)| (point.id, index))
         .collect();
     by_id.sort_unstable();
-    let mut neighbours = Vec::new();
-    let mut ranges = received_from.into_iter().peekable();
-    for (other, bytes) in comm.all_to_all(requests).iter().enumerate() {
-        let wanted: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
-        let send: Vec<u32> = wanted
-            .iter()
-            .map(|id| {
-                let found = by_id.binary_search_by_key(id, |(id, _)| *id);
-                by_id[found.expect("distance is symmetric, so a ghost is a border point")].1
-            })
-            .collect();
-        let receive = ranges
-            .next_if(|(from, _)| *from == other)
-            .map_or(0..0, |(_, range)| range);
-        if !send.is_empty() || !receive.is_empty() {
-            neighbours.push(Neighbour {
-                rank: other,
-                send,
-                receive,
-            });
+    let requests = wanted
+        .iter()
+        .map(|(ids, _)| bytemuck::cast_slice(ids).to_vec());
+    let requested = comm.all_to_all(requests.collect());
+    let neighbours = requested.iter().zip(wanted).enumerate();
+    let neighbours = neighbours.map(|(rank, (bytes, (_, receive)))| {
+        let index = |id: u64| {
+            let found = by_id.binary_search_by_key(&id, |(id, _)| *id);
+            by_id[found.expect("distance is symmetric, so a ghost is a border point")].1
+        };
+        let ids: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+        Neighbour {
+            rank,
+            send: ids.into_iter().map(index).collect(),
+            receive,
         }
-    }
-    Domain {
-        interior,
-        owned: owned.len(),
-        total,
-        halo: Halo::new(neighbours, HALO_WIDTH),
-        points: [owned, ghosts].concat(),
-    }
+    });
+    let talks = |neighbour: &Neighbour| !neighbour.send.is_empty() || !neighbour.receive.is_empty();
+    Halo::new(neighbours.filter(talks).collect(), HALO_WIDTH)
 }

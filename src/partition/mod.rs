@@ -57,15 +57,25 @@ fn migrate(
         return pieces;
     }
     let mut outgoing = vec![Vec::new(); comm.size()];
-    for point in &pieces {
+    let mut owned = pieces;
+    owned.retain(|point| {
         let rank = owner[cells.of(point.position)] as usize;
-        outgoing[rank].extend_from_slice(bytemuck::bytes_of(point));
+        if rank != comm.rank() {
+            outgoing[rank].extend_from_slice(bytemuck::bytes_of(point));
+        }
+        rank == comm.rank()
+    });
+    owned.shrink_to_fit();
+    for bytes in comm.all_to_all(outgoing) {
+        owned.extend(received(&bytes));
     }
-    drop(pieces);
-    comm.all_to_all(outgoing)
-        .iter()
-        .flat_map(|bytes| bytemuck::pod_collect_to_vec::<u8, Point>(bytes))
-        .collect()
+    owned
+}
+
+/// The points in a message.
+fn received(bytes: &[u8]) -> impl Iterator<Item = Point> {
+    let records = bytes.chunks_exact(size_of::<Point>());
+    records.map(bytemuck::pod_read_unaligned)
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
     let mut points = Vec::new();
     let mut total = 0;
     for (index, body) in plan.bodies.iter().enumerate() {
-        let piece = match &body.points {
+        let mut piece = match &body.points {
             PointSource::Lattice { .. } => lattice::piece(plan, index, comm)?,
             PointSource::File { path, .. } => {
                 if file::users(plan, path)[0].0 != index {
@@ -69,11 +69,14 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
             }
         };
         let (before, all) = crate::comm::scan(comm, piece.len() as u64);
-        let first = total + before;
-        points.extend(piece.into_iter().enumerate().map(|(k, point)| Point {
-            id: first + k as u64,
-            ..point
-        }));
+        for (point, id) in piece.iter_mut().zip(total + before..) {
+            point.id = id;
+        }
+        // Appending would copy the first piece, which most often is the only one.
+        match points.is_empty() {
+            true => points = piece,
+            false => points.extend(piece),
+        }
         total += all;
     }
     no_empty_body(plan, comm, &points)?;
