@@ -11,6 +11,7 @@ use fissure::comm::threads;
 use fissure::deck::{self, Plan, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::solver::Simulation;
+use fissure::solver::observe::HistoryObserver;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -44,6 +45,7 @@ fn prepare(plan: &Plan) -> Result<(u64, f64, u64)> {
     fn of<const D: usize>(plan: &Plan) -> Result<(u64, f64, u64)> {
         let comm = threads::alone();
         let simulation = Simulation::<D>::new(plan, &comm)?;
+        HistoryObserver::new(&simulation)?;
         Ok((simulation.model.total, simulation.step, simulation.last))
     }
     match plan.dimension.count() {

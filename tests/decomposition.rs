@@ -55,6 +55,9 @@ fields = ['displacement', 'velocity', 'acceleration', 'force_density', 'damage',
 every_steps = 3
 reactions = ['rim']
 probe.ahead.at = [0.02, 0]
+front.wave = { from = [0.02, -0.012], direction = [0.1, 1], field = 'velocity', threshold = 0.5 }
+front.strain = { from = [0, 0], direction = [1, 0], length = 0.03, field = 'strain_energy_density', threshold = 1 }
+tip.notch = { from = [0, 0], direction = [1, 0.2], set = 'plate' }
 ";
 
 /// Blocks of different state-based and bond-based laws and horizons, damped, some of them breaking.

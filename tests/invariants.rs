@@ -432,7 +432,7 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
     simulate::<2, _>(&text, |mut simulation| {
         let snapshot = Snapshot::new(&mut simulation);
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let row = observer.row(&simulation, &snapshot);
+        let row = observer.row(&mut simulation, &snapshot);
         assert_eq!(
             row.broken, 0,
             "bonds that start broken do not count as broken by the run"

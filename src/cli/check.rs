@@ -8,6 +8,7 @@ use fissure::material::AnyLaw;
 use fissure::solver::Simulation;
 use fissure::solver::assign::block_laws;
 use fissure::solver::conditions::members;
+use fissure::solver::observe::HistoryObserver;
 
 use super::format::{bytes, count, si};
 use super::{CheckArguments, Verbosity, launch};
@@ -42,6 +43,7 @@ fn report<const D: usize>(
     let comm = threads::alone();
     let mut simulation = Simulation::<D>::new(plan, &comm)?;
     simulation.check()?;
+    HistoryObserver::new(&simulation)?;
     if verbosity == Verbosity::Quiet {
         return Ok(());
     }

@@ -73,7 +73,7 @@ impl<'a> Recorder<'a> {
         metadata: &[(&'static str, String)],
     ) -> Result<Self> {
         let (plan, comm) = (simulation.plan, simulation.comm);
-        let observer = HistoryObserver::new(simulation)?;
+        let mut observer = HistoryObserver::new(simulation)?;
         let order = id_order(simulation);
         let schedule = |every| Schedule::new(every, simulation.step, simulation.last);
         let (outputs, rows) = (schedule(plan.output.every), schedule(plan.history.every));
@@ -106,7 +106,10 @@ impl<'a> Recorder<'a> {
             }
             Start::After(outputs, rows) => {
                 let kept = (outputs, rows);
-                ResultFile::resume(&files.result, comm, &contents, &history, kept)?
+                let (file, past) =
+                    ResultFile::resume(&files.result, comm, &contents, &history, kept)?;
+                observer.recall::<D>(&past);
+                file
             }
         };
         Ok(Self {

@@ -91,6 +91,13 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         .damage_threshold
         .take()
         .or(number(plan.history.damage_threshold));
+    for front in history.front.values_mut().map(|table| table.get_mut()) {
+        front.radius = front.radius.take().or(Some(grid.horizon.clone()));
+    }
+    for tip in history.tip.values_mut().map(|table| table.get_mut()) {
+        let threshold = history.damage_threshold.clone();
+        tip.threshold = tip.threshold.take().or(threshold);
+    }
 }
 
 fn fill_interval(every: &mut Option<Number>, in_steps: bool, interval: Interval) {

@@ -567,6 +567,12 @@ pub struct History {
     /// Places whose nearest point is followed, by name.
     #[serde(default)]
     pub probe: Tables<Probe>,
+    /// Fronts that are followed along lines, by name.
+    #[serde(default)]
+    pub front: Tables<Front>,
+    /// Crack tips that are followed, by name.
+    #[serde(default)]
+    pub tip: Tables<Tip>,
 }
 
 /// Checkpoints; at most one of the keys.
@@ -591,4 +597,47 @@ pub struct Checkpoint {
 pub struct Probe {
     /// The place in m; the nearest point is followed.
     pub at: Vector,
+}
+
+/// A front: how far a field has come along a line. Of the points near the line, the farthest one above
+/// the threshold; from there to the next point ahead, linear interpolation to where the threshold is
+/// crossed.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Front {
+    /// Where the line starts, m.
+    pub from: Vector,
+    /// Where it leads, of any length.
+    pub direction: Vector,
+    /// Length of the line in m; to the end of the bodies if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length: Option<Number>,
+    /// Points up to this distance from the line count, in m; the horizon if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<Number>,
+    /// Name of an output field.
+    pub field: Text,
+    /// `"x"`, `"y"` or `"z"` of a vector, whose length is taken if nothing is given; `"xx"`, `"yy"`,
+    /// `"zz"`, `"xy"`, `"yz"` or `"xz"` of a stress.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub component: Option<Text>,
+    /// What the size of the field must exceed, in the unit of the field.
+    pub threshold: Number,
+}
+
+/// A crack tip: the farthest point of a set, in one direction, with more damage than a threshold; from
+/// there on as for a [`Front`].
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tip {
+    /// Where the length of the crack is counted from, m.
+    pub from: Vector,
+    /// Where the crack runs, of any length; its own length is counted along this.
+    pub direction: Vector,
+    /// The points that are looked at; all if not given.
+    #[serde(default = "all_points")]
+    pub set: Text,
+    /// What the damage must exceed; `damage_threshold` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<Number>,
 }

@@ -6,6 +6,7 @@ mod difference;
 mod explain;
 pub mod expression;
 pub mod grammar;
+mod history;
 mod materials;
 mod number;
 mod outputs;

@@ -1,4 +1,4 @@
-//! What a deck writes to the result and the history, and how often; validated.
+//! What a deck writes to the result, and how often; validated.
 
 use std::num::NonZeroU64;
 
@@ -7,11 +7,14 @@ use serde_spanned::Spanned;
 use super::grammar::Deck;
 use super::number::Number;
 use super::plan;
-use super::resolve::{Scope, find, resolve_each};
-use super::sets::find_sets;
+use super::resolve::{Scope, find};
 use crate::error::Result;
 
-fn interval(
+/// How often something is written: one of two keys, or every `default` seconds.
+///
+/// # Errors
+/// When both are given, or a wrong number.
+pub fn interval(
     scope: &Scope,
     key: &str,
     every: &Option<Number>,
@@ -75,55 +78,6 @@ pub const DEFAULT_FIELDS: [plan::Field; 4] = [
     plan::Field::Damage,
     plan::Field::StrainEnergyDensity,
 ];
-
-/// Damage above which a point counts as cracked if the deck does not say.
-pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
-
-/// Validates what is written to the history; `end` (s) is the end of the run.
-///
-/// # Errors
-/// On an unknown set, a wrong place or number.
-pub fn history(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Result<plan::History> {
-    let history = deck.history.get_ref();
-    let damage_threshold = match &history.damage_threshold {
-        None => DEFAULT_DAMAGE_THRESHOLD,
-        Some(number) => {
-            let key = "[history] damage_threshold";
-            scope.within(number, key, 0.0..1.0, "at least 0 and below 1")?
-        }
-    };
-    for (k, set) in history.reactions.iter().enumerate() {
-        if history.reactions[..k]
-            .iter()
-            .any(|earlier| earlier.get_ref() == set.get_ref())
-        {
-            let message = format!("[history] reactions: `{}` is named twice", set.get_ref());
-            return Err(scope.error(set.span(), message));
-        }
-    }
-    let probes = resolve_each(&history.probe, |name, probe| {
-        if name.is_empty() || name.contains(['/', '.', ',']) {
-            let message = format!(
-                "[history.probe.{name}]: the name becomes that of columns, so it must not be empty \
-                 or contain `/`, `.` or `,`"
-            );
-            return Err(scope.error(probe.span(), message));
-        }
-        scope.vector(&probe.get_ref().at, &format!("[history.probe.{name}] at"))
-    })?;
-    Ok(plan::History {
-        every: interval(
-            scope,
-            "[history]",
-            &history.every,
-            &history.every_steps,
-            end / 500.0,
-        )?,
-        reactions: find_sets(scope, &history.reactions, sets, "[history] reactions")?,
-        damage_threshold,
-        probes: probes.into_iter().collect(),
-    })
-}
 
 /// Wall-clock time between checkpoints if the deck does not say, s.
 const DEFAULT_CHECKPOINT: f64 = 600.0;

@@ -409,6 +409,55 @@ pub struct History {
     pub damage_threshold: f64,
     /// Name and place (m) of each probe.
     pub probes: Vec<(String, [f64; 3])>,
+    /// Fronts that are followed.
+    pub fronts: Vec<Front>,
+    /// Crack tips that are followed.
+    pub tips: Vec<Tip>,
+}
+
+/// A start and a way from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Where it starts, m.
+    pub from: [f64; 3],
+    /// Unit vector.
+    pub direction: [f64; 3],
+}
+
+/// How far a field has come along a line.
+#[derive(Debug, Clone)]
+pub struct Front {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The line.
+    pub line: Line,
+    /// Length of the line, m.
+    pub length: f64,
+    /// Points up to this distance from the line count, m.
+    pub radius: f64,
+    /// The field.
+    pub field: Field,
+    /// The entry of a row of the field; `None` is the length of a vector.
+    pub component: Option<usize>,
+    /// What the size of the field must exceed.
+    pub threshold: f64,
+}
+
+/// The farthest point with damage in a direction.
+#[derive(Debug, Clone)]
+pub struct Tip {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Where the crack starts, and where it runs.
+    pub line: Line,
+    /// Index of the set that is looked at.
+    pub set: usize,
+    /// What the damage must exceed.
+    pub threshold: f64,
 }
 
 /// A field of the result that changes with time.

@@ -190,9 +190,12 @@ fn label(path: &[String]) -> String {
     let section = path.first().map_or("", String::as_str);
     let count = match section {
         "material" | "damage" | "crack" => 3,
-        "history" if path.get(1).is_some_and(|key| key == "probe") => 3,
+        "history" => match path.get(1).map_or("", String::as_str) {
+            "probe" | "front" | "tip" => 3,
+            _ => 1,
+        },
         "body" | "set" | "initial" | "condition" => 2,
-        "grid" | "time" | "output" | "history" | "parameters" => 1,
+        "grid" | "time" | "output" | "parameters" => 1,
         _ => 0,
     };
     let (header, keys) = path.split_at(count.min(path.len()));

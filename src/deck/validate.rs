@@ -5,7 +5,7 @@ use super::number::{Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
-use super::{bodies, conditions, materials, outputs, sets, shapes};
+use super::{bodies, conditions, history, materials, outputs, sets, shapes};
 use crate::dimension::Dimension;
 use crate::error::Result;
 
@@ -50,7 +50,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         initials: conditions::initials(&scope, deck, &sets)?,
         conditions: conditions::conditions(&scope, deck, &sets, spacing)?,
         output: outputs::output(&scope, deck, time.end)?,
-        history: outputs::history(&scope, deck, &sets, time.end)?,
+        history: history::history(&scope, deck, &sets, time.end, horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
         sets,
         time,

@@ -177,7 +177,7 @@ impl<'a> ResultFile<'a> {
 
     /// Goes on with a result after its first `kept` steps and so many rows of its history; later ones
     /// are dropped. What is kept is copied to a new file, which then takes the place of the old one:
-    /// whenever the process is killed, one of them is there.
+    /// whenever the process is killed, one of them is there. Also gives the rows that are kept.
     ///
     /// # Errors
     /// The old file cannot be read, holds less, or other points or fields; the disc is full.
@@ -187,7 +187,7 @@ impl<'a> ResultFile<'a> {
         contents: &Contents,
         history: &HistoryContents,
         (kept, kept_rows): (u64, u64),
-    ) -> Result<Self> {
+    ) -> Result<(Self, Vec<Vec<f64>>)> {
         let piece = contents.piece;
         let mut old = CollectiveFile::open(path, comm)?;
         let times = old.open_dataset(&format!("{STEPS}/Values"))?;
@@ -215,7 +215,7 @@ impl<'a> ResultFile<'a> {
             result.append_history(&rows)?;
             result.file.flush()?;
             result.file.rename(path)?;
-            Ok(result)
+            Ok((result, rows))
         });
         if finished.is_err() && comm.rank() == 0 {
             // It only takes up space; that it cannot be removed either changes nothing.

@@ -6,6 +6,8 @@ pub mod conditions;
 pub mod damping;
 mod failure;
 pub mod forces;
+mod foremost;
+mod front;
 mod geometry;
 pub mod instructions;
 mod kernels;
@@ -21,6 +23,7 @@ pub mod simulation;
 pub mod stable_step;
 pub mod state;
 mod sweep;
+mod tip;
 mod verlet;
 
 pub use kernels::{Response, Stored};

@@ -1,4 +1,4 @@
-//! What is seen of a run: fields for the result, sums and probes for the history.
+//! What is seen of a run: fields for the result; sums, probes, fronts and crack tips for the history.
 
 use rayon::prelude::*;
 
@@ -10,8 +10,10 @@ use crate::points::distance_squared;
 
 use super::Simulation;
 use super::conditions::{members, not_empty};
+use super::front::Front;
 use super::kernels::Stored;
 use super::measures::Expansion;
+use super::tip::Tip;
 
 /// Points summed by one task.
 const CHUNK: usize = 4096;
@@ -125,6 +127,8 @@ pub struct HistoryObserver {
     columns: Vec<(String, &'static str)>,
     reactions: Vec<Vec<u32>>,
     probes: Vec<Probe>,
+    fronts: Vec<Front>,
+    tips: Vec<Tip>,
     /// Energy (J) and intact bonds in the first row.
     start: Option<(f64, u64)>,
 }
@@ -157,10 +161,10 @@ pub struct HistoryRow {
 }
 
 impl HistoryObserver {
-    /// Finds the sets and probes.
+    /// Finds the sets, probes, lines and tips.
     ///
     /// # Errors
-    /// On a reaction of an empty set; the same on all ranks.
+    /// On an empty set and on a line without points; the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let axes = &AXES[..D];
@@ -197,10 +201,25 @@ impl HistoryObserver {
             vector(format!("probe_{name}_displacement"), "m");
             vector(format!("probe_{name}_velocity"), "m/s");
         }
+        let mut fronts = Vec::new();
+        for front in &plan.history.fronts {
+            fronts.push(Front::new(simulation, front)?);
+            columns.push((format!("front_{}", front.name), "m"));
+        }
+        let mut tips = Vec::new();
+        for tip in &plan.history.tips {
+            tips.push(Tip::new(simulation, tip)?);
+            let name = format!("tip_{}", tip.name);
+            columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), "m")));
+            columns.push((format!("{name}_length"), "m"));
+            columns.push((format!("{name}_speed"), "m/s"));
+        }
         Ok(Self {
             columns,
             reactions,
             probes,
+            fronts,
+            tips,
             start: None,
         })
     }
@@ -220,10 +239,21 @@ impl HistoryObserver {
         self.start = Some(start);
     }
 
+    /// Takes note of rows of the past, as [`Self::row`] gave them.
+    pub fn recall<const D: usize>(&mut self, rows: &[Vec<f64>]) {
+        let width = D + 2;
+        let first = self.columns.len() - width * self.tips.len();
+        for row in rows {
+            for (tip, values) in self.tips.iter_mut().zip(row[first..].chunks_exact(width)) {
+                tip.recall(row[0], values[D]);
+            }
+        }
+    }
+
     /// The present row; collective.
     pub fn row<const D: usize>(
         &mut self,
-        simulation: &Simulation<'_, D>,
+        simulation: &mut Simulation<'_, D>,
         snapshot: &Snapshot,
     ) -> HistoryRow {
         let comm = simulation.comm;
@@ -280,6 +310,13 @@ impl HistoryObserver {
         values.extend(&upper[..D]);
         values.extend(reactions);
         values.extend(self.probe_values(simulation));
+        for front in &self.fronts {
+            values.push(front.position(simulation, snapshot));
+        }
+        let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        for tip in &mut self.tips {
+            values.extend(tip.row(simulation, damage));
+        }
         HistoryRow {
             values,
             energies,

@@ -1,0 +1,200 @@
+//! What a deck writes to the history, and how often; validated.
+
+use serde_spanned::Spanned;
+
+use super::grammar::{self, Deck, Text};
+use super::number::{Number, Vector};
+use super::outputs::interval;
+use super::plan::{self, Field};
+use super::resolve::{Scope, find, resolve_each};
+use super::sets::{find_set, find_sets};
+use crate::error::Result;
+
+/// Damage above which a point counts as cracked if the deck does not say.
+const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
+
+/// Validates what is written to the history; `end` (s) is the end of the run, `horizon` (m) that of the
+/// grid.
+///
+/// # Errors
+/// On an unknown set or field, a wrong place or number.
+pub fn history(
+    scope: &Scope,
+    deck: &Deck,
+    sets: &[plan::Set],
+    end: f64,
+    horizon: f64,
+) -> Result<plan::History> {
+    let history = deck.history.get_ref();
+    let damage_threshold = match &history.damage_threshold {
+        None => DEFAULT_DAMAGE_THRESHOLD,
+        Some(number) => damage(scope, number, "[history] damage_threshold")?,
+    };
+    for (k, set) in history.reactions.iter().enumerate() {
+        if history.reactions[..k]
+            .iter()
+            .any(|earlier| earlier.get_ref() == set.get_ref())
+        {
+            let message = format!("[history] reactions: `{}` is named twice", set.get_ref());
+            return Err(scope.error(set.span(), message));
+        }
+    }
+    let probes = resolve_each(&history.probe, |name, probe| {
+        let key = column_name(scope, "probe", name, probe)?;
+        scope.vector(&probe.get_ref().at, &format!("{key} at"))
+    })?;
+    let fronts = resolve_each(&history.front, |name, table| {
+        front(scope, name, table, horizon)
+    })?;
+    let tips = resolve_each(&history.tip, |name, table| {
+        tip(scope, name, table, sets, damage_threshold)
+    })?;
+    Ok(plan::History {
+        every: interval(
+            scope,
+            "[history]",
+            &history.every,
+            &history.every_steps,
+            end / 500.0,
+        )?,
+        reactions: find_sets(scope, &history.reactions, sets, "[history] reactions")?,
+        damage_threshold,
+        probes: probes.into_iter().collect(),
+        fronts: fronts.into_values().collect(),
+        tips: tips.into_values().collect(),
+    })
+}
+
+/// The key of a table, if its name can be part of the names of columns.
+fn column_name<T>(scope: &Scope, kind: &str, name: &str, table: &Spanned<T>) -> Result<String> {
+    let key = format!("[history.{kind}.{name}]");
+    if name.is_empty() || name.contains(['/', '.', ',']) {
+        let message = format!(
+            "{key}: the name becomes that of columns, so it must not be empty or contain `/`, `.` \
+             or `,`"
+        );
+        return Err(scope.error(table.span(), message));
+    }
+    Ok(key)
+}
+
+fn damage(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
+    scope.within(number, key, 0.0..1.0, "at least 0 and below 1")
+}
+
+fn line(scope: &Scope, key: &str, from: &Vector, direction: &Vector) -> Result<plan::Line> {
+    Ok(plan::Line {
+        from: scope.vector(from, &format!("{key} from"))?,
+        direction: scope.direction(direction, &format!("{key} direction"))?,
+    })
+}
+
+fn front(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::Front>,
+    horizon: f64,
+) -> Result<plan::Front> {
+    let key = column_name(scope, "front", name, table)?;
+    let front = table.get_ref();
+    let length_or = |number: &Option<Number>, name, default| match number {
+        None => Ok(default),
+        Some(number) => scope.positive(number, &format!("{key} {name}")),
+    };
+    // The ranks are no property of the solid.
+    let fields = Field::ALL.into_iter().filter(|field| *field != Field::Rank);
+    let fields: Vec<Field> = fields.collect();
+    let names = fields.iter().map(|field| field.name());
+    let field = fields[find(scope.source, &front.field, names, &format!("{key} field"))?];
+    Ok(plan::Front {
+        name: name.to_owned(),
+        span: table.span(),
+        line: line(scope, &key, &front.from, &front.direction)?,
+        length: length_or(&front.length, "length", f64::INFINITY)?,
+        radius: length_or(&front.radius, "radius", horizon)?,
+        field,
+        component: component(scope, &key, field, &front.field, &front.component)?,
+        threshold: scope.within(
+            &front.threshold,
+            &format!("{key} threshold"),
+            0.0..f64::INFINITY,
+            "at least 0",
+        )?,
+    })
+}
+
+/// Names of the entries of a symmetric tensor, and the dimension from which on they are there.
+const ENTRIES: [(&str, usize); 6] = [
+    ("xx", 1),
+    ("yy", 2),
+    ("zz", 3),
+    ("xy", 2),
+    ("yz", 3),
+    ("xz", 3),
+];
+
+/// Names of the entries of a vector.
+const AXES: [(&str, usize); 3] = [("x", 1), ("y", 2), ("z", 3)];
+
+/// The entry of a field that a front looks at; `None` for the length of a vector.
+fn component(
+    scope: &Scope,
+    key: &str,
+    field: Field,
+    place: &Text,
+    component: &Option<Text>,
+) -> Result<Option<usize>> {
+    let names: &[(&str, usize)] = match field.components() {
+        1 => &[],
+        3 => &AXES,
+        _ => &ENTRIES,
+    };
+    let there = names.iter().filter(|(_, least)| *least <= scope.dimension);
+    match component {
+        None if names.is_empty() => Ok(Some(0)),
+        None if field.components() == 3 => Ok(None),
+        None => {
+            let known: Vec<&str> = there.map(|(name, _)| *name).collect();
+            let message = format!(
+                "{key} field: `{}` needs a `component`, one of {}",
+                field.name(),
+                known.join(", ")
+            );
+            Err(scope.error(place.span(), message))
+        }
+        Some(component) if names.is_empty() => {
+            let message = format!(
+                "{key} component: `{}` is a single number and has none",
+                field.name()
+            );
+            Err(scope.error(component.span(), message))
+        }
+        Some(component) => {
+            let known: Vec<&str> = there.map(|(name, _)| *name).collect();
+            let key = format!("{key} component");
+            let wanted = known[find(scope.source, component, known.iter().copied(), &key)?];
+            Ok(names.iter().position(|(name, _)| *name == wanted))
+        }
+    }
+}
+
+fn tip(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::Tip>,
+    sets: &[plan::Set],
+    damage_threshold: f64,
+) -> Result<plan::Tip> {
+    let key = column_name(scope, "tip", name, table)?;
+    let tip = table.get_ref();
+    Ok(plan::Tip {
+        name: name.to_owned(),
+        span: table.span(),
+        line: line(scope, &key, &tip.from, &tip.direction)?,
+        set: find_set(scope, &tip.set, sets, &format!("{key} set"))?,
+        threshold: match &tip.threshold {
+            None => damage_threshold,
+            Some(number) => damage(scope, number, &format!("{key} threshold"))?,
+        },
+    })
+}

@@ -1,0 +1,130 @@
+//! How far something has come in one direction: the farthest of some points above a threshold, and from
+//! there to where the threshold is crossed.
+
+use crate::comm::{self, Communicator, total};
+use crate::deck::plan::Line;
+use crate::points::distance_squared;
+
+use super::Simulation;
+
+/// Points count as equally far, and as within a distance, up to this share of the horizon.
+const TOLERANCE: f64 = 1e-9;
+
+/// This rank's points along a line, and how far along (m) each of them is.
+pub struct Course {
+    line: Line,
+    points: Vec<(u32, f64)>,
+}
+
+/// The place that something has reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reached {
+    /// How far from the start of the line, m.
+    pub along: f64,
+    /// Where, m; beside the line by as much as the farthest point.
+    pub position: [f64; 3],
+}
+
+impl Course {
+    /// The points of `among` (local indices) that lie between the start and the end (m along the line)
+    /// and up to `radius` (m) beside the line.
+    pub fn new<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        line: Line,
+        (end, radius): (f64, f64),
+        among: impl Iterator<Item = u32>,
+    ) -> Self {
+        let tolerance = TOLERANCE * simulation.plan.horizon;
+        let along = |point: u32| {
+            let offset = from_start(line, simulation.model.position(point as usize));
+            let along = (0..3).map(|d| offset[d] * line.direction[d]).sum::<f64>();
+            let foot = line.direction.map(|entry| along * entry);
+            let beside = distance_squared(foot, offset).sqrt();
+            let counts =
+                along >= -tolerance && along <= end + tolerance && beside <= radius + tolerance;
+            counts.then_some((point, along))
+        };
+        Self {
+            line,
+            points: among.filter_map(along).collect(),
+        }
+    }
+
+    /// Whether no rank has a point. Collective.
+    pub fn is_empty(&self, comm: &dyn Communicator) -> bool {
+        total(comm, self.points.len() as u64) == 0
+    }
+
+    /// How far the points with a `value` (of a local index) above the threshold reach; `None` where no
+    /// point is above. Collective; equal to the bit on any number of ranks.
+    ///
+    /// From the farthest of these points (of equally far ones that with the smallest id), the nearest
+    /// points ahead that are within a horizon of it are looked at: between both, the values are taken to
+    /// change linearly, the largest one counting where several points are equally far. What is reached
+    /// grows without a jump when values grow, also where the next point comes above the threshold.
+    pub fn reached<const D: usize>(
+        &self,
+        simulation: &Simulation<'_, D>,
+        threshold: f64,
+        value: impl Fn(usize) -> f64,
+    ) -> Option<Reached> {
+        let (model, comm) = (&simulation.model, simulation.comm);
+        let horizon = simulation.plan.horizon;
+        let tolerance = TOLERANCE * horizon;
+        let points = || {
+            let entry = |(point, along): &(u32, f64)| (*point as usize, *along);
+            self.points.iter().map(entry)
+        };
+        let above = || points().filter(|(point, _)| value(*point) > threshold);
+
+        let mut last = [largest(above().map(|(_, along)| along))];
+        comm.max(&mut last);
+        let [last] = last;
+        if last == f64::MIN {
+            return None;
+        }
+        let foremost = above()
+            .filter(|(_, along)| *along >= last - tolerance)
+            .map(|(point, _)| point)
+            .min_by_key(|point| model.ids[*point]);
+        let mut id = [foremost.map_or(f64::MAX, |point| model.ids[point] as f64)];
+        comm::min(comm, &mut id);
+        let own = foremost.filter(|point| model.ids[*point] as f64 == id[0]);
+        let mut place = own.map_or([f64::MIN; 3], |point| model.position(point));
+        comm.max(&mut place);
+
+        let near = |point: usize| {
+            distance_squared(place, model.position(point)).sqrt() <= horizon + tolerance
+        };
+        let ahead = || points().filter(|(point, along)| *along > last + tolerance && near(*point));
+        let mut next = [ahead().map(|(_, along)| along).fold(f64::MAX, f64::min)];
+        comm::min(comm, &mut next);
+        let [next] = next;
+        let here = above().filter(|(point, along)| *along >= last - tolerance && near(*point));
+        let there = ahead().filter(|(_, along)| *along <= next + tolerance);
+        let mut values = [
+            largest(here.map(|(point, _)| value(point))),
+            largest(there.map(|(point, _)| value(point))),
+        ];
+        comm.max(&mut values);
+        let share = (values[0] - threshold) / (values[0] - values[1]);
+        let further = if next == f64::MAX {
+            0.0
+        } else {
+            share * (next - last)
+        };
+        Some(Reached {
+            along: last + further,
+            position: std::array::from_fn(|d| place[d] + further * self.line.direction[d]),
+        })
+    }
+}
+
+fn from_start(line: Line, position: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|d| position[d] - line.from[d])
+}
+
+/// The largest of some values; of none, the smallest number there is.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::MIN, f64::max)
+}

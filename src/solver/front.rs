@@ -1,0 +1,58 @@
+//! Fronts: how far a field has come along a line.
+
+use crate::deck::plan;
+use crate::error::Result;
+
+use super::Simulation;
+use super::foremost::Course;
+use super::observe::Snapshot;
+
+/// A front that is followed.
+pub struct Front {
+    rule: plan::Front,
+    course: Course,
+}
+
+impl Front {
+    /// Finds the points along the line. Collective.
+    ///
+    /// # Errors
+    /// When there is none; the same on all ranks.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, rule: &plan::Front) -> Result<Self> {
+        let owned = 0..simulation.model.owned() as u32;
+        let course = Course::new(simulation, rule.line, (rule.length, rule.radius), owned);
+        if course.is_empty(simulation.comm) {
+            let message = format!(
+                "[history.front.{}]: no point lies within {} m of the line",
+                rule.name, rule.radius
+            );
+            return Err(simulation.plan.source.error(rule.span.clone(), message));
+        }
+        Ok(Self {
+            rule: rule.clone(),
+            course,
+        })
+    }
+
+    /// How far along the line (m) the size of the field is above the threshold, at the moment of the
+    /// snapshot; NaN where it is nowhere. Collective.
+    pub fn position<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) -> f64 {
+        let plan::Front {
+            field, component, ..
+        } = self.rule;
+        let values = snapshot.field(simulation, field);
+        let size = |point: usize| {
+            let row = &values[field.components() * point..][..field.components()];
+            match component {
+                Some(entry) => row[entry].abs(),
+                None => row.iter().map(|value| value * value).sum::<f64>().sqrt(),
+            }
+        };
+        let reached = self.course.reached(simulation, self.rule.threshold, size);
+        reached.map_or(f64::NAN, |reached| reached.along)
+    }
+}

@@ -1,0 +1,133 @@
+//! Crack tips: where the damage ends in one direction, and how fast that moves.
+
+use crate::deck::plan;
+use crate::error::Result;
+
+use super::Simulation;
+use super::conditions::{members, not_empty};
+use super::foremost::{Course, Reached};
+
+/// A crack tip that is followed.
+pub struct Tip {
+    threshold: f64,
+    course: Course,
+    growth: Growth,
+}
+
+impl Tip {
+    /// Finds the points that are looked at. Collective.
+    ///
+    /// # Errors
+    /// When the set is empty or lies behind the start; the same on all ranks.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, rule: &plan::Tip) -> Result<Self> {
+        let (plan, model) = (simulation.plan, &simulation.model);
+        let points = members(plan, model, rule.set);
+        let key = format!("[history.tip.{}] set", rule.name);
+        let place = (&key[..], rule.span.clone());
+        not_empty(plan, simulation.comm, rule.set, &points, place)?;
+        let everywhere = (f64::INFINITY, f64::INFINITY);
+        let course = Course::new(simulation, rule.line, everywhere, points.into_iter());
+        if course.is_empty(simulation.comm) {
+            let message = format!(
+                "[history.tip.{}]: all points of the set `{}` lie behind `from`",
+                rule.name, plan.sets[rule.set].name
+            );
+            return Err(plan.source.error(rule.span.clone(), message));
+        }
+        Ok(Self {
+            threshold: rule.threshold,
+            course,
+            growth: Growth::new(plan.horizon),
+        })
+    }
+
+    /// Position (m), length (m) and speed (m/s) at a damage of the owned points; NaN where no point is
+    /// above the threshold. Collective.
+    pub fn row<const D: usize>(
+        &mut self,
+        simulation: &Simulation<'_, D>,
+        damage: impl Fn(usize) -> f64,
+    ) -> Vec<f64> {
+        let reached = self.course.reached(simulation, self.threshold, damage);
+        let Reached { along, position } = reached.unwrap_or(Reached {
+            along: f64::NAN,
+            position: [f64::NAN; 3],
+        });
+        let mut row = position[..D].to_vec();
+        row.extend([along, self.growth.speed(simulation.time(), along)]);
+        row
+    }
+
+    /// Takes note of a length (m) at a time (s) of the past.
+    pub fn recall(&mut self, time: f64, length: f64) {
+        self.growth.speed(time, length);
+    }
+}
+
+/// The length of a crack over time.
+///
+/// Its speed is the mean over the last horizon of growth: since the latest row in which it was at least
+/// one horizon shorter, or, before it has grown by as much, since the latest one in which it had its
+/// first length. Over a shorter way the steps of the lattice would be seen, over a fixed time the speed
+/// would depend on how often rows are written. A crack at rest from the start has speed 0; that of one
+/// that stops falls as one horizon over the time since then.
+struct Growth {
+    horizon: f64,
+    /// Time (s) and length (m) of each row with a tip.
+    past: Vec<(f64, f64)>,
+}
+
+impl Growth {
+    fn new(horizon: f64) -> Self {
+        Self {
+            horizon,
+            past: Vec::new(),
+        }
+    }
+
+    /// The speed (m/s) when the next length (m) is seen at a time (s); NaN at the first.
+    fn speed(&mut self, time: f64, length: f64) -> f64 {
+        if length.is_nan() {
+            return f64::NAN;
+        }
+        let first = self.past.first().map_or(f64::NAN, |first| first.1);
+        let shorter = (length - self.horizon).max(first);
+        let then = self.past.iter().rev().find(|then| then.1 <= shorter);
+        let speed = then.map_or(f64::NAN, |then| (length - then.1) / (time - then.0));
+        self.past.push((time, length));
+        speed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speed_is_the_mean_over_the_last_horizon_of_growth() {
+        let mut growth = Growth::new(3.0);
+        assert!(growth.speed(0.0, f64::NAN).is_nan());
+        assert!(growth.speed(1.0, 10.0).is_nan());
+        assert_eq!(growth.speed(2.0, 10.0), 0.0);
+        // Steps of one spacing, every other row.
+        assert_eq!(growth.speed(3.0, 11.0), 1.0);
+        assert_eq!(growth.speed(4.0, 11.0), 0.5);
+        assert_eq!(growth.speed(5.0, 12.0), 2.0 / 3.0);
+        assert_eq!(growth.speed(6.0, 12.0), 0.5);
+        assert_eq!(growth.speed(7.0, 13.0), 0.6);
+        assert_eq!(growth.speed(8.0, 13.0), 0.5);
+        assert_eq!(growth.speed(9.0, 14.0), 0.6);
+        assert_eq!(growth.speed(10.0, 14.0), 0.5);
+        // At rest.
+        assert_eq!(growth.speed(304.0, 14.0), 0.01);
+    }
+
+    #[test]
+    fn a_crack_that_seems_to_shrink_has_a_negative_speed() {
+        let mut growth = Growth::new(3.0);
+        growth.speed(0.0, 5.0);
+        growth.speed(1.0, 9.0);
+        assert_eq!(growth.speed(2.0, 8.5), 3.5 / 2.0);
+        assert_eq!(growth.speed(4.0, 4.0), -0.25);
+    }
+}
