@@ -188,6 +188,16 @@ mod tests {
         assert_eq!(lines, ["condition: stands in another order"]);
         let lines = against("density = 2", "density = 3");
         assert_eq!(lines, ["material.rubber.pmb.density: was 2, is 3"]);
+        let glued = |rule: &str| {
+            let pair =
+                format!("interface.pair.glue = {{ bodies = ['bar', 'rod'], rule = '{rule}' }}");
+            source(&DECK.replace("time =", &format!("{pair}\n time =")))
+        };
+        let lines = differences(&glued("own"), &glued("minimum")).unwrap();
+        assert_eq!(
+            lines,
+            ["interface.pair.glue.rule: was \"own\", is \"minimum\""]
+        );
         let lines = against("time", "initial.push.velocity = ['x']\n time");
         assert!(lines[0].starts_with("initial: was not there"), "{lines:?}");
     }

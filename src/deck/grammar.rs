@@ -169,16 +169,32 @@ pub struct Interface {
     /// half with its own modulus and horizon; else both have the mean or the smaller of each.
     #[serde(default = "own")]
     pub rule: Spanned<Rule>,
+    /// Pairs of bodies with a rule of their own, by any name.
+    #[serde(default)]
+    pub pair: Tables<Pair>,
 }
 
 impl Default for Interface {
     fn default() -> Self {
-        Self { rule: own() }
+        Self {
+            rule: own(),
+            pair: Tables::default(),
+        }
     }
 }
 
 fn own() -> Spanned<Rule> {
     Spanned::new(0..0, Rule::Own)
+}
+
+/// The bonds between two bodies.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pair {
+    /// Names of the two bodies, in any order.
+    pub bodies: Spanned<Vec<Text>>,
+    /// As for all pairs.
+    pub rule: Spanned<Rule>,
 }
 
 /// What constants bonds between blocks have.

@@ -7,6 +7,7 @@ mod explain;
 pub mod expression;
 pub mod grammar;
 mod history;
+mod interface;
 mod materials;
 mod number;
 mod outputs;

@@ -29,7 +29,7 @@ pub struct Plan {
     /// How bonds are kept.
     pub family: FamilyRule,
     /// The bonds between blocks.
-    pub interface: InterfaceRule,
+    pub interface: Interface,
     /// Bodies in the order of the deck; the index is the block number.
     pub bodies: Vec<Body>,
     /// Sets: `all`, then the bodies, then those of the deck.
@@ -159,7 +159,28 @@ pub enum FamilyRule {
     List,
 }
 
-/// What constants the bonds between blocks have.
+/// The bonds between blocks.
+#[derive(Debug, Clone)]
+pub struct Interface {
+    /// The rule of pairs without one of their own.
+    pub rule: InterfaceRule,
+    /// Pairs of bodies, by name, with a rule of their own.
+    pub pairs: Vec<([String; 2], InterfaceRule)>,
+}
+
+impl Interface {
+    /// The rule of the bonds between two bodies; the same for both orders.
+    pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
+        let joins = |names: &[String; 2]| {
+            let [a, b] = [&names[0], &names[1]];
+            (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)
+        };
+        let own = self.pairs.iter().find(|(names, _)| joins(names));
+        own.map_or(self.rule, |(_, rule)| *rule)
+    }
+}
+
+/// What constants the bonds between two blocks have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InterfaceRule {
     /// Means of the moduli and of the horizons.

@@ -194,8 +194,9 @@ fn label(path: &[String]) -> String {
             "probe" | "front" | "tip" => 3,
             _ => 1,
         },
+        "interface" if path.get(1).is_some_and(|key| key == "pair") => 3,
         "body" | "set" | "initial" | "condition" => 2,
-        "grid" | "time" | "output" | "parameters" => 1,
+        "grid" | "interface" | "time" | "output" | "parameters" => 1,
         _ => 0,
     };
     let (header, keys) = path.split_at(count.min(path.len()));

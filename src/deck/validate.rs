@@ -1,11 +1,11 @@
 //! From the grammar to the plan: every value checked, every name resolved.
 
-use super::grammar::{Deck, DimensionName, Family, Quadrature, Rule, VolumeCorrection};
+use super::grammar::{Deck, DimensionName, Family, Quadrature, VolumeCorrection};
 use super::number::{Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
-use super::{bodies, conditions, history, materials, outputs, sets, shapes};
+use super::{bodies, conditions, history, interface, materials, outputs, sets, shapes};
 use crate::dimension::Dimension;
 use crate::error::Result;
 
@@ -28,7 +28,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(&scope, deck, &bodies)?;
     let family = family(&scope, deck, &bodies)?;
-    let interface = interface(&scope, deck, &bodies)?;
+    let interface = interface::interface(&scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| {
         shapes::crack(&scope, name, table)
     })?;
@@ -153,46 +153,6 @@ fn family(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::Fam
                  neighbours all over, {reason}; take \"auto\" or \"list\""
             );
             Err(scope.error(family.span(), message))
-        }
-    }
-}
-
-fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::InterfaceRule> {
-    let rule = &deck.interface.rule;
-    let linear =
-        |body: &&plan::Body| matches!(body.material.law, plan::Law::LinearMicroelastic { .. });
-    let name = |body: &plan::Body| body.material.law.name();
-    if let Some(body) = bodies.iter().find(linear)
-        && let Some(other) = bodies.iter().find(|other| name(other) != name(body))
-    {
-        let message = format!(
-            "[body.{}] material: the forces of `{}` and of `linear_microelastic` have different \
-             directions, so that no bond can have both",
-            other.name,
-            name(other),
-        );
-        return Err(scope.error(other.span.clone(), message));
-    }
-    let found = match rule.get_ref() {
-        Rule::Own => return Ok(plan::InterfaceRule::Own),
-        Rule::Average => plan::InterfaceRule::Average,
-        Rule::Minimum => plan::InterfaceRule::Minimum,
-    };
-    let own_only = |body: &&plan::Body| match &body.material.law {
-        plan::Law::Ordinary(_) => true,
-        plan::Law::LinearMicroelastic { lambda, .. } => lambda.is_some(),
-        _ => name(body) != name(&bodies[0]),
-    };
-    match bodies.iter().find(own_only) {
-        None => Ok(found),
-        Some(body) => {
-            let message = format!(
-                "[interface] rule: one micromodulus for both ends needs the same bond-based law in \
-                 all bodies, but [body.{}] is `{}`; take `own`",
-                body.name,
-                name(body)
-            );
-            Err(scope.error(rule.span(), message))
         }
     }
 }

@@ -34,7 +34,7 @@ fn constants(plan: &Plan, here: &Body, there: &Body) -> Constants {
         },
         horizon: of(own.1, other.1),
     };
-    match plan.interface {
+    match plan.interface.between(here, there) {
         InterfaceRule::Own => combine(|own, _| own),
         InterfaceRule::Average => combine(|own, other| 0.5 * (own + other)),
         InterfaceRule::Minimum => combine(f64::min),

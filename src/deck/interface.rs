@@ -1,0 +1,144 @@
+//! The bonds between the bodies of a deck, validated.
+
+use serde_spanned::Spanned;
+
+use super::grammar::{self, Deck, Rule};
+use super::plan;
+use super::resolve::{Scope, find};
+use crate::error::Result;
+
+/// Validates the rules of the bonds between bodies.
+///
+/// # Errors
+/// On bodies whose laws no bond can have, a rule that the laws of a pair do not allow, and on pairs that
+/// are none or are given twice.
+pub fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::Interface> {
+    no_two_directions(scope, bodies)?;
+    let mut pairs: Vec<(&str, [usize; 2])> = Vec::new();
+    let mut interface = plan::Interface {
+        rule: rule(&deck.interface.rule),
+        pairs: Vec::new(),
+    };
+    for (name, table) in &deck.interface.pair {
+        let key = format!("[interface.pair.{name}]");
+        let table = table.get_ref();
+        let pair = pair(scope, &key, table, bodies)?;
+        if let Some((earlier, _)) = pairs.iter().find(|(_, other)| *other == pair) {
+            let [a, b] = pair.map(|body| &bodies[body].name);
+            let message = format!(
+                "{key} bodies: [interface.pair.{earlier}] has the bonds between `{a}` and `{b}` already"
+            );
+            return Err(scope.error(table.bodies.span(), message));
+        }
+        suits(scope, &format!("{key} rule"), &table.rule, pair, bodies)?;
+        pairs.push((name, pair));
+        let names = pair.map(|body| bodies[body].name.clone());
+        interface.pairs.push((names, rule(&table.rule)));
+    }
+    for second in 1..bodies.len() {
+        for first in 0..second {
+            let pair = [first, second];
+            if pairs.iter().all(|(_, other)| *other != pair) {
+                suits(
+                    scope,
+                    "[interface] rule",
+                    &deck.interface.rule,
+                    pair,
+                    bodies,
+                )?;
+            }
+        }
+    }
+    Ok(interface)
+}
+
+fn rule(rule: &Spanned<Rule>) -> plan::InterfaceRule {
+    match rule.get_ref() {
+        Rule::Own => plan::InterfaceRule::Own,
+        Rule::Average => plan::InterfaceRule::Average,
+        Rule::Minimum => plan::InterfaceRule::Minimum,
+    }
+}
+
+/// The indices of two different bodies, the lower one first.
+fn pair(
+    scope: &Scope,
+    key: &str,
+    table: &grammar::Pair,
+    bodies: &[plan::Body],
+) -> Result<[usize; 2]> {
+    let key = format!("{key} bodies");
+    let [first, second] = &table.bodies.get_ref()[..] else {
+        let count = table.bodies.get_ref().len();
+        let message = format!("{key}: must name two bodies, names {count}");
+        return Err(scope.error(table.bodies.span(), message));
+    };
+    let names = bodies.iter().map(|body| body.name.as_str());
+    let a = find(scope.source, first, names.clone(), &key)?;
+    let b = find(scope.source, second, names, &key)?;
+    if a == b {
+        let message = format!(
+            "{key}: `{}` is named twice; bonds within a body have its own constants",
+            bodies[a].name
+        );
+        return Err(scope.error(second.span(), message));
+    }
+    Ok([a.min(b), a.max(b)])
+}
+
+/// An error if the laws of two bodies exert forces in different directions on their bonds.
+fn no_two_directions(scope: &Scope, bodies: &[plan::Body]) -> Result<()> {
+    let linear =
+        |body: &&plan::Body| matches!(body.material.law, plan::Law::LinearMicroelastic { .. });
+    let name = |body: &plan::Body| body.material.law.name();
+    let Some(body) = bodies.iter().find(linear) else {
+        return Ok(());
+    };
+    match bodies.iter().find(|other| name(other) != name(body)) {
+        None => Ok(()),
+        Some(other) => {
+            let message = format!(
+                "[body.{}] material: the forces of `{}` and of `linear_microelastic` have different \
+                 directions, so that no bond can have both",
+                other.name,
+                name(other),
+            );
+            Err(scope.error(other.span.clone(), message))
+        }
+    }
+}
+
+/// An error if a rule needs one micromodulus for both ends and the laws of two bodies cannot have it.
+fn suits(
+    scope: &Scope,
+    key: &str,
+    rule: &Spanned<Rule>,
+    pair: [usize; 2],
+    bodies: &[plan::Body],
+) -> Result<()> {
+    let pair = pair.map(|body| &bodies[body]);
+    let [first, second] = pair.map(|body| body.material.law.name());
+    let has_micromodulus = |body: &plan::Body| match &body.material.law {
+        plan::Law::Ordinary(_) => false,
+        plan::Law::LinearMicroelastic { lambda, .. } => lambda.is_none(),
+        _ => true,
+    };
+    if *rule.get_ref() == Rule::Own || first == second && pair.into_iter().all(has_micromodulus) {
+        return Ok(());
+    }
+    let lambda = |body: &plan::Body| match body.material.law {
+        plan::Law::LinearMicroelastic {
+            lambda: Some(_), ..
+        } => " with a `lambda`",
+        _ => "",
+    };
+    let message = format!(
+        "{key}: one micromodulus for both ends needs the same bond-based law in both bodies, but \
+         [body.{}] is `{first}`{} and [body.{}] is `{second}`{}; take `own`",
+        pair[0].name,
+        lambda(pair[0]),
+        pair[1].name,
+        lambda(pair[1]),
+    );
+    Err(scope.error(rule.span(), message))
+}

@@ -1,0 +1,148 @@
+//! Bonds between bodies: what each rule makes of their constants, pair by pair, and that whatever the
+//! rule action and reaction cancel.
+
+mod support;
+
+use fissure::solver::Simulation;
+use support::{displace, largest_force, simulate};
+
+/// The micromodulus of a bar, 12E/(5δ²A) (N/m⁶).
+fn micromodulus(modulus: f64, horizon: f64) -> f64 {
+    12.0 * modulus / (5.0 * horizon * horizon)
+}
+
+#[test]
+fn each_pair_has_its_rule() {
+    // Three points a metre apart, each a body; the outer two of moduli and horizons of their own.
+    let text = |interface: &str| {
+        format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 1.5 }}
+            {interface}
+            material.soft.pmb = {{ density = 1, youngs_modulus = 2 }}
+            material.firm.pmb = {{ density = 1, youngs_modulus = 3 }}
+            material.hard.pmb = {{ density = 1, youngs_modulus = 7 }}
+            body.left = {{ material = 'soft', horizon = 1.2, shape.box = {{ lower = [0], upper = [1] }} }}
+            body.middle = {{ material = 'firm', shape.box = {{ lower = [1], upper = [2] }} }}
+            body.right = {{ material = 'hard', horizon = 1.7, shape.box = {{ lower = [2], upper = [3] }} }}
+            time = {{ end = 1 }}
+            "
+        )
+    };
+    let found = |interface: &str| {
+        simulate::<1, _>(&text(interface), |mut simulation| {
+            // The middle stays; both bonds have the stretch 0.1.
+            displace(&mut simulation, |[x, ..]| [1.5 + 1.1 * (x - 1.5), 0.0, 0.0]);
+            [0, 2].map(|point| simulation.state.responses[point].force[0].abs() / 0.1)
+        })
+    };
+    let own =
+        |a: [f64; 2], b: [f64; 2]| 0.5 * (micromodulus(a[0], a[1]) + micromodulus(b[0], b[1]));
+    let average = |a: [f64; 2], b: [f64; 2]| micromodulus(0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]));
+    let minimum = |a: [f64; 2], b: [f64; 2]| micromodulus(a[0].min(b[0]), a[1].min(b[1]));
+    let (left, middle, right) = ([2.0, 1.2], [3.0, 1.5], [7.0, 1.7]);
+    let pair = |name: &str, bodies: &str, rule: &str| {
+        format!("interface.pair.{name} = {{ bodies = {bodies}, rule = '{rule}' }}\n")
+    };
+    for (interface, expected) in [
+        (String::new(), [own(left, middle), own(middle, right)]),
+        (
+            "interface.rule = 'average'".to_owned(),
+            [average(left, middle), average(middle, right)],
+        ),
+        (
+            "interface.rule = 'minimum'\n".to_owned() + &pair("a", "['middle', 'left']", "own"),
+            [own(left, middle), minimum(middle, right)],
+        ),
+        (
+            pair("a", "['left', 'middle']", "minimum")
+                + &pair("b", "['right', 'middle']", "average")
+                + &pair("c", "['right', 'left']", "own"),
+            [minimum(left, middle), average(middle, right)],
+        ),
+    ] {
+        let found = found(&interface);
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!(
+                (found / expected - 1.0).abs() < 1e-12,
+                "{interface}: {found} {expected}"
+            );
+        }
+    }
+}
+
+/// Three blocks of three moduli, horizons and spacings with a rule for each pair; two of them can break.
+fn blocks(law: [&str; 3], correction: &str, rules: [&str; 3]) -> String {
+    let [soft, firm, hard] = law;
+    let [first, second, third] = rules;
+    let damage = match soft {
+        law if law.starts_with("linear") => "",
+        _ => "damage = 'brittle',",
+    };
+    format!(
+        "dimension = 'plane-strain'
+        grid = {{ spacing = 1, horizon = 3, volume_correction = '{correction}' }}
+        [interface]
+        rule = '{first}'
+        pair.b = {{ bodies = ['middle', 'right'], rule = '{second}' }}
+        pair.c = {{ bodies = ['right', 'left'], rule = '{third}' }}
+        [material]
+        soft.{soft}
+        firm.{firm}
+        hard.{hard}
+        [damage.brittle.critical_stretch]
+        critical_stretch = 0.05
+        [body]
+        left = {{ material = 'soft', shape.box = {{ lower = [0, 0], upper = [9, 6] }} }}
+        middle = {{ material = 'firm', {damage} horizon = 2.1, shape.box = {{ lower = [9, 0], upper = [18, 6] }} }}
+        right = {{ material = 'hard', {damage} horizon = 1.6, spacing = 0.5, shape.box = {{ lower = [4, 6], upper = [14, 10] }} }}
+        [time]
+        end = 1
+        "
+    )
+}
+
+#[test]
+fn momentum_is_kept_by_every_rule() {
+    let bond_based = |law: &str| {
+        [2, 5, 60].map(|modulus| format!("{law} = {{ density = 2, youngs_modulus = {modulus} }}"))
+    };
+    let ordinary = [
+        "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.4 }",
+        "ordinary = { density = 2, youngs_modulus = 50, poisson_ratio = 0.1, influence = 'linear' }",
+        "pmb = { density = 2, youngs_modulus = 20 }",
+    ]
+    .map(str::to_owned);
+    let rules = ["own", "average", "minimum"];
+    let mut decks = Vec::new();
+    for correction in ["none", "linear", "exact"] {
+        decks.push((ordinary.clone(), correction, ["own"; 3]));
+        for law in ["pmb", "normalised_pmb", "linear_microelastic"] {
+            for shift in 0..3 {
+                let rules = std::array::from_fn(|k| rules[(k + shift) % 3]);
+                decks.push((bond_based(law), correction, rules));
+            }
+        }
+    }
+    for (laws, correction, rules) in decks {
+        let laws = [&laws[0], &laws[1], &laws[2]].map(String::as_str);
+        let text = blocks(laws, correction, rules);
+        simulate::<2, _>(&text, |mut simulation: Simulation<2>| {
+            displace(&mut simulation, |[x, y, z]| {
+                let bend = 0.05 * (0.6 * x + 0.4 * y).sin();
+                [x + bend, y + 0.05 * (0.3 * x - 0.7 * y).cos(), z]
+            });
+            assert!(largest_force(&simulation) > 0.0);
+            for d in 0..2 {
+                let forces = simulation.state.responses.iter().map(|r| r.force[d]);
+                let products: Vec<f64> = forces
+                    .zip(&simulation.model.volume)
+                    .map(|(force, volume)| force * volume)
+                    .collect();
+                let gross: f64 = products.iter().map(|force| force.abs()).sum();
+                let net: f64 = products.iter().sum();
+                assert!(net.abs() < 1e-12 * gross, "{net} of {gross}: {text}");
+            }
+        });
+    }
+}
