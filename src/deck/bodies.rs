@@ -10,7 +10,7 @@ use super::number::shown;
 use super::plan;
 use super::resolve::{Scope, find, resolve_each};
 use super::shapes;
-use super::validate::checked_spacing;
+use super::validate;
 use crate::error::Result;
 
 /// The square of this number of bond lists is looked through in every step.
@@ -23,7 +23,7 @@ const MOST_BODIES: usize = 256;
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
-    spacing: Option<f64>,
+    spacing: Option<[f64; 3]>,
     materials: &IndexMap<String, plan::Material>,
     damages: &IndexMap<String, plan::CriticalStretch>,
 ) -> Result<Vec<plan::Body>> {
@@ -119,7 +119,7 @@ fn point_source(
     key: &str,
     span: Range<usize>,
     body: &grammar::Body,
-    grid_spacing: Option<f64>,
+    grid_spacing: Option<[f64; 3]>,
     horizon: f64,
 ) -> Result<plan::PointSource> {
     let given = [
@@ -136,18 +136,20 @@ fn point_source(
             let own = body
                 .spacing
                 .as_ref()
-                .map(|number| checked_spacing(scope, number, &format!("{key} spacing"), horizon))
+                .map(|edges| validate::spacing(scope, edges, &format!("{key} spacing"), horizon))
                 .transpose()?;
             let Some(spacing) = own.or(grid_spacing) else {
                 let message = "[grid]: a body given as a shape needs `spacing` here or in the body";
                 return Err(scope.error(deck.grid.span(), message));
             };
-            if let (Some(number), true) = (&body.horizon, spacing > horizon) {
+            let edges = &spacing[..scope.dimension];
+            let longest = edges.iter().copied().fold(0.0, f64::max);
+            if let (Some(number), true) = (&body.horizon, longest > horizon) {
                 let message = format!(
                     "{key} horizon: {} m is smaller than the spacing {} m, so no point would have \
                      a neighbour",
                     shown(horizon),
-                    shown(spacing)
+                    shown(longest)
                 );
                 return Err(scope.error(number.span(), message));
             }

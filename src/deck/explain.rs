@@ -1,7 +1,7 @@
 //! A deck with every default filled in.
 
-use super::grammar::Deck;
-use super::number::{Number, default_number};
+use super::grammar::{Deck, Grid};
+use super::number::{Edges, Number, default_number};
 use super::plan::{CheckpointRule, Interval, Plan};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
@@ -61,7 +61,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     }
     for condition in deck.condition.values_mut().map(|table| table.get_mut()) {
         if condition.traction.is_some() || condition.pressure.is_some() {
-            condition.depth = condition.depth.take().or(grid.spacing.clone());
+            condition.depth = condition.depth.take().or_else(|| edge(grid));
         }
     }
     let output = deck.output.get_mut();
@@ -97,6 +97,15 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     for tip in history.tip.values_mut().map(|table| table.get_mut()) {
         let threshold = history.damage_threshold.clone();
         tip.threshold = tip.threshold.take().or(threshold);
+    }
+}
+
+/// The grid's spacing, if one number holds for all directions.
+fn edge(grid: &Grid) -> Option<Number> {
+    let spacing = grid.spacing.as_ref()?;
+    match spacing.get_ref() {
+        Edges::Same(edge) => Some(Spanned::new(spacing.span(), edge.clone())),
+        Edges::Each(_) => None,
     }
 }
 

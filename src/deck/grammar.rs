@@ -10,7 +10,7 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
-use super::number::{Number, Vector, default_number};
+use super::number::{Edges, Number, Vector, default_number};
 
 /// A string with its place in the deck.
 pub type Text = Spanned<String>;
@@ -98,9 +98,9 @@ pub enum DimensionName {
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
-    /// Distance of lattice points in m; for bodies given as shapes.
+    /// Edge of a lattice cell in m, or a list with one a dimension; for bodies given as shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub spacing: Option<Number>,
+    pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded.
     pub horizon: Number,
     /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
@@ -362,7 +362,7 @@ pub struct Body {
     pub points: Option<PointFile>,
     /// Lattice spacing of this body in m; that of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub spacing: Option<Number>,
+    pub spacing: Option<Spanned<Edges>>,
     /// Horizon of this body in m; that of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub horizon: Option<Number>,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::de::{self, Visitor};
+use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_spanned::Spanned;
 
@@ -20,6 +20,15 @@ pub type Number = Spanned<Written>;
 
 /// A vector of numbers with its place in the deck, one entry a dimension.
 pub type Vector = Spanned<Vec<Number>>;
+
+/// The edges of a lattice cell as written: one number, or a list with one a dimension.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Edges {
+    /// All alike.
+    Same(Written),
+    /// One a dimension.
+    Each(Vec<Number>),
+}
 
 /// A number that stands nowhere: a default.
 pub fn default_number(value: f64) -> Number {
@@ -64,6 +73,51 @@ impl<'de> Deserialize<'de> for Written {
         }
 
         deserializer.deserialize_any(WrittenVisitor)
+    }
+}
+
+impl<'de> Deserialize<'de> for Edges {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct EdgesVisitor;
+
+        impl<'de> Visitor<'de> for EdgesVisitor {
+            type Value = Edges;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("a number, an expression in quotes, or a list of them")
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Edges, E> {
+                Ok(Edges::Same(Written::Value(value as f64)))
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Edges, E> {
+                Ok(Edges::Same(Written::Value(value)))
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Edges, E> {
+                Ok(Edges::Same(Written::Text(text.to_owned())))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Edges, A::Error> {
+                let mut edges = Vec::new();
+                while let Some(edge) = list.next_element()? {
+                    edges.push(edge);
+                }
+                Ok(Edges::Each(edges))
+            }
+        }
+
+        deserializer.deserialize_any(EdgesVisitor)
+    }
+}
+
+impl Serialize for Edges {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Same(edge) => edge.serialize(serializer),
+            Self::Each(edges) => edges.serialize(serializer),
+        }
     }
 }
 

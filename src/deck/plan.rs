@@ -220,8 +220,8 @@ pub enum PointSource {
     Lattice {
         /// The shape.
         shape: Shape,
-        /// Cell edge, m.
-        spacing: f64,
+        /// Edges of a cell, m.
+        spacing: [f64; 3],
         /// A corner of a cell, m.
         origin: [f64; 3],
     },

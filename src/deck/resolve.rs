@@ -127,7 +127,11 @@ impl<'a> Scope<'a> {
         }
     }
 
-    fn entries<'v>(&self, vector: &'v Vector, key: &str) -> Result<&'v [Number]> {
+    /// The entries of a vector, one a dimension.
+    ///
+    /// # Errors
+    /// When there are more or fewer.
+    pub fn entries<'v>(&self, vector: &'v Vector, key: &str) -> Result<&'v [Number]> {
         let entries = vector.get_ref();
         if entries.len() == self.dimension {
             return Ok(entries);

@@ -1,7 +1,9 @@
 //! From the grammar to the plan: every value checked, every name resolved.
 
-use super::grammar::{Deck, DimensionName, Family, Quadrature, VolumeCorrection};
-use super::number::{Number, shown};
+use serde_spanned::Spanned;
+
+use super::grammar::{Deck, DimensionName, Family, Grid, Quadrature, VolumeCorrection};
+use super::number::{Edges, Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
@@ -17,7 +19,10 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let scope = Scope::of(source, deck)?;
     let dimension = dimension(&scope, deck)?;
     let horizon = scope.positive(&deck.grid.get_ref().horizon, "[grid] horizon")?;
-    let spacing = spacing(&scope, deck, horizon)?;
+    let spacing = match &deck.grid.get_ref().spacing {
+        None => None,
+        Some(edges) => Some(spacing(&scope, edges, "[grid] spacing", horizon)?),
+    };
     let sets = sets::sets(&scope, deck)?;
     let materials = resolve_each(&deck.material, |name, table| {
         materials::material(&scope, dimension, name, table)
@@ -48,7 +53,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         bodies,
         cracks: cracks.into_values().collect(),
         initials: conditions::initials(&scope, deck, &sets)?,
-        conditions: conditions::conditions(&scope, deck, &sets, spacing)?,
+        conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
         output: outputs::output(&scope, deck, time.end)?,
         history: history::history(&scope, deck, &sets, time.end, horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
@@ -86,26 +91,35 @@ fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
     })
 }
 
-fn spacing(scope: &Scope, deck: &Deck, horizon: f64) -> Result<Option<f64>> {
-    let Some(number) = &deck.grid.get_ref().spacing else {
-        return Ok(None);
+/// The edges of a lattice cell (m), at most the horizon (m); 1 beyond the dimension.
+pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -> Result<[f64; 3]> {
+    let written = match edges.get_ref() {
+        Edges::Same(edge) => vec![Spanned::new(edges.span(), edge.clone()); scope.dimension],
+        Edges::Each(each) => each.clone(),
     };
-    checked_spacing(scope, number, "[grid] spacing", horizon).map(Some)
-}
-
-/// A lattice spacing (m), at most the horizon (m).
-pub fn checked_spacing(scope: &Scope, number: &Number, key: &str, horizon: f64) -> Result<f64> {
-    let spacing = scope.positive(number, key)?;
-    if spacing > horizon {
-        let message = format!(
-            "{key}: {} m is larger than the horizon {} m, so no point would have a neighbour; the \
-             horizon is usually 3 to 6 spacings",
-            shown(spacing),
-            shown(horizon)
-        );
-        return Err(scope.error(number.span(), message));
+    let written = Spanned::new(edges.span(), written);
+    let mut spacing = [1.0; 3];
+    for (edge, number) in spacing.iter_mut().zip(scope.entries(&written, key)?) {
+        *edge = scope.positive(number, key)?;
+        if *edge > horizon {
+            let message = format!(
+                "{key}: {} m is larger than the horizon {} m, so no point would have a neighbour; \
+                 the horizon is usually 3 to 6 spacings",
+                shown(*edge),
+                shown(horizon)
+            );
+            return Err(scope.error(number.span(), message));
+        }
     }
     Ok(spacing)
+}
+
+/// The spacing of the grid (m) where one number holds for all directions.
+fn single(grid: &Spanned<Grid>, spacing: Option<[f64; 3]>) -> Option<f64> {
+    match grid.get_ref().spacing.as_ref()?.get_ref() {
+        Edges::Same(_) => Some(spacing?[0]),
+        Edges::Each(_) => None,
+    }
 }
 
 fn volume_correction(
@@ -119,40 +133,53 @@ fn volume_correction(
         VolumeCorrection::Linear => plan::VolumeCorrection::Linear,
         VolumeCorrection::Exact => plan::VolumeCorrection::Exact,
     };
-    let Some(reason) = not_at_centres(deck, bodies) else {
+    let unequal = |body: &plan::Body| match &body.points {
+        plan::PointSource::File { .. } => None,
+        plan::PointSource::Lattice { spacing, .. } => {
+            let edges = &spacing[..scope.dimension];
+            let alike = edges.iter().all(|edge| *edge == edges[0]);
+            (!alike).then_some("has cells with edges of different lengths")
+        }
+    };
+    let reason = |body| not_at_centres(grid, body).or_else(|| unequal(body));
+    let reason = bodies
+        .iter()
+        .find_map(|body| Some((&body.name, reason(body)?)));
+    let Some((name, reason)) = reason else {
         return Ok(correction);
     };
     let message = format!(
-        "[grid] volume_correction: only points at the centres of lattice cells have cells to \
-         correct, {reason}"
+        "[grid] volume_correction: only points at the centres of square or cubic lattice cells have \
+         cells to correct, and [body.{name}] {reason}"
     );
     Err(scope.error(grid.volume_correction.span(), message))
 }
 
-/// Why some points do not lie at the centres of lattice cells, if any do not.
-fn not_at_centres(deck: &Deck, bodies: &[plan::Body]) -> Option<String> {
-    let from_file = |body: &&plan::Body| matches!(body.points, plan::PointSource::File { .. });
-    if let Some(body) = bodies.iter().find(from_file) {
-        return Some(format!(
-            "and [body.{}] has its points from a file",
-            body.name
-        ));
+/// Why a body's points do not lie at the centres of lattice cells, if they do not.
+fn not_at_centres(grid: &Grid, body: &plan::Body) -> Option<&'static str> {
+    match body.points {
+        plan::PointSource::File { .. } => Some("has its points from a file"),
+        plan::PointSource::Lattice { .. } if grid.quadrature == Quadrature::Gauss => {
+            Some("has Gauss points")
+        }
+        plan::PointSource::Lattice { .. } => None,
     }
-    (deck.grid.get_ref().quadrature == Quadrature::Gauss)
-        .then(|| "not with `quadrature = \"gauss\"`".to_owned())
 }
 
 fn family(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::FamilyRule> {
-    let family = &deck.grid.get_ref().family;
-    match (family.get_ref(), not_at_centres(deck, bodies)) {
+    let grid = deck.grid.get_ref();
+    let reason = bodies
+        .iter()
+        .find_map(|body| Some((&body.name, not_at_centres(grid, body)?)));
+    match (grid.family.get_ref(), reason) {
         (Family::List, _) => Ok(plan::FamilyRule::List),
         (Family::Auto, _) | (Family::Lattice, None) => Ok(plan::FamilyRule::Auto),
-        (Family::Lattice, Some(reason)) => {
+        (Family::Lattice, Some((name, reason))) => {
             let message = format!(
                 "[grid] family: only points at the centres of lattice cells have the same \
-                 neighbours all over, {reason}; take \"auto\" or \"list\""
+                 neighbours all over, and [body.{name}] {reason}; take \"auto\" or \"list\""
             );
-            Err(scope.error(family.span(), message))
+            Err(scope.error(grid.family.span(), message))
         }
     }
 }

@@ -20,15 +20,15 @@ struct Range {
 }
 
 impl Range {
-    fn new(shape: &Shape, spacing: f64, origin: [f64; 3], dimension: usize) -> Option<Self> {
+    fn new(shape: &Shape, spacing: [f64; 3], origin: [f64; 3], dimension: usize) -> Option<Self> {
         let (lower, upper) = shape::bounds(shape);
         let mut range = Self {
             first: [0; 3],
             counts: [1; 3],
         };
         for k in 0..dimension {
-            let low = ((lower[k] - origin[k]) / spacing - TOLERANCE).floor();
-            let high = ((upper[k] - origin[k]) / spacing + TOLERANCE).ceil();
+            let low = ((lower[k] - origin[k]) / spacing[k] - TOLERANCE).floor();
+            let high = ((upper[k] - origin[k]) / spacing[k] + TOLERANCE).ceil();
             if low.abs().max(high.abs()) > 1e15 {
                 return None;
             }
@@ -81,8 +81,9 @@ pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result
             PointSource::File { .. } => None,
         })
         .collect();
-    let tolerance = TOLERANCE * spacing;
-    let volume = spacing.powi(dimension as i32) * plan.dimension.section();
+    let edges = &spacing[..dimension];
+    let tolerance = TOLERANCE * edges.iter().copied().fold(f64::INFINITY, f64::min);
+    let volume = edges.iter().product::<f64>() * plan.dimension.section();
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
     let share = |rank: u64| (u128::from(total) * u128::from(rank) / u128::from(size)) as u64;
     let mut points = Vec::new();
@@ -90,7 +91,7 @@ pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result
         let cell = cells.cell(index);
         let mut position = [0.0; 3];
         for k in 0..dimension {
-            position[k] = origin[k] + (cell[k] as f64 + 0.5) * spacing;
+            position[k] = origin[k] + (cell[k] as f64 + 0.5) * spacing[k];
         }
         let taken = later
             .iter()
@@ -102,10 +103,10 @@ pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result
             Quadrature::Midpoint => points.push(Point::new(0, position, volume, body)),
             Quadrature::Gauss => {
                 let count = 1 << dimension;
-                let shift = spacing / 12.0_f64.sqrt();
                 for corner in 0..count {
                     let mut place = position;
                     for k in 0..dimension {
+                        let shift = spacing[k] / 12.0_f64.sqrt();
                         place[k] += if corner >> k & 1 == 1 { shift } else { -shift };
                     }
                     points.push(Point::new(0, place, volume / f64::from(count), body));

@@ -120,7 +120,8 @@ fn has_no_influence(body: &Body) -> bool {
 /// The share of a body's cells in the families of a horizon.
 fn cell_share(plan: &Plan, neighbours: &Body, horizon: f64) -> CellShare {
     let edge = match neighbours.points {
-        PointSource::Lattice { spacing, .. } => spacing,
+        // Only cells with equal edges are corrected.
+        PointSource::Lattice { spacing, .. } => spacing[0],
         PointSource::File { .. } => 0.0,
     };
     CellShare::new(
