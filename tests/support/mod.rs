@@ -5,6 +5,8 @@
 pub mod command;
 pub mod datasets;
 
+use std::path::Path;
+
 use fissure::comm::{Communicator, threads};
 use fissure::deck::{self, Plan, Source};
 use fissure::solver::Simulation;
@@ -21,6 +23,24 @@ pub fn plan(text: &str) -> Plan {
 /// Runs `body` on one rank without MPI.
 pub fn simulate<const D: usize, T>(text: &str, body: impl FnOnce(Simulation<D>) -> T) -> T {
     let plan = plan(text);
+    let comm = threads::alone();
+    body(Simulation::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Runs `body` on one rank without MPI, with a deck of `inputs/` in which some parameters have other
+/// values.
+pub fn simulate_input<const D: usize, T>(
+    name: &str,
+    parameters: &[(&str, &str)],
+    body: impl FnOnce(Simulation<D>) -> T,
+) -> T {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("inputs/{name}.toml"));
+    let set: Vec<(String, String)> = parameters
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
+        .collect();
+    let plan = deck::read(&path, &set).and_then(|deck| deck.plan());
+    let plan = plan.unwrap_or_else(|error| panic!("{error}"));
     let comm = threads::alone();
     body(Simulation::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
