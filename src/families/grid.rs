@@ -20,8 +20,8 @@ const CHUNK: usize = 4096;
 pub struct GridFrame {
     /// Centre of a cell, m.
     pub origin: [f64; 3],
-    /// Edge of the cells, m.
-    pub spacing: f64,
+    /// Edges of the cells by direction, m.
+    pub spacing: [f64; 3],
     /// Whether each block's points lie on it.
     pub blocks: Vec<bool>,
 }
@@ -29,7 +29,7 @@ pub struct GridFrame {
 impl GridFrame {
     /// The cell whose centre is at a position (m).
     pub fn cell(&self, position: [f64; 3]) -> [i64; 3] {
-        std::array::from_fn(|k| ((position[k] - self.origin[k]) / self.spacing).round() as i64)
+        std::array::from_fn(|k| ((position[k] - self.origin[k]) / self.spacing[k]).round() as i64)
     }
 }
 

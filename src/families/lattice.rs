@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::material::lanes::WIDTH;
 use crate::partition::Domain;
+use crate::points::distance_squared;
 
 use super::grid::{Grid, HOLE};
 
@@ -405,22 +406,29 @@ impl BondLattice {
 }
 
 /// The offsets up to a length (m) by z, y and x, and the lines that they lead to.
-fn offsets(spacing: f64, cutoff: f64, dimension: usize) -> (Vec<Offset>, Vec<[i64; 2]>) {
-    let reach = (cutoff / spacing).floor() as i64;
-    let range = |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
+fn offsets(spacing: [f64; 3], cutoff: f64, dimension: usize) -> (Vec<Offset>, Vec<[i64; 2]>) {
+    let range = |k: usize| match k < dimension {
+        true => {
+            let reach = (cutoff / spacing[k]).floor() as i64;
+            -reach..=reach
+        }
+        false => 0..=0,
+    };
     let (mut offsets, mut around) = (Vec::new(), Vec::new());
     for z in range(2) {
         for y in range(1) {
             let mut used = false;
             for x in range(0) {
-                let square = (x * x + y * y + z * z) as f64 * spacing * spacing;
+                let steps = [x, y, z];
+                let reference: [f64; 3] = std::array::from_fn(|k| steps[k] as f64 * spacing[k]);
+                let square = distance_squared([0.0; 3], reference);
                 let length = square.sqrt();
                 if square == 0.0 || length > cutoff {
                     continue;
                 }
                 used = true;
                 offsets.push(Offset {
-                    reference: [x, y, z].map(|steps| steps as f64 * spacing),
+                    reference,
                     length,
                     square,
                     inverse: 1.0 / length,
@@ -563,7 +571,7 @@ mod tests {
 
     #[test]
     fn offsets_of_known_horizons() {
-        let count = |cutoff, dimension| offsets(1.0, cutoff, dimension).0.len();
+        let count = |cutoff, dimension| offsets([1.0; 3], cutoff, dimension).0.len();
         assert_eq!(count(3.015, 3), 122);
         assert_eq!(count(2.52, 3), 80);
         assert_eq!(count(3.0, 2), 28);
@@ -572,7 +580,7 @@ mod tests {
 
     #[test]
     fn both_ends_of_a_bond_have_the_same_length() {
-        let (offsets, _) = offsets(0.1, 0.35, 3);
+        let (offsets, _) = offsets([0.1, 0.2, 0.1], 0.35, 3);
         for offset in &offsets {
             let opposite = offset.reference.map(|x| -x);
             let other = offsets.iter().find(|other| other.reference == opposite);

@@ -148,13 +148,14 @@ pub fn cutoffs(plan: &Plan) -> Vec<f64> {
 }
 
 /// The grids on which the points of bodies lie. Bodies are on the same one if their cells have the
-/// same edge and coincide.
+/// same edges and coincide.
 pub fn grids(plan: &Plan) -> Vec<GridFrame> {
     let mut grids: Vec<GridFrame> = Vec::new();
     let midpoint = plan.quadrature == Quadrature::Midpoint;
     if plan.family == FamilyRule::List || !midpoint {
         return grids;
     }
+    let dimension = plan.dimension.count();
     for (index, body) in plan.bodies.iter().enumerate() {
         let PointSource::Lattice {
             spacing, origin, ..
@@ -162,24 +163,20 @@ pub fn grids(plan: &Plan) -> Vec<GridFrame> {
         else {
             continue;
         };
-        let centre = origin.map(|x| x + 0.5 * spacing);
+        let mut centre = [0.0; 3];
+        for k in 0..dimension {
+            centre[k] = origin[k] + 0.5 * spacing[k];
+        }
         let coincides = |frame: &&mut GridFrame| {
-            let apart = |k: usize| (centre[k] - frame.origin[k]) / spacing;
-            let steps = |k: usize| {
-                k >= plan.dimension.count() || (apart(k) - apart(k).round()).abs() < ON_GRID
-            };
-            frame.spacing == spacing && (0..3).all(steps)
+            (0..dimension).all(|k| {
+                let steps = (centre[k] - frame.origin[k]) / spacing[k];
+                frame.spacing[k] == spacing[k] && (steps - steps.round()).abs() < ON_GRID
+            })
         };
         match grids.iter_mut().find(coincides) {
             Some(frame) => frame.blocks[index] = true,
             None => grids.push(GridFrame {
-                origin: std::array::from_fn(|k| {
-                    if k < plan.dimension.count() {
-                        centre[k]
-                    } else {
-                        0.0
-                    }
-                }),
+                origin: centre,
                 spacing,
                 blocks: (0..plan.bodies.len()).map(|other| other == index).collect(),
             }),
