@@ -1,0 +1,316 @@
+"""Edge-on impact on ALON in the three limits of Diehl & Schweitzer (2016), figures 8 to 10.
+
+Runs `inputs/eoi_alon.toml` with the prototype law, both forms of the normalised one, and the latter as
+its paper's figure 8 has it; prints a table of the speeds of the wave front and of the damage front and
+draws them beside the measured ones. Beside each run stand the speeds that a long wave has on this very
+lattice: in the bulk, and in a tile of this thickness with free faces.
+"""
+
+import argparse
+import csv
+import json
+import pathlib
+import re
+import subprocess
+import sys
+
+import matplotlib
+import numpy
+
+matplotlib.use("Agg")
+from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+
+EXAMPLES = """\
+examples:
+  scripts/eoi_study --small              spacings down to 1.25 mm; some minutes on 2 cores
+  scripts/eoi_study                      down to 0.5 mm, the paper's finest; half an hour on 2 cores
+  scripts/eoi_study --limits local --laws pmb,energy
+
+limits: `local`, horizon of three spacings, both to 0; `continuum`, horizon of 7.5 mm, spacing to 0;
+`discrete`, the spacing fixed, the horizon to two spacings.
+laws: `pmb`; `energy` and `diehl2016`, the two forms of the normalised law; `printed`, the normalised
+law with the constant of eq. 15 put into the force of eq. 4 as it stands, too soft by a factor |bond|, in
+the first limit down to 1 mm only.
+
+The speed of a front is the slope of its place over time, by least squares, where the wave lies between
+30 and 90 mm, the damage between 20 and 50 mm. What covers less than 15 mm there, or goes by leaps of more
+than 10 mm from row to row as scattered damage does, is no front.
+
+Writes eoi_alon.md (the table), eoi_alon.png and eoi_alon.json into the output folder.
+"""
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DECK = ROOT / "inputs/eoi_alon.toml"
+
+BULK_MODULUS = 210e9  # Pa
+DENSITY = 3690.0  # kg/m³
+THICKNESS = 0.01  # m
+DURATION = 8.7e-6  # s
+MEASURED = {"wave": 9367.0, "damage": 8381.0}  # m/s
+THEORY = (1.8 * BULK_MODULUS / DENSITY) ** 0.5
+# E/(1 − ν²) = 1.6 K for ν = 1/4.
+PLATE = (1.6 * BULK_MODULUS / DENSITY) ** 0.5
+
+LAWS = ["pmb", "energy", "diehl2016", "printed"]
+LIMITS = {
+    "local": "horizon 3 dx, dx to 0",
+    "continuum": "horizon fixed at 7.5 mm, dx to 0",
+    "discrete": "dx fixed, horizon to 2 dx",
+}
+FIXED_HORIZON = 7.5e-3  # m
+
+
+def arguments():
+    parser = argparse.ArgumentParser(
+        prog="scripts/eoi_study",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+    def several_of(known):
+        def parse(text):
+            names = text.split(",")
+            if wrong := [name for name in names if name not in known]:
+                raise argparse.ArgumentTypeError(f"`{wrong[0]}` is none of {', '.join(known)}")
+            return names
+
+        return parse
+
+    add = parser.add_argument
+    add("--small", action="store_true", help="coarse lattices only")
+    add("--laws", type=several_of(LAWS), default=LAWS, metavar="LIST", help="[all]")
+    add("--limits", type=several_of(LIMITS), default=list(LIMITS), metavar="LIST", help="[all]")
+    add("--reuse", action="store_true", help="take the histories of earlier runs where they are there")
+    add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
+    add("--binary", type=pathlib.Path, default=ROOT / "target/release/fissure", metavar="PATH")
+    add("--output", type=pathlib.Path, default=ROOT / "out/eoi_study", metavar="DIR")
+    return parser.parse_args()
+
+
+def grids(limit, small):
+    """The (spacing in m, horizon in spacings) of a limit, from coarse to fine."""
+    if limit == "local":
+        return [(dx, 3.0) for dx in ([2.5e-3, 2e-3, 1.25e-3] if small else [2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3])]
+    if limit == "continuum":
+        return [(dx, FIXED_HORIZON / dx) for dx in ([2.5e-3, 2e-3] if small else [2.5e-3, 2e-3, 1.25e-3, 1e-3])]
+    return [(1.25e-3 if small else 1e-3, ratio) for ratio in (4.0, 3.0, 8**0.5, 2.0)]
+
+
+def deck(law, dx):
+    """The deck's text with another law."""
+    text = DECK.read_text()
+
+    def replace(old, new):
+        nonlocal text
+        if text.count(old) != 1:
+            sys.exit(f"error: {DECK} has no single line `{old}`")
+        text = text.replace(old, new)
+
+    table = "[material.alon.pmb]"
+    if law in ("energy", "diehl2016"):
+        replace(table, f'[material.alon.normalised_pmb]\nform = "{law}"')
+    elif law == "printed":
+        # c = 9K/(4πδ³/3) of eq. 15 is the prototype's 18K'/(πδ⁴) for K' = 3Kδ/8, the number of δ in metres;
+        # eq. 17 with this c and the tile's thickness gives the critical stretch. So soft a material would
+        # be given a long step.
+        replace("bulk_modulus = 210e9", 'bulk_modulus = "210e9*0.375*m*dx"')
+        stretch = "sqrt(15)/4*2e6/(210e9*sqrt(27/(4*pi)*thickness))"
+        replace("fracture_toughness = 2e6", f'critical_stretch = "{stretch}"')
+        replace('end = "duration"', f'end = "duration"\nstep = {1e-4 * dx!r}')
+    return text
+
+
+def offsets(ratio):
+    """Neighbours on a lattice of unit spacing."""
+    reach = range(-int(ratio) - 1, int(ratio) + 2)
+    every = numpy.array([(x, y, z) for x in reach for y in reach for z in reach], dtype=float)
+    length = numpy.linalg.norm(every, axis=1)
+    inside = (length > 0) & (length <= ratio * (1 + 1e-9))
+    return every[inside], length[inside]
+
+
+def long_waves(law, dx, ratio):
+    """Speeds (m/s) of long waves along an axis of the lattice: in the bulk, and in the tile, whose layers
+    move apart freely across it."""
+    steps, lengths = offsets(ratio)
+    steps, lengths, horizon = steps * dx, lengths * dx, ratio * dx
+    volume = dx**3
+    layers = round(THICKNESS / dx)
+    level = numpy.round(steps[:, 2] / dx).astype(int)
+
+    # The energy of a bond is w = (g/2) s²|ξ|; g at the own end, from the family in each layer.
+    def modulus(inside):
+        if law == "pmb":
+            return numpy.full(len(lengths), 18 * BULK_MODULUS / (numpy.pi * horizon**4))
+        if law == "energy":
+            return numpy.full(len(lengths), 18 * BULK_MODULUS / (lengths[inside].sum() * volume))
+        if law == "printed":
+            return numpy.full(len(lengths), 9 * BULK_MODULUS / (4 / 3 * numpy.pi * horizon**3))
+        return 9 * BULK_MODULUS / (inside.sum() * volume) / lengths
+
+    whole = modulus(numpy.full(len(lengths), True))
+    bulk = (whole * steps[:, 0] ** 4 / lengths**3).sum() * volume / 2
+
+    own = [modulus((0 <= level + layer) & (level + layer < layers)) for layer in range(layers)]
+    matrix, load, energy = numpy.zeros((layers, layers)), numpy.zeros(layers), 0.0
+    for layer in range(layers):
+        for k, (step, length) in enumerate(zip(steps, lengths)):
+            other = layer + level[k]
+            if not 0 <= other < layers:
+                continue
+            weight = (own[layer][k] + own[other][k]) / 2 * volume / (2 * length**3)
+            # s = (ξx² + ξz (w' − w))/|ξ|² at unit strain along x.
+            axial, across = step[0] ** 2, step[2]
+            energy += weight * axial**2
+            for index, sign in ((other, 1), (layer, -1)):
+                load[index] += sign * weight * axial * across
+                matrix[index, other] += sign * weight * across**2
+                matrix[index, layer] -= sign * weight * across**2
+    shift = numpy.linalg.lstsq(matrix, -load, rcond=None)[0]
+    plate = (energy + load @ shift) / layers
+    return (bulk / DENSITY) ** 0.5, (plate / DENSITY) ** 0.5
+
+
+def slope(times, places, start, end):
+    """Speed (m/s) of a front between two places (m); none if it covers too little of the way or leaps."""
+    chosen = (places >= start) & (places <= end)
+    if chosen.sum() < 3 or numpy.ptp(places[chosen]) < 0.015:
+        return None
+    leaps = numpy.diff(places)[chosen[:-1] | chosen[1:]]
+    if leaps.max() > 0.01:
+        return None
+    return float(numpy.polyfit(times[chosen], places[chosen], 1)[0])
+
+
+def run(options, limit, law, dx, ratio):
+    """Runs the deck; returns the columns of its history."""
+    folder = options.output / f"{limit}-{law}-{dx * 1e3:g}-{ratio:.3g}"
+    folder.mkdir(parents=True, exist_ok=True)
+    history = folder / "history.csv"
+    if options.reuse and history.exists():
+        earlier = columns(history)
+        if len(earlier["time"]) and earlier["time"][-1] > 0.999 * DURATION:
+            return earlier
+    written = folder / "deck.toml"
+    written.write_text(deck(law, dx))
+    values = {"dx": dx, "m": ratio, "outputs": 1}
+    command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
+    for name, value in values.items():
+        command += ["--set", f"{name}={value!r}"]
+    if options.threads:
+        command += ["--threads", str(options.threads)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
+    # The points themselves are not needed.
+    for name in ("result.vtkhdf", "result.xdmf", "checkpoint_0.h5", "checkpoint_1.h5"):
+        (folder / name).unlink(missing_ok=True)
+    return columns(history)
+
+
+def columns(history):
+    with open(history) as file:
+        rows = list(csv.reader(file))
+    names = [re.sub(r" \[.*", "", name) for name in rows[0]]
+    return dict(zip(names, numpy.array(rows[1:], dtype=float).T))
+
+
+def evaluate(history, limit, law, dx, ratio):
+    """What a line of the table says."""
+    bulk, plate = long_waves(law, dx, ratio)
+    result = {"limit": limit, "law": law, "dx": dx, "ratio": ratio, "bulk": bulk, "plate": plate}
+    for front, window in (("wave", (0.03, 0.09)), ("damage", (0.02, 0.05))):
+        places = history[f"front_{front}"]
+        result[front] = slope(history["time"], places, *window)
+        reached = float(places[-1])
+        result[f"{front}_reached"] = None if numpy.isnan(reached) else reached
+    return result
+
+
+def table(results):
+    def number(value, factor=1.0):
+        return "none" if value is None else f"{factor * value:.0f}"
+
+    heads = ["limit", "law", "dx, mm", "δ/dx", "wave, m/s", "damage, m/s", "wave at the end, mm"]
+    heads += ["damage at the end, mm", "long wave in the bulk, m/s", "long wave in the tile, m/s"]
+    rows = [heads, ["---"] * len(heads)]
+    for result in results:
+        rows.append([result["limit"], f"`{result['law']}`", f"{result['dx'] * 1e3:g}", f"{result['ratio']:.3g}"])
+        rows[-1] += [number(result[name]) for name in ("wave", "damage")]
+        rows[-1] += [number(result[name], 1e3) for name in ("wave_reached", "damage_reached")]
+        rows[-1] += [number(result[name]) for name in ("bulk", "plate")]
+    rows.append(["measured", "", "", "", number(MEASURED["wave"]), number(MEASURED["damage"]), "", "", "", ""])
+    rows.append(["classical", "", "", "", "", "", "", "", number(THEORY), number(PLATE)])
+    return "".join("| " + " | ".join(row) + " |\n" for row in rows)
+
+
+def draw(results, path):
+    limits = [limit for limit in LIMITS if any(result["limit"] == limit for result in results)]
+    figure, axes = pyplot.subplots(
+        1, len(limits), figsize=(4.2 * len(limits) + 0.6, 4.2), sharey=True, squeeze=False, layout="constrained"
+    )
+    colours = dict(zip(LAWS, ("#1b6ca8", "#d1495b", "#66a182", "#8d6a9f")))
+    names = {
+        "pmb": "prototype",
+        "energy": "normalised, `energy`",
+        "diehl2016": "normalised, `diehl2016`",
+        "printed": "normalised, c of eq. 15 in eq. 4",
+    }
+    for axis, limit in zip(axes[0], limits):
+        for speed, style in ((MEASURED["wave"], "--"), (MEASURED["damage"], ":")):
+            axis.axhline(speed, color="black", linestyle=style, linewidth=1)
+        axis.axhline(THEORY, color="0.6", linewidth=1)
+        axis.axhline(PLATE, color="0.6", linewidth=1, linestyle="-.")
+        for law in LAWS:
+            chosen = [result for result in results if (result["limit"], result["law"]) == (limit, law)]
+            if not chosen:
+                continue
+            place = [result["ratio"] if limit == "discrete" else result["dx"] * 1e3 for result in chosen]
+            for kind, marker, fill in (("wave", "o", "full"), ("damage", "^", "none")):
+                # No front is drawn at 0.
+                speeds = [result[kind] or 0.0 for result in chosen]
+                label = f"{names[law]}: {kind}" if axis is axes[0][0] else None
+                axis.plot(place, speeds, marker=marker, fillstyle=fill, color=colours[law], linewidth=0.8, label=label)
+        axis.set_title(LIMITS[limit], fontsize=10)
+        axis.set_xlabel("horizon / dx" if limit == "discrete" else "dx, mm")
+        axis.set_ylim(-300, 12500)
+    axes[0][0].set_ylabel("speed, m/s (0: no front)")
+    lines = [
+        pyplot.Line2D([], [], color="black", linestyle="--", linewidth=1, label="wave, measured"),
+        pyplot.Line2D([], [], color="black", linestyle=":", linewidth=1, label="damage, measured"),
+        pyplot.Line2D([], [], color="0.6", linewidth=1, label="√(1.8K/ρ), bulk"),
+        pyplot.Line2D([], [], color="0.6", linestyle="-.", linewidth=1, label="√(1.6K/ρ), thin plate"),
+    ]
+    handles = axes[0][0].get_legend_handles_labels()[0]
+    figure.legend(handles=handles + lines, loc="outside lower center", ncols=len(limits) + 1, fontsize=8, frameon=False)
+    figure.savefig(path, dpi=110)
+
+
+def main():
+    options = arguments()
+    options.output.mkdir(parents=True, exist_ok=True)
+    results = []
+    for limit in options.limits:
+        for dx, ratio in grids(limit, options.small):
+            for law in options.laws:
+                # Where there is no wave a few runs are enough.
+                if law == "printed" and (limit != "local" or dx < 1e-3):
+                    continue
+                history = run(options, limit, law, dx, ratio)
+                result = evaluate(history, limit, law, dx, ratio)
+                results.append(result)
+                wave, damage = (result[kind] or 0.0 for kind in ("wave", "damage"))
+                print(
+                    f"{limit:10} {law:10} dx {dx * 1e3:.3g} mm, horizon {ratio:.3g} dx: "
+                    f"wave {wave:.0f} m/s, damage {damage:.0f} m/s",
+                    flush=True,
+                )
+    (options.output / "eoi_alon.json").write_text(json.dumps(results, indent=1) + "\n")
+    (options.output / "eoi_alon.md").write_text(table(results))
+    draw(results, options.output / "eoi_alon.png")
+    print(f"\n{table(results)}\ntable and picture in {options.output}")
+
+
+if __name__ == "__main__":
+    main()
