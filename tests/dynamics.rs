@@ -89,6 +89,57 @@ fn energy_drift_falls_by_four_when_the_step_halves() {
 }
 
 #[test]
+fn a_steady_load_keeps_the_total_energy() {
+    // Emmrich & Weckner 2006, section 2: E_kin + E_el + E_ext is constant, with E_ext = −∫ b·u.
+    for law in ["pmb", "linear_microelastic", "ordinary"] {
+        let nu = if law == "ordinary" {
+            ", poisson_ratio = 0.1"
+        } else {
+            ""
+        };
+        let drift = |step: f64| {
+            let law = format!("{law} = {{ density = 2, youngs_modulus = 5{nu} }}");
+            let text = format!(
+                "{}
+                [condition.load]
+                set = 'all'
+                body_force = ['0.01*x', '-0.02', '0.01*y']
+                ",
+                flying(&law, step)
+            );
+            let total = |simulation: &mut Simulation<3>| {
+                let mut observer = HistoryObserver::new(simulation).unwrap();
+                let energies = row(&mut observer, simulation).energies;
+                let (model, u) = (&simulation.model, &simulation.state.displacement);
+                let external: f64 = (0..model.owned())
+                    .map(|k| {
+                        let [x, y, _] = model.position(k);
+                        let power = 0.01 * x * u[0][k] - 0.02 * u[1][k] + 0.01 * y * u[2][k];
+                        -power * model.volume[k]
+                    })
+                    .sum();
+                energies.kinetic + energies.strain + external
+            };
+            simulate::<3, _>(&text, |mut simulation| {
+                let start = total(&mut simulation);
+                let mut largest = 0.0_f64;
+                while simulation.number < simulation.last {
+                    simulation.advance();
+                    largest = largest.max((total(&mut simulation) - start).abs());
+                }
+                largest / start.abs()
+            })
+        };
+        let (coarse, fine) = (drift(0.08), drift(0.04));
+        assert!(coarse < 1e-3, "{law}: {coarse}");
+        assert!(
+            (3.6..4.4).contains(&(coarse / fine)),
+            "{law}: {coarse} {fine}"
+        );
+    }
+}
+
+#[test]
 fn damping_takes_the_energy_that_the_motion_loses() {
     // A body in free flight: u̇ falls as exp(−r t).
     let text = "dimension = '3d'

@@ -155,10 +155,43 @@ fn wave(x: [f64; 3]) -> [f64; 3] {
     ]
 }
 
+/// The moments of all forces about the axes, and the sums of their sizes, N m; arms are those of the
+/// bonds, deformed, except where forces act along undeformed ones.
+fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
+    let linear = simulation.plan.bodies.iter().any(|body| {
+        matches!(
+            body.material.law,
+            fissure::deck::plan::Law::LinearMicroelastic { .. }
+        )
+    });
+    let model = &simulation.model;
+    let mut sums = [[0.0; 2]; 3];
+    for (point, response) in simulation.state.responses.iter().enumerate() {
+        let (mut arm, mut force) = (model.position(point), [0.0; 3]);
+        for d in 0..D {
+            arm[d] += if linear {
+                0.0
+            } else {
+                simulation.state.displacement[d][point]
+            };
+            force[d] = response.force[d] * model.volume[point];
+        }
+        for (axis, [net, gross]) in sums.iter_mut().enumerate() {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            *net += arm[a] * force[b] - arm[b] * force[a];
+            *gross += (arm[a] * force[b]).abs() + (arm[b] * force[a]).abs();
+        }
+    }
+    sums
+}
+
 #[test]
 fn forces_are_equal_and_opposite() {
     fn check<const D: usize>(mut simulation: Simulation<D>) {
         displace(&mut simulation, wave);
+        for [net, gross] in moments(&simulation) {
+            assert!(net.abs() <= 1e-12 * gross, "moment {net} of {gross}");
+        }
         for d in 0..D {
             let (mut net, mut gross) = (0.0, 0.0);
             for (k, response) in simulation.state.responses.iter().enumerate() {
@@ -254,6 +287,13 @@ fn the_force_is_the_slope_of_the_energy() {
         }
     }
     for_all_laws!(check);
+    // With bonds that the motion has broken.
+    for law in LAWS.into_iter().filter(|law| can_break(law)) {
+        let breaking =
+            |dimension| deck(dimension, law, "exact", ", damage = 'brittle'") + &damage(0.25);
+        simulate(&breaking("plane-stress"), check::<2>);
+        simulate(&breaking("3d"), check::<3>);
+    }
     for deck in two_blocks() {
         simulate(&deck, check::<2>);
     }
@@ -294,17 +334,23 @@ fn the_mirror_image_has_the_mirrored_forces() {
 fn both_ends_of_a_bond_break_together() {
     for law in LAWS.into_iter().filter(|law| can_break(law)) {
         for alpha in [0.0, 0.25] {
-            let deck = deck("plane-stress", law, "linear", ", damage = 'brittle'");
-            together(&format!("{deck}{}", damage(alpha)));
+            let breaking =
+                |dimension| deck(dimension, law, "linear", ", damage = 'brittle'") + &damage(alpha);
+            if has_line(law) {
+                together::<1>(&breaking("1d"));
+            }
+            together::<2>(&breaking("plane-stress"));
+            together::<2>(&breaking("plane-strain"));
+            together::<3>(&breaking("3d"));
         }
     }
     for deck in two_blocks() {
-        together(&deck);
+        together::<2>(&deck);
     }
 }
 
-fn together(text: &str) {
-    let broken = simulate_on::<2, _>(3, text, |mut simulation| {
+fn together<const D: usize>(text: &str) {
+    let broken = simulate_on::<D, _>(3, text, |mut simulation| {
         let before = intact_bonds(&mut simulation).len();
         displace(&mut simulation, wave);
         (before, intact_bonds(&mut simulation))
