@@ -1,0 +1,20 @@
+//! All tests but those of single files, as one program: what they call is generic, and would be
+//! compiled anew for each.
+
+mod commands;
+mod crack_branching;
+mod decks;
+mod decomposition;
+mod dynamics;
+mod edge_on_impact;
+mod elasticity;
+mod emmrich_weckner;
+mod failures;
+mod families;
+mod fronts;
+mod interfaces;
+mod invariants;
+mod readers;
+mod restart;
+mod stable_step;
+mod support;

@@ -1,0 +1,234 @@
+//! Waves that travel: pulses through cubic lattices and standing waves in a bar, simulated and timed.
+//! `tests/elasticity.rs` holds the forces in such waves against closed forms.
+
+mod support;
+
+use std::collections::HashMap;
+
+use fissure::solver::Simulation;
+use support::simulate;
+
+const DENSITY: f64 = 3.0;
+const BULK: f64 = 2.0;
+
+/// Makes every point move as the one of the middle column at the same x: with a plane wave along x in
+/// a bar whose middle has whole families, the infinite lattice.
+struct Plane {
+    /// The place in the middle column of each point.
+    leader: Vec<usize>,
+    /// The middle column.
+    column: Vec<usize>,
+}
+
+impl Plane {
+    fn new(simulation: &Simulation<3>) -> Self {
+        let model = &simulation.model;
+        let layer = |point: usize| model.position(point)[0].round() as i64;
+        let middle = |point: &usize| {
+            let [_, y, z] = model.position(*point);
+            y.abs() < 1e-9 && z.abs() < 1e-9
+        };
+        let column: Vec<usize> = (0..model.owned()).filter(middle).collect();
+        let known: HashMap<i64, usize> =
+            column.iter().map(|point| (layer(*point), *point)).collect();
+        Self {
+            leader: (0..model.owned())
+                .map(|point| known[&layer(point)])
+                .collect(),
+            column,
+        }
+    }
+
+    fn follow(&self, simulation: &mut Simulation<3>) {
+        let state = &mut simulation.state;
+        for (point, leader) in self.leader.iter().copied().enumerate() {
+            for d in 0..3 {
+                state.displacement[d][point] = state.displacement[d][leader];
+                state.velocity[d][point] = state.velocity[d][leader];
+            }
+            state.responses[point] = state.responses[leader];
+        }
+    }
+
+    /// The centroid of the part of a pulse of displacement that goes to the right.
+    fn centroid(&self, simulation: &Simulation<3>) -> f64 {
+        let values = self.column.iter().map(|point| {
+            let x = simulation.model.reference[0][*point];
+            (x, simulation.state.displacement[0][*point])
+        });
+        let right = values.filter(|(x, _)| *x > 0.0);
+        let (mut weighted, mut sum) = (0.0, 0.0);
+        for (x, u) in right {
+            weighted += x * u;
+            sum += u;
+        }
+        weighted / sum
+    }
+}
+
+/// The speed of a pulse of displacement (m/s) along an axis of a cubic lattice of unit spacing; `bodies`
+/// gives the deck's materials and bodies for a bar that reaches this far to both sides.
+///
+/// A Gaussian at rest falls apart into two halves. However they disperse, the centroid of one moves at
+/// the speed of long waves once they have parted.
+fn pulse_speed(horizon: f64, bodies: impl Fn(f64) -> String) -> f64 {
+    let expected = (1.8 * BULK / DENSITY).sqrt();
+    let [apart, end] = [5.0, 8.5].map(|horizons| horizons * horizon / expected);
+    let half = (13.0 * horizon).ceil() + 0.5;
+    let text = format!(
+        "dimension = '3d'
+        [grid]
+        spacing = 1
+        horizon = {horizon}
+        origin = [0.5, 0.5, 0.5]
+        {}
+        [initial.pulse]
+        displacement = ['1e-5*exp(-(x/{})^2)', 0, 0]
+        [time]
+        end = {end}
+        safety = 0.9
+        ",
+        bodies(half),
+        1.5 * horizon
+    );
+    simulate::<3, _>(&text, |mut simulation| {
+        let plane = Plane::new(&simulation);
+        plane.follow(&mut simulation);
+        let mut start = None;
+        while simulation.number < simulation.last {
+            simulation.advance();
+            plane.follow(&mut simulation);
+            if simulation.time() >= apart && start.is_none() {
+                start = Some((simulation.time(), plane.centroid(&simulation)));
+            }
+        }
+        let (time, place) = start.expect("the run is longer");
+        (plane.centroid(&simulation) - place) / (simulation.time() - time)
+    })
+}
+
+/// A bar of one law, so far to all sides of its axis.
+fn uniform(law: &str, width: f64) -> impl Fn(f64) -> String {
+    move |half| {
+        format!(
+            "[material]
+            rubber.{law} = {{ density = {DENSITY}, bulk_modulus = {BULK} }}
+            [body.bar]
+            material = 'rubber'
+            shape.box = {{ lower = [-{half}, -{width}, -{width}], upper = [{half}, {width}, {width}] }}
+            "
+        )
+    }
+}
+
+fn compare(name: &str, horizon: f64, found: f64, expected: f64) {
+    let ratio = found / (1.8 * BULK / DENSITY).sqrt();
+    assert!(
+        (ratio / expected - 1.0).abs() < 0.005,
+        "{name}, m = {horizon}: {ratio} instead of {expected}"
+    );
+}
+
+#[test]
+fn pulses_have_the_speeds_of_the_prototype_law() {
+    for (horizon, expected) in [(2.52, 1.130), (3.0, 1.028), (4.0, 0.967), (6.0, 1.004)] {
+        let width = f64::floor(horizon) + 0.5;
+        let found = pulse_speed(horizon, uniform("pmb", width));
+        compare("pmb", horizon, found, expected);
+    }
+}
+
+#[test]
+fn pulses_have_the_speeds_of_the_normalised_law() {
+    // The neighbours of the middle have whole families as well, hence its constant.
+    for (horizon, expected) in [(2.52, 1.001), (3.0, 0.971), (4.0, 0.995)] {
+        let width = 2.0 * f64::floor(horizon) + 0.5;
+        let found = pulse_speed(horizon, uniform("normalised_pmb", width));
+        compare("normalised", horizon, found, expected);
+    }
+}
+
+#[test]
+fn a_pulse_has_the_speed_of_the_normalised_law_in_a_wide_family() {
+    // The same for m = 6 in a bar of half the width: the middle column is a body of the normalised law,
+    // and the others have the constant of a whole family by a modulus of their own.
+    let horizon: f64 = 6.0;
+    let mut lengths = 0.0;
+    for x in -6..=6 {
+        for y in -6..=6 {
+            for z in -6..=6 {
+                let length = f64::from(x * x + y * y + z * z).sqrt();
+                lengths += if length <= horizon { length } else { 0.0 };
+            }
+        }
+    }
+    // 18K/Σ|ξ|V in place of 18K/πδ⁴.
+    let bulk = BULK * std::f64::consts::PI * horizon.powi(4) / lengths;
+    let bodies = |half: f64| {
+        format!(
+            "[material]
+            rubber.normalised_pmb = {{ density = {DENSITY}, bulk_modulus = {BULK} }}
+            around.pmb = {{ density = {DENSITY}, bulk_modulus = {bulk} }}
+            [body.around]
+            material = 'around'
+            shape.box = {{ lower = [-{half}, -6.5, -6.5], upper = [{half}, 6.5, 6.5] }}
+            [body.middle]
+            material = 'rubber'
+            shape.box = {{ lower = [-{half}, -0.5, -0.5], upper = [{half}, 0.5, 0.5] }}
+            "
+        )
+    };
+    compare("normalised", horizon, pulse_speed(horizon, bodies), 0.990);
+}
+
+#[test]
+fn standing_waves_in_a_bar_disperse_as_the_integral_says() {
+    // ω = k c with the phase speeds of ω² = (4c/ρδ²) Cin(kδ), c the modulus of uniaxial strain: the
+    // middle of a long bar comes to rest at π/2ω, before the ends are heard.
+    let (horizon, modulus) = (40.0, 1.2_f64 * 5.0);
+    let speed = (modulus / DENSITY).sqrt();
+    for (number, expected) in [
+        (0.5, 0.9948),
+        (1.0, 0.9794),
+        (2.0, 0.9205),
+        (std::f64::consts::PI, 0.8173),
+    ] {
+        let wave_number = number / horizon;
+        let quarter = 0.5 * std::f64::consts::PI / (wave_number * speed);
+        let text = format!(
+            "dimension = '1d'
+            [grid]
+            spacing = 1
+            horizon = {horizon}
+            origin = [0.5]
+            volume_correction = 'exact'
+            [material]
+            rubber.proportional = {{ density = {DENSITY}, youngs_modulus = 5 }}
+            [body.bar]
+            material = 'rubber'
+            shape.box = {{ lower = [-400.5], upper = [400.5] }}
+            [initial.wave]
+            displacement = ['1e-5*cos({wave_number}*x)']
+            [time]
+            end = {}
+            step = {}
+            ",
+            1.5 * quarter,
+            0.01 * quarter
+        );
+        simulate::<1, _>(&text, |mut simulation| {
+            let middle = (0..801).find(|k| simulation.model.reference[0][*k].abs() < 1e-9);
+            let middle = middle.expect("a point in the middle");
+            let at = |simulation: &Simulation<1>| simulation.state.displacement[0][middle];
+            let mut before = at(&simulation);
+            while at(&simulation) > 0.0 {
+                before = at(&simulation);
+                simulation.advance();
+            }
+            let after = at(&simulation);
+            let passed = simulation.time() - simulation.step * after / (after - before);
+            let found = quarter / passed;
+            assert!((found / expected - 1.0).abs() < 0.005, "{number}: {found}");
+        });
+    }
+}
