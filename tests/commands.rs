@@ -1,9 +1,7 @@
 //! The commands that need no MPI launch, used as a newcomer would.
 
-mod support;
-
+use crate::support::command::{Folder, finish, fissure, succeed, text};
 use fissure::output::ResultReader;
-use support::command::{Folder, finish, fissure, succeed, text};
 
 #[test]
 fn from_an_example_deck_to_pictures() {

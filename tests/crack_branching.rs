@@ -1,12 +1,10 @@
 //! The first benchmark: Dipasquale et al. 2014, section 4. The deck is run as it stands, and what must
 //! come out is read from its result.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::command::{Folder, fissure, succeed};
 use fissure::output::ResultReader;
-use support::command::{Folder, fissure, succeed};
 
 /// Points with more damage than this are on a crack: a face of a straight cut has 0.4 and more.
 const CRACKED: f64 = 0.38;

@@ -1,11 +1,9 @@
 //! The same deck on any number of ranks and threads gives the same bits.
 
-mod support;
-
 use std::collections::BTreeMap;
 
-use support::command::{Folder, fissure, succeed};
-use support::datasets::{datasets, difference};
+use crate::support::command::{Folder, fissure, succeed};
+use crate::support::datasets::{datasets, difference};
 
 /// A plate of two materials: damage with α, a no-failure zone, supports, loads, a notch, probes.
 const PLATE: &str = "

@@ -1,10 +1,8 @@
 //! Bodies in motion: conservation, order of the integrator, wave speed, the stable step, supports.
 
-mod support;
-
+use crate::support::simulate;
 use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
-use support::simulate;
 
 fn row<const D: usize>(
     observer: &mut HistoryObserver,
@@ -311,7 +309,6 @@ fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
         let stable = simulate::<D, _>(&rattled(dimension, 0.01), |s| s.stable_step);
         let (usual, growth) =
             simulate::<D, _>(&rattled(dimension, 0.98 * stable), |mut simulation| {
-                let displacement = &simulation.state.displacement;
                 let stiffness = simulation.forces.stiffness(&simulation.model);
                 let trace = |entries: &[f64; 6]| entries[0] + entries[1] + entries[2];
                 let stiffest = stiffness.iter().map(trace).fold(0.0, f64::max);

@@ -1,10 +1,8 @@
 //! Edge-on impact on ALON, Diehl & Schweitzer (2016): variants of the deck that are cheap enough here.
 //! What its fronts do at finer spacings stands in docs/eoi_alon.md.
 
-mod support;
-
+use crate::support::simulate;
 use fissure::solver::observe::{HistoryObserver, Snapshot};
-use support::simulate;
 
 const DENSITY: f64 = 3690.0;
 

@@ -1,12 +1,10 @@
 //! What the laws are calibrated to: stiffness, stress, wave speeds and dispersion, held against closed
 //! forms and against sums over lattice offsets made here.
 
-mod support;
-
+use crate::support::{displace, simulate};
 use fissure::deck::plan::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observe::Snapshot;
-use support::{displace, simulate};
 
 /// A body of unit spacing, `half` points to each side of a central one at the origin.
 fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -> String {

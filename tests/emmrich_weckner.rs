@@ -1,14 +1,12 @@
 //! The simulations of Emmrich & Weckner 2006, section 4: their decks, and what must come out.
 
-mod support;
-
 use std::collections::HashMap;
 
+use crate::support::simulate_input;
 use fissure::deck::plan::Field;
 use fissure::points::distance_squared;
 use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
-use support::simulate_input;
 
 /// Points with more damage than this are on a crack.
 const CRACKED: f64 = 0.35;

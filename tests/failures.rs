@@ -1,13 +1,11 @@
 //! What goes wrong on one rank ends all of them, soon, with one message and the right exit code; what
 //! was written before stays readable.
 
-mod support;
-
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use crate::support::command::{Folder, finish, fissure, succeed, text};
 use fissure::output::ResultReader;
-use support::command::{Folder, finish, fissure, succeed, text};
 
 /// A bar with the given time table; small enough to be quick, with an output at every step.
 fn bar(time: &str) -> String {

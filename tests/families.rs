@@ -1,11 +1,9 @@
 //! Bonds kept as lattices and in lists give the same physics, up to rounding.
 
-mod support;
-
+use crate::support::{plan, simulate_on};
 use fissure::deck::plan::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observe::Snapshot;
-use support::{plan, simulate_on};
 
 /// Two bodies on one grid, with a hole, a crack, a zone without failure and supports; `LAW` and
 /// `GRID` stand for what differs.

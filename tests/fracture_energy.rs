@@ -4,9 +4,7 @@
 //! that share too much energy. What is left is the quadrature error of the lattice, which falls as the
 //! horizon holds more spacings.
 
-mod support;
-
-use support::{displace, simulate};
+use crate::support::{displace, simulate};
 /// G0, J/m².
 const FRACTURE_ENERGY: f64 = 2.0;
 

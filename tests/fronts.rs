@@ -1,10 +1,8 @@
 //! Fronts along lines and crack tips, as the history has them.
 
-mod support;
-
+use crate::support::{displace, simulate, simulate_on};
 use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, Snapshot};
-use support::{displace, simulate, simulate_on};
 
 /// The last entries of the present row: those of the fronts and tips.
 fn last<const D: usize, const N: usize>(simulation: &mut Simulation<D>) -> [f64; N] {

@@ -1,10 +1,8 @@
 //! Bonds between bodies: what each rule makes of their constants, pair by pair, and that whatever the
 //! rule action and reaction cancel.
 
-mod support;
-
+use crate::support::{displace, largest_force, simulate};
 use fissure::solver::Simulation;
-use support::{displace, largest_force, simulate};
 
 /// The micromodulus of a bar, 12E/(5δ²A) (N/m⁶).
 fn micromodulus(modulus: f64, horizon: f64) -> f64 {

@@ -1,11 +1,9 @@
 //! What every law must do in every dimension: nothing at rest, nothing under rigid motion, equal and
 //! opposite forces, forces that are the slope of the energy, both ends of a bond broken together.
 
-mod support;
-
+use crate::support::{displace, largest_force, simulate, simulate_on};
 use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, Snapshot};
-use support::{displace, largest_force, simulate, simulate_on};
 
 /// Every law, as the material `rubber`.
 const LAWS: [&str; 12] = [

@@ -1,10 +1,8 @@
 //! The result as other programs see it: VTK's own reader and h5py find the same numbers.
 
-mod support;
-
 use std::process::Command;
 
-use support::command::{Folder, finish, fissure, succeed, text};
+use crate::support::command::{Folder, finish, fissure, succeed, text};
 
 #[test]
 fn vtk_and_h5py_agree() {

@@ -1,15 +1,13 @@
 //! Checkpoints: a run that is killed or stopped at any moment, and continued on any number of ranks,
 //! ends to the bit where the uninterrupted one ends.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::support::command::{Folder, finish, fissure, succeed, text, wait};
+use crate::support::datasets::{datasets, difference};
 use fissure::output::ResultReader;
-use support::command::{Folder, finish, fissure, succeed, text, wait};
-use support::datasets::{datasets, difference};
 
 /// Exit code of a run that stopped and can be continued.
 const STOPPED: i32 = 75;

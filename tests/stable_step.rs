@@ -1,11 +1,9 @@
 //! The stable step against the largest frequency that a body has.
 
-mod support;
-
+use crate::support::simulate;
 use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, Snapshot};
 use nalgebra::{DMatrix, Matrix3, Vector3};
-use support::simulate;
 
 /// A system of one body or two.
 struct System {

@@ -1,12 +1,10 @@
 //! Waves that travel: pulses through cubic lattices and standing waves in a bar, simulated and timed.
 //! `tests/elasticity.rs` holds the forces in such waves against closed forms.
 
-mod support;
-
 use std::collections::HashMap;
 
+use crate::support::simulate;
 use fissure::solver::Simulation;
-use support::simulate;
 
 const DENSITY: f64 = 3.0;
 const BULK: f64 = 2.0;
