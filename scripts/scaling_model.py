@@ -70,7 +70,6 @@ def step(given, points):
 def predict(given, points_of):
     """A row for each number of ranks; `points_of` gives the points of one rank."""
     rows = []
-    # The same on one core, where nothing is exchanged.
     for ranks in RANKS:
         row = {"ranks": ranks, **step(given, points_of(ranks))}
         row["history"] = math.log2(ranks) * (given["latency"] + HISTORY_BYTES / given["bandwidth"])
@@ -84,7 +83,8 @@ def predict(given, points_of):
 def limits(given, ranks, points):
     """What stands in the way for so many ranks and points in all: (what, amount, limit), all of
     them numbers of the same unit, the worst first."""
-    cells = points / given["layers"] ** 3
+    # As src/partition/cells.rs chooses them: no more than one for a horizon in each direction.
+    cells = min(points / given["layers"] ** 3, max(1e5, 2000 * ranks), max(4e6, 64 * ranks))
     own = points / ranks
     found = [
         ("cells on every rank: points and owner of each, B", CELL_BYTES * cells, given["memory"]),
@@ -92,7 +92,8 @@ def limits(given, ranks, points):
         ("METIS on rank 0: time, s", METIS_SECONDS * cells, given["patience"]),
         ("METIS on rank 0: cells that 32-bit edges allow", cells, GRAPH_CELLS),
         ("adding up the points of cells: time, s", 2 * 8 * cells / given["bandwidth"], given["patience"]),
-        ("lists by rank (swaps of the set-up), B", 4 * 24 * ranks, given["memory"]),
+        ("lists by rank in swaps between all, B", 4 * 24 * ranks, given["memory"]),
+        ("telling all ranks sizes, in each swap: time, s", ranks * given["latency"], 0.01 * given["patience"]),
         ("local index of 32 bits: points of a rank", own, 2**31),
         ("global ids of 64 bits", points, 2**63),
     ]

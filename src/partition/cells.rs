@@ -1,21 +1,49 @@
-//! The cells that are dealt out to ranks: boxes of edge about one horizon.
+//! The cells that are dealt out to ranks: boxes of an edge of one horizon or some.
 
 use crate::comm::{self, Communicator};
 use crate::points::Point;
 use crate::points::bins::boxes;
+
+/// Up to so many cells need no thought.
+const FEW: usize = 100_000;
+
+/// More cells for each rank make its border no smoother.
+const ENOUGH_A_RANK: usize = 2000;
+
+/// Every rank knows the owner of every cell, and one rank deals them out alone: from this many cells
+/// on, ranks get fewer.
+const MANY: usize = 4_000_000;
+
+/// The fewest cells of a rank that still can be dealt out evenly.
+const FEWEST_A_RANK: usize = 64;
+
+/// The largest number of cells for so many ranks.
+pub fn most_cells(ranks: usize) -> usize {
+    FEW.max(ENOUGH_A_RANK * ranks)
+        .min(MANY.max(FEWEST_A_RANK * ranks))
+}
 
 /// A grid of cells over all points, the same on all ranks. Points within the cut-off of one another
 /// lie in the same cell or in adjacent ones.
 #[derive(Debug, Clone)]
 pub struct Cells {
     lower: [f64; 3],
+    /// Edge of a box, about the cut-off, m.
     edge: f64,
+    /// Number of boxes along the edge of a cell.
+    boxes: usize,
     counts: [usize; 3],
 }
 
 impl Cells {
-    /// The grid for all points of all ranks and a cut-off in m.
-    pub fn new(comm: &dyn Communicator, points: &[Point], total: u64, cutoff: f64) -> Self {
+    /// The grid for all points of all ranks and a cut-off in m, with so many cells at `most`.
+    pub fn new(
+        comm: &dyn Communicator,
+        points: &[Point],
+        total: u64,
+        cutoff: f64,
+        most: usize,
+    ) -> Self {
         let mut lower = [f64::MAX; 3];
         let mut upper = [f64::MIN; 3];
         for point in points {
@@ -27,10 +55,14 @@ impl Cells {
         comm::min(comm, &mut lower);
         comm.max(&mut upper);
         let (edge, counts) = boxes(lower, upper, cutoff, total as usize);
+        let cells = |boxes: usize| counts.map(|count| count.div_ceil(boxes));
+        let boxes = (1..).find(|boxes| cells(*boxes).iter().product::<usize>() <= most);
+        let boxes = boxes.expect("one cell is few enough");
         Self {
             lower,
             edge,
-            counts,
+            boxes,
+            counts: cells(boxes),
         }
     }
 
@@ -39,13 +71,26 @@ impl Cells {
         self.counts.iter().product()
     }
 
+    /// The box of a position (m) by direction, within the cells.
+    fn place(&self, position: [f64; 3]) -> [usize; 3] {
+        std::array::from_fn(|k| {
+            let offset = ((position[k] - self.lower[k]) / self.edge) as usize;
+            offset.min(self.counts[k] * self.boxes - 1)
+        })
+    }
+
     /// The cell that holds a position (m).
     pub fn of(&self, position: [f64; 3]) -> usize {
-        let coordinate = |k: usize| {
-            let offset = ((position[k] - self.lower[k]) / self.edge) as usize;
-            offset.min(self.counts[k] - 1)
-        };
-        coordinate(0) + self.counts[0] * (coordinate(1) + self.counts[1] * coordinate(2))
+        let [x, y, z] = self.place(position).map(|at| at / self.boxes);
+        x + self.counts[0] * (y + self.counts[1] * z)
+    }
+
+    /// A number that puts positions (m) in the order of cells, and those of a cell in that of its
+    /// boxes, so that what is near lies near in memory.
+    pub fn order(&self, position: [f64; 3]) -> u64 {
+        let [x, y, z] = self.place(position).map(|at| at % self.boxes);
+        let within = x + self.boxes * (y + self.boxes * z);
+        (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
     /// The adjacent cells, across corners and edges too, with the number of directions (1 to 3) in
@@ -78,5 +123,18 @@ impl Cells {
         }
         comm.sum(&mut occupation);
         occupation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_for_few_and_for_many_ranks() {
+        assert_eq!(most_cells(1), 100_000);
+        assert_eq!(most_cells(1000), 2_000_000);
+        assert_eq!(most_cells(20_000), 4_000_000);
+        assert_eq!(most_cells(100_000), 6_400_000);
     }
 }

@@ -5,7 +5,7 @@ use crate::points::Point;
 
 /// The points that a rank works with. Local index order: interior points (no bond leads to a ghost),
 /// border points, then ghosts grouped by owner and sorted by id. Both kinds of owned points are
-/// sorted by cell, then id.
+/// sorted by cell, by box within it, then by id.
 #[derive(Debug, Default)]
 pub struct Domain {
     /// All local points.

@@ -30,7 +30,7 @@ pub fn domain(
     total: u64,
     cutoff: f64,
 ) -> Domain {
-    owned.sort_by_cached_key(|point| (cells.of(point.position), point.id));
+    owned.sort_by_cached_key(|point| (cells.order(point.position), point.id));
     let (offers, edge) = offers(comm, cells, owner, &owned);
     let offered = comm.all_to_all(offers);
 

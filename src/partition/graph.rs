@@ -117,7 +117,7 @@ mod tests {
             .map(|k| Point::new(k, [(k % 100) as f64, (k / 100) as f64, 0.0], 1.0, 0))
             .collect();
         let comm = threads::alone();
-        let cells = Cells::new(&comm, &points, 4000, 3.0);
+        let cells = Cells::new(&comm, &points, 4000, 3.0, 4000);
         let occupation = cells.occupation(&comm, &points);
         for ranks in [2, 3, 4, 7, 64] {
             let owner = partition(&cells, &occupation, ranks).unwrap();
@@ -138,7 +138,7 @@ mod tests {
             Point::new(1, [9.0, 0.0, 0.0], 1.0, 0),
         ];
         let comm = threads::alone();
-        let cells = Cells::new(&comm, &points, 2, 1.0);
+        let cells = Cells::new(&comm, &points, 2, 1.0, 100);
         let occupation = cells.occupation(&comm, &points);
         let owner = partition(&cells, &occupation, 4).unwrap();
         assert_ne!(owner[cells.of([0.0; 3])], owner[cells.of([9.0, 0.0, 0.0])]);

@@ -11,7 +11,7 @@ use crate::comm::{Communicator, agree};
 use crate::error::Result;
 use crate::points::Point;
 
-use cells::Cells;
+use cells::{Cells, most_cells};
 
 /// Moves the pieces that the ranks made to the ranks that will own them, and finds the ghosts.
 ///
@@ -25,7 +25,19 @@ pub fn distribute(
     total: u64,
     cutoff: f64,
 ) -> Result<Domain> {
-    let cells = Cells::new(comm, &pieces, total, cutoff);
+    let most = most_cells(comm.size());
+    distribute_by_cells(comm, pieces, total, cutoff, most)
+}
+
+/// As [`distribute`], with so many cells at most.
+fn distribute_by_cells(
+    comm: &dyn Communicator,
+    pieces: Vec<Point>,
+    total: u64,
+    cutoff: f64,
+    most: usize,
+) -> Result<Domain> {
+    let cells = Cells::new(comm, &pieces, total, cutoff, most);
     let occupation = cells.occupation(comm, &pieces);
     let owner = owners(comm, &cells, &occupation)?;
     drop(occupation);
@@ -98,12 +110,14 @@ mod tests {
         fn every_point_has_one_owner_and_sees_all_its_neighbours(
             seed in prop::collection::vec(prop::array::uniform3(0.0..4.0_f64), 1..120),
             ranks in 1_usize..5,
+            most in 1_usize..100,
         ) {
             let all = cloud(&seed);
             let domains = threads::run(ranks, |comm| {
                 let share = |rank: usize| all.len() * rank / ranks;
                 let piece = all[share(comm.rank())..share(comm.rank() + 1)].to_vec();
-                let mut domain = distribute(comm, piece, all.len() as u64, 1.0).unwrap();
+                let total = all.len() as u64;
+                let mut domain = distribute_by_cells(comm, piece, total, 1.0, most).unwrap();
                 // The halo must bring each ghost its own id.
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);
