@@ -53,7 +53,8 @@ class Panel:
             return
         edge = max(self.left, self.x(max(self.least, cores)) + 8)
         width = self.left + WIDTH - edge
-        self.parts.append(f'<rect x="{edge:.1f}" y="{TOP}" width="{width:.1f}" height="{HEIGHT}" class="beyond"/>')
+        # Below the lines of the axes.
+        self.parts.insert(0, f'<rect x="{edge:.1f}" y="{TOP}" width="{width:.1f}" height="{HEIGHT}" class="beyond"/>')
         self.text(self.left + WIDTH - 4, TOP + HEIGHT - 8, "more than the cores", "small", "end")
 
     def line(self, number, name, points):

@@ -110,3 +110,51 @@ fn a_point_file_that_is_not_there() {
         );
     }
 }
+
+#[test]
+fn the_benchmark_counts_what_it_does() {
+    let figure = |json: &str, name: &str| -> f64 {
+        let (_, rest) = json.split_once(&format!("\"{name}\": ")).unwrap();
+        rest[..rest.find([',', '}']).unwrap()].parse().unwrap()
+    };
+    // In a 5 × 4 × 4 block every offset (x, y, z) within 3.015 has (5 − x)(4 − y)(4 − z) bonds.
+    let mut bonds = 0;
+    for x in -3_i32..=3 {
+        for y in -3_i32..=3 {
+            for z in -3_i32..=3 {
+                if (1..=9).contains(&(x * x + y * y + z * z)) {
+                    bonds += (5 - x.abs()) * (4 - y.abs()) * (4 - z.abs());
+                }
+            }
+        }
+    }
+    let options = [
+        "bench",
+        "--points",
+        "5,4,4",
+        "--steps",
+        "7",
+        "--threads",
+        "1",
+        "--json",
+    ];
+    for ranks in [1, 2] {
+        for law in [&["--law", "pmb"][..], &["--law", "lps", "--no-failure"]] {
+            let mut command = fissure(ranks);
+            let json = succeed(command.args(options).args(law).arg("--no-limits"));
+            assert_eq!(figure(&json, "points"), 80.0, "{json}");
+            assert_eq!(figure(&json, "directed_bonds"), f64::from(bonds), "{json}");
+            let rate = figure(&json, "updates_per_second");
+            let rate = rate * figure(&json, "loop_seconds_slowest");
+            assert!((rate / f64::from(7 * bonds) - 1.0).abs() < 1e-9, "{json}");
+            // Three numbers of each ghost in each step; a fourth where there are states.
+            let numbers = if law.len() == 3 { 4.0 } else { 3.0 };
+            let sent = figure(&json, "halo_bytes_per_step");
+            assert_eq!(sent, 8.0 * numbers * figure(&json, "ghosts"), "{json}");
+            assert_eq!(sent > 0.0, ranks == 2);
+        }
+    }
+    let wrong = finish(fissure(1).args(["bench", "--points", "5,4"]));
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong).contains("edges such as"), "{}", text(&wrong));
+}
