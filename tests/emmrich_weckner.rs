@@ -9,7 +9,7 @@ use fissure::solver::Simulation;
 use fissure::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
 
 /// Points with more damage than this are on a crack.
-const CRACKED: f64 = 0.35;
+const CRACKED: f64 = 0.34;
 
 /// Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of the plate, its size (m), its cells, and
 /// the horizon (m): the values of the paper.

@@ -1,5 +1,10 @@
-//! Bonds kept as lattices and in lists give the same physics, up to rounding.
+//! Bonds kept as lattices and in lists give the same physics, up to rounding; so do all vector
+//! instructions.
 
+use std::collections::BTreeMap;
+
+use crate::support::command::{Folder, finish, fissure, succeed, text};
+use crate::support::datasets::{datasets, difference};
 use crate::support::{plan, simulate_on};
 use fissure::deck::plan::Field;
 use fissure::solver::Simulation;
@@ -158,4 +163,58 @@ fn normalised_bonds() {
     let grid = "horizon = 2.3\nvolume_correction = 'linear'";
     compare::<3>(&deck(SOLID, "normalised_pmb", "", grid, "0"));
     compare::<2>(&deck(PLANE, "normalised_pmb", "", grid, "0.25"));
+}
+
+/// The values of all datasets under a limit to the instructions.
+fn run_with(
+    instructions: &str,
+    folder: &Folder,
+    ranks: usize,
+    deck: &str,
+) -> BTreeMap<String, Vec<u64>> {
+    let deck = folder.write(&format!("{instructions}.toml"), deck);
+    let out = folder.join(format!("{instructions}{ranks}"));
+    let mut command = fissure(ranks);
+    command.env("FISSURE_INSTRUCTIONS", instructions);
+    succeed(command.arg("run").arg(deck).arg("--output").arg(&out));
+    datasets(&out.join("result.vtkhdf"))
+}
+
+#[test]
+fn all_instructions_agree() {
+    let folder = Folder::new("instructions");
+    let ratio = ", poisson_ratio = 0.3";
+    for family in ["list", "lattice"] {
+        let grid = format!("horizon = 2.3\nfamily = '{family}'");
+        let deck = deck(PLANE, "ordinary", ratio, &grid, "0.25");
+        let best = run_with("avx512", &folder, 1, &deck);
+        for instructions in ["baseline", "avx2"] {
+            let found = run_with(instructions, &folder, 1, &deck);
+            for (name, best) in &best {
+                let numbers =
+                    |bits: &[u64]| bits.iter().map(|bits| f64::from_bits(*bits)).collect();
+                let [a, b]: [Vec<f64>; 2] = [numbers(best), numbers(&found[name])];
+                let largest = a.iter().fold(f64::MIN_POSITIVE, |all, a| all.max(a.abs()));
+                for (a, b) in a.iter().zip(&b) {
+                    // The balance is a difference of energies.
+                    let tolerance = if name.contains("error") { 1e-3 } else { 1e-8 };
+                    assert!(
+                        a.is_nan() && b.is_nan() || (a - b).abs() < tolerance * largest,
+                        "{instructions} {family} {name}: {a} {b}"
+                    );
+                }
+            }
+            let three = run_with(instructions, &folder, 3, &deck);
+            assert_eq!(difference(&found, &three), None, "{instructions}");
+        }
+    }
+    let mut command = fissure(2);
+    command.env("FISSURE_INSTRUCTIONS", "sse9");
+    let output = finish(command.arg("run").arg(folder.join("avx2.toml")));
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output).contains("`sse9` is none of"),
+        "{}",
+        text(&output)
+    );
 }

@@ -229,8 +229,10 @@ fn a_checkpoint_is_written_on_request_and_a_second_signal_ends_at_once() {
     assert_eq!(output.status.code(), Some(STOPPED), "{}", text(&output));
 
     // A rank that is stuck in its set-up cannot stop by itself: the second signal ends it.
-    let points = "0 0 1 0\n".repeat(4_000_000);
-    folder.write("points.txt", &points);
+    let pipe = Command::new("mkfifo")
+        .arg(folder.join("points.txt"))
+        .status();
+    assert!(pipe.unwrap().success());
     let stuck = folder.write(
         "stuck.toml",
         "dimension = 'plane-stress'

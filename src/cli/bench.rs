@@ -52,6 +52,28 @@ impl Law {
     }
 }
 
+/// How bonds are kept.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Family {
+    /// One bit each, for this block is a lattice.
+    Auto,
+    /// One bit each.
+    Lattice,
+    /// In lists, as those of scattered points.
+    List,
+}
+
+impl Family {
+    /// Its name in the deck.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Lattice => "lattice",
+            Self::List => "list",
+        }
+    }
+}
+
 /// Bytes of a point that a step cannot but read or write beside its bonds, in three dimensions:
 /// motion (displacement and velocity read and written, response and block read, twice), and in each
 /// pass over the bonds (reference, displacement and volume read, response read and written).
@@ -76,6 +98,7 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
 /// The deck of the problem. The bonds are stretched a little, so that no time is saved on zeros.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
+    let family = arguments.family.name();
     let [x, y, z] = arguments.points;
     let last = warm_up(arguments) + u64::from(arguments.steps);
     let damage = match arguments.no_failure {
@@ -85,7 +108,7 @@ fn deck(arguments: &BenchArguments) -> String {
     format!(
         "title = 'Benchmark'
         dimension = '3d'
-        grid = {{ spacing = 1e-3, horizon = 3.015e-3 }}
+        grid = {{ spacing = 1e-3, horizon = 3.015e-3, family = '{family}' }}
         material.block.{law}
         damage.block.critical_stretch = {{ critical_stretch = 1e3, alpha = 0 }}
         [body.block]
@@ -180,6 +203,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         ("after the loop", resident(|r| r.now, after)),
         ("peak", resident(|r| r.peak, after)),
     ];
+    let instructions = simulation.forces.instructions();
     drop(simulation);
     let limits = match arguments.no_limits {
         true => None,
@@ -199,6 +223,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     };
     Ok(Figures {
         law: arguments.law,
+        family: arguments.family,
+        instructions,
         failure: !arguments.no_failure,
         edges: arguments.points,
         points: points as f64,

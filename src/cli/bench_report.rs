@@ -4,8 +4,9 @@ use clap::ValueEnum;
 
 use crate::cli::say;
 
-use super::bench::Law;
+use super::bench::{Family, Law};
 use super::format::{bytes, count, si};
+use fissure::solver::instructions::Instructions;
 
 /// Time of a phase of the loop over the ranks, s.
 pub struct Phase {
@@ -33,6 +34,10 @@ pub struct Limited {
 pub struct Figures {
     /// The law of the bonds.
     pub law: Law,
+    /// How bonds are kept.
+    pub family: Family,
+    /// The vector instructions of the loops.
+    pub instructions: Instructions,
     /// Whether bonds can break.
     pub failure: bool,
     /// Points along each edge.
@@ -101,7 +106,8 @@ impl Figures {
             true => "bonds can break",
             false => "bonds cannot break",
         };
-        say!("benchmark: {}, {failure}", self.law_name());
+        let family = self.family.name();
+        say!("benchmark: {}, {failure}, family {family}", self.law_name());
         let [x, y, z] = self.edges;
         let points = count(self.points as u64);
         line("points", format!("{points}   ({x} × {y} × {z})"));
@@ -111,6 +117,7 @@ impl Figures {
             "ranks × threads",
             format!("{} × {}", self.ranks, self.threads),
         );
+        line("instructions", self.instructions.name().to_owned());
         let (steps, warm_up) = (self.steps, self.warm_up);
         line("steps", format!("{steps} after {warm_up} to warm up"));
         say!("speed");
@@ -166,6 +173,11 @@ impl Figures {
         let [x, y, z] = self.edges;
         let mut entries = vec![
             ("law".to_owned(), format!("\"{}\"", self.law_name())),
+            ("family".to_owned(), format!("\"{}\"", self.family.name())),
+            (
+                "instructions".to_owned(),
+                format!("\"{}\"", self.instructions.name()),
+            ),
             ("failure".to_owned(), self.failure.to_string()),
             ("edges".to_owned(), format!("[{x}, {y}, {z}]")),
         ];

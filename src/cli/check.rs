@@ -88,6 +88,10 @@ fn report<const D: usize>(
     let total = model.total;
     line("points", count(total));
     line("bonds", count(simulation.forces.directed_bonds() / 2));
+    line(
+        "of them as lattice",
+        count(simulation.forces.lattice_bonds() / 2),
+    );
     let state = 8 * (2 * D + 1) + 8 * D + 8 * (D + 1) + 8 + 2;
     let whole = simulation.forces.bytes() as f64 + (state as u64 * total) as f64;
     let ranks = arguments.ranks;

@@ -100,6 +100,9 @@ Examples:
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
+The loops use the best vector instructions that all ranks have. On machines of several kinds set
+FISSURE_INSTRUCTIONS to baseline, avx2 or avx512, the most to use, to get the same bits everywhere.
+
 SIGTERM, SIGINT or SIGUSR1 to any rank: all finish the step, write a checkpoint and leave with exit
 code 75; a second signal ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
 struct RunArguments {
@@ -249,6 +252,10 @@ struct BenchArguments {
     /// The law of the bonds.
     #[arg(long, value_enum, default_value_t = bench::Law::Pmb)]
     law: bench::Law,
+
+    /// How bonds are kept.
+    #[arg(long, value_enum, default_value_t = bench::Family::Auto)]
+    family: bench::Family,
 
     /// Bonds cannot break; otherwise each is tested in every step, and none breaks.
     #[arg(long)]

@@ -81,6 +81,10 @@ impl Summary {
             format!("{step} ({share:.2} of the stable one)"),
         );
         line("ranks × threads", format!("{} × {threads}", comm.size()));
+        line(
+            "instructions",
+            simulation.forces.instructions().name().to_owned(),
+        );
         line("checkpoints", count(self.checkpoints));
         let [_, bonds, halo, motion, ..] = self.seconds;
         let loop_seconds = bonds + halo + motion;

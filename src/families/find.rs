@@ -20,9 +20,10 @@ pub fn find(
     cutoffs: &[f64],
     dimension: usize,
 ) -> Result<(Vec<Family>, Vec<Arc<Grid>>)> {
+    let longest = cutoffs.iter().copied().fold(0.0, f64::max);
     let grids: Vec<Arc<Grid>> = frames
         .iter()
-        .map(|frame| Arc::new(Grid::new(frame.clone(), domain)))
+        .map(|frame| Arc::new(Grid::new(frame.clone(), domain, longest)))
         .collect();
     let shared = |pair: usize| {
         let [here, there] = [pair / blocks, pair % blocks];

@@ -2,9 +2,13 @@
 //! points are adjacent.
 //!
 //! A line holds the points with the same y and z, x fastest, from the first to the last one here;
-//! places without a point are holes. Lines follow one another without gaps, so a place is one number.
+//! places without a point are holes. Where no point is near, all lines end and others begin: the
+//! grid falls into bands, between which there are no bonds. Lines follow one another without gaps, so
+//! a place is one number.
 
 use std::collections::HashMap;
+
+use rayon::prelude::*;
 
 use crate::material::lanes::WIDTH;
 use crate::partition::Domain;
@@ -44,8 +48,8 @@ struct Run {
 /// A line of places.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
-    /// y and z.
-    pub(super) at: [i64; 2],
+    /// The band, y and z.
+    pub(super) at: [i64; 3],
     /// x of the first place.
     pub(super) first: i64,
     /// The first place.
@@ -55,7 +59,8 @@ pub(super) struct Line {
 }
 
 /// The layout of a grid's points on a rank, ghosts included. Before the first and after the last
-/// place there are [`WIDTH`] more without a point, so that vectors can reach over the ends.
+/// line there are more places without a point: from any place with one, eight can be read where its
+/// neighbours on any line of its band would be.
 #[derive(Debug)]
 pub struct Grid {
     /// The grid.
@@ -67,13 +72,14 @@ pub struct Grid {
     pub(super) blocks: Vec<u16>,
     /// Owned points and ghosts, and where each chunk's runs start.
     runs: [(Vec<Run>, Vec<u32>); 2],
-    by_line: HashMap<[i64; 2], u32>,
+    by_line: HashMap<[i64; 3], u32>,
 }
 
 impl Grid {
-    /// Lays out the points of a domain that lie on a grid.
-    pub fn new(frame: GridFrame, domain: &Domain) -> Self {
-        let mut cells: Vec<([i64; 3], u32)> = domain
+    /// Lays out the points of a domain that lie on a grid; `longest` is the length of the longest
+    /// bond, m.
+    pub fn new(frame: GridFrame, domain: &Domain, longest: f64) -> Self {
+        let cells: Vec<([i64; 3], u32)> = domain
             .points
             .iter()
             .zip(0..)
@@ -83,29 +89,52 @@ impl Grid {
                 ([z, y, x], index)
             })
             .collect();
-        cells.sort_unstable();
-        let mut lines = Vec::new();
-        let mut points = vec![0; WIDTH];
-        let mut blocks = vec![HOLE; WIDTH];
-        for line in cells.chunk_by(|a, b| a.0[..2] == b.0[..2]) {
-            let ([z, y, first], _) = line[0];
-            let start = points.len();
-            for ([_, _, x], index) in line {
-                let place = start + (x - first) as usize;
-                points.resize(place, 0);
-                blocks.resize(place, HOLE);
-                points.push(*index);
-                blocks.push(domain.points[*index as usize].block as u16);
-            }
+        let reach = (longest / frame.spacing[0]) as i64 + 1;
+        let starts = bands(&cells, reach);
+        let band = |x: i64| starts.partition_point(|start| *start <= x) as i64;
+        let mut cells = cells;
+        cells.par_sort_unstable_by_key(|([z, y, x], _)| [band(*x), *z, *y, *x]);
+        let line_of = |([z, y, x], _): &([i64; 3], u32)| [band(*x), *y, *z];
+        let mut lines: Vec<Line> = Vec::new();
+        let mut total = 0;
+        let mut extents = vec![[i64::MAX, i64::MIN]; starts.len() + 1];
+        for line in cells.chunk_by(|a, b| line_of(a) == line_of(b)) {
+            let ([_, _, first], _) = line[0];
+            let ([_, _, last], _) = line[line.len() - 1];
+            let at = line_of(&line[0]);
+            let length = (last - first) as usize + 1;
             lines.push(Line {
-                at: [y, z],
+                at,
                 first,
-                start,
-                length: points.len() - start,
+                start: total,
+                length,
             });
+            total += length;
+            let [low, high] = &mut extents[at[0] as usize];
+            (*low, *high) = (first.min(*low), last.max(*high));
         }
-        points.resize(points.len() + WIDTH, 0);
-        blocks.resize(blocks.len() + WIDTH, HOLE);
+        // From any line of a band it must be possible to look at the same x on any other.
+        let width = WIDTH as i64;
+        let beyond = |line: &Line| {
+            let [low, high] = extents[line.at[0] as usize];
+            let before = reach + line.first - low - line.start as i64;
+            let after = line.start as i64 + high - line.first + reach + width - total as i64;
+            [before, after]
+        };
+        let [front, back] = lines.iter().map(beyond).fold([width; 2], |most, next| {
+            [most[0].max(next[0]), most[1].max(next[1])]
+        });
+        let places = front as usize + total + back as usize;
+        let (mut points, mut blocks) = (vec![0; places], vec![HOLE; places]);
+        let chunks = cells.chunk_by(|a, b| line_of(a) == line_of(b));
+        for (line, own) in lines.iter_mut().zip(chunks) {
+            line.start += front as usize;
+            for ([_, _, x], index) in own {
+                let place = line.start + (x - line.first) as usize;
+                points[place] = *index;
+                blocks[place] = domain.points[*index as usize].block as u16;
+            }
+        }
         let by_line = lines.iter().map(|line| line.at).zip(0..).collect();
         let runs = [true, false].map(|owned| {
             let wanted = |place: usize| {
@@ -123,20 +152,19 @@ impl Grid {
         }
     }
 
-    /// Number of places, those at the ends included.
+    /// Number of places, those before and after all lines included.
     pub fn places(&self) -> usize {
         self.points.len()
     }
 
-    /// The line with this y and z, if there is one.
-    pub(super) fn line(&self, at: [i64; 2]) -> Option<&Line> {
+    /// The line in this band with this y and z, if there is one.
+    pub(super) fn line(&self, at: [i64; 3]) -> Option<&Line> {
         let index = self.by_line.get(&at)?;
         Some(&self.lines[*index as usize])
     }
 
     /// Copies the values of the local points, or of the ghosts among them only, to their places.
     pub fn bring(&self, which: Which, values: &[f64], places: &mut [f64]) {
-        use rayon::prelude::*;
         let kinds = match which {
             Which::Owned => 0..1,
             Which::Ghosts => 1..2,
@@ -176,6 +204,19 @@ pub enum Which {
     Ghosts,
     /// Both.
     All,
+}
+
+/// The first x of each band: where more than `reach` steps before it there is no point.
+fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
+    let mut all: Vec<i64> = cells.iter().map(|([_, _, x], _)| *x).collect();
+    all.par_sort_unstable();
+    all.dedup();
+    let apart = |pair: &[i64]| (pair[1] - pair[0] > reach).then_some(pair[1]);
+    all.first()
+        .copied()
+        .into_iter()
+        .chain(all.windows(2).filter_map(apart))
+        .collect()
 }
 
 /// The longest runs of wanted places whose points follow one another, cut at the ends of chunks, and

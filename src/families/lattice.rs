@@ -26,6 +26,8 @@ pub struct Offset {
     pub square: f64,
     /// 1/|ξ|, 1/m.
     pub inverse: f64,
+    /// 1/|ξ|², 1/m².
+    pub inverse_square: f64,
     /// What volumes are multiplied by in the sums of the own and of the far end.
     pub weights: [f64; 2],
     /// Steps along x.
@@ -96,7 +98,6 @@ pub struct Adjacent<'a> {
     /// Whether any weight is not 1, and whether those of the ends differ.
     pub weighted: [bool; 2],
     shifts: &'a [i32],
-    last: isize,
 }
 
 /// A range of vectors that can be split between threads.
@@ -115,7 +116,6 @@ struct Shared<'a> {
     weighted: [bool; 2],
     shifts: &'a [i32],
     around: usize,
-    last: isize,
 }
 
 impl BondLattice {
@@ -134,8 +134,8 @@ impl BondLattice {
         for (line, shifts) in grid.lines.iter().zip(shifts.chunks_mut(around.len())) {
             for ([y, z], shift) in around.iter().zip(shifts) {
                 // Where there is no line there is no bond either, so any place will do.
-                if let Some(other) = grid.line([line.at[0] + y, line.at[1] + z]) {
-                    *shift = (origin(other) - origin(line)).clamp(-(1 << 30), 1 << 30) as i32;
+                if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
+                    *shift = (origin(other) - origin(line)) as i32;
                 }
             }
         }
@@ -210,7 +210,7 @@ impl BondLattice {
             if offset.line as usize != around {
                 around = offset.line as usize;
                 let [y, z] = self.around[around];
-                target = grid.line([line.at[0] + y, line.at[1] + z]);
+                target = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]);
             }
             *bits = 0;
             let Some(target) = target else { continue };
@@ -268,7 +268,6 @@ impl BondLattice {
                 weighted: self.weighted,
                 shifts: &self.shifts,
                 around: self.around.len(),
-                last: (self.grid.places() - WIDTH) as isize,
             },
             first: range.start,
             vectors: &self.vectors[range],
@@ -432,6 +431,7 @@ fn offsets(spacing: [f64; 3], cutoff: f64, dimension: usize) -> (Vec<Offset>, Ve
                     length,
                     square,
                     inverse: 1.0 / length,
+                    inverse_square: 1.0 / square,
                     weights: [1.0; 2],
                     x: x as i32,
                     line: around.len() as u32,
@@ -534,7 +534,6 @@ impl<'a> Vectors<'a> {
             weighted,
             shifts,
             around,
-            last,
         } = self.lattice;
         let count = offsets.len();
         let all = (self.first + vector) * count..(self.first + vector + 1) * count;
@@ -550,18 +549,18 @@ impl<'a> Vectors<'a> {
             intact: &mut self.intact[bits],
             weighted,
             shifts: &shifts[vector.line as usize * around..(vector.line as usize + 1) * around],
-            last,
         }
     }
 }
 
 impl Adjacent<'_> {
-    /// The place of the first of the eight far ends at an offset. Always one from which eight places
-    /// can be read; where none of the bonds exists it is meaningless.
+    /// The place of the first of the eight far ends at an offset, with seven more after it. Where
+    /// none of the bonds exists it is meaningless, but still a place.
     #[inline(always)]
     pub fn far(&self, offset: &Offset) -> usize {
-        let shift = self.shifts[offset.line as usize] + offset.x;
-        (self.place as isize + shift as isize).clamp(0, self.last) as usize
+        // SAFETY: lines around are numbered from 0, and there is a shift for each.
+        let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
+        (self.place as isize + (shift + offset.x) as isize) as usize
     }
 }
 

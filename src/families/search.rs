@@ -145,8 +145,9 @@ impl Chunk {
             });
             if let Some(other) = coincident {
                 return Err(Error::input(format!(
-                    "points {} and {other} lie at the same place, {:?} m; do two bodies overlap?",
+                    "points {} and {} lie at the same place, {:?} m; do two bodies overlap?",
                     here.id.min(other),
+                    here.id.max(other),
                     here.position,
                 )));
             }

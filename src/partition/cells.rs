@@ -93,15 +93,15 @@ impl Cells {
         (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
-    /// The adjacent cells, across corners and edges too, with the number of directions (1 to 3) in
-    /// which each is displaced.
-    pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, u32)> + '_ {
+    /// The adjacent cells, across corners and edges too, with whether each is displaced in each
+    /// direction.
+    pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
         let here = [cell % nx, cell / nx % ny, cell / nx / ny];
         let counts = [nx, ny, nz];
         (0..27).filter_map(move |code| {
             let offset = [code % 3, code / 3 % 3, code / 9];
-            let displaced = offset.iter().filter(|o| **o != 1).count() as u32;
+            let displaced = offset.map(|steps| steps != 1);
             let mut there = [0; 3];
             for k in 0..3 {
                 // Offsets 0, 1, 2 mean −1, 0, +1.
@@ -111,7 +111,7 @@ impl Cells {
                 }
             }
             let index = there[0] + nx * (there[1] + ny * there[2]);
-            (displaced > 0).then_some((index, displaced))
+            displaced.contains(&true).then_some((index, displaced))
         })
     }
 

@@ -25,12 +25,18 @@ impl Domain {
     /// `order` has the present local index of each.
     pub fn reorder(&mut self, order: &[u32], interior: usize) {
         let mut place = vec![0; order.len()];
-        for (new, old) in order.iter().zip(0..) {
-            place[*new as usize] = old;
+        for (new, old) in (0..).zip(order) {
+            place[*old as usize] = new;
         }
-        let owned: Vec<Point> = order.iter().map(|k| self.points[*k as usize]).collect();
-        self.points[..self.owned].copy_from_slice(&owned);
         self.halo.renumber(&place);
+        // In place: a copy of all points would be the most that is ever alive.
+        for k in 0..place.len() {
+            while place[k] as usize != k {
+                let other = place[k] as usize;
+                self.points.swap(k, other);
+                place.swap(k, other);
+            }
+        }
         self.interior = interior;
     }
 }

@@ -9,10 +9,10 @@ use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::families::{CellShare, Family, GridFrame};
 use crate::material::{AnyLaw, Influence, LinearMicroelastic, Normalised, Ordinary, Pmb};
-use crate::partition::Domain;
 use crate::points::distance_squared;
 
 use super::laws::{BlockLaws, Bonds, FamilyFailure, FamilyLaw};
+use super::model::Model;
 
 /// The share of a cell's edge by which two grids may be apart and still be one.
 const ON_GRID: f64 = 1e-6;
@@ -230,9 +230,9 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<CriticalStre
 
 /// Gives each family its law, failure rule and weights. A bond between blocks breaks at the smaller of
 /// the two thresholds, of which a block without damage has none.
-pub fn assign(
+pub fn assign<const D: usize>(
     plan: &Plan,
-    domain: &Domain,
+    model: &Model<D>,
     blocks: &[BlockLaws],
     families: Vec<Family>,
 ) -> Vec<Bonds> {
@@ -253,7 +253,7 @@ pub fn assign(
         let [here, there] = ends.map(|block| &plan.bodies[block]);
         let [own, far] = [(here, there), (there, here)]
             .map(|(body, other)| (body, other, constants(plan, body, other)));
-        weigh(plan, domain, &mut family, [own, far]);
+        weigh(plan, model, &mut family, [own, far]);
         Bonds {
             family,
             law: FamilyLaw::new(
@@ -269,7 +269,12 @@ pub fn assign(
 
 /// Sets the weights of a family, unless they are all 1. An end is its body, the other body and the
 /// constants there.
-fn weigh(plan: &Plan, domain: &Domain, family: &mut Family, ends: [(&Body, &Body, Constants); 2]) {
+fn weigh<const D: usize>(
+    plan: &Plan,
+    model: &Model<D>,
+    family: &mut Family,
+    ends: [(&Body, &Body, Constants); 2],
+) {
     let [own, far] = &ends;
     let same_horizon = own.2.horizon == far.2.horizon;
     let plain = plan.volume_correction == VolumeCorrection::None
@@ -292,7 +297,7 @@ fn weigh(plan: &Plan, domain: &Domain, family: &mut Family, ends: [(&Body, &Body
         match family {
             Family::Lattice(lattice) => lattice.weigh(end, weight),
             Family::List(list) => list.weigh(end, |here, there| {
-                let [a, b] = [here, there].map(|point| domain.points[point].position);
+                let [a, b] = [here, there].map(|point| model.position(point));
                 weight(std::array::from_fn(|k| b[k] - a[k]))
             }),
         }

@@ -156,6 +156,7 @@ impl Cloud<'_> {
             square,
             length: square * inverse,
             inverse,
+            inverse_square: inverse * inverse,
         };
         let deformed = deform::<A, D>(&reference, eta, kernel.linear());
         // SAFETY: as above.

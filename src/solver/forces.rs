@@ -8,13 +8,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::comm::{Communicator, Halo};
-use crate::families::{Grid, Which};
+use crate::error::Result;
+use crate::families::{Family, Grid, Which};
 use crate::material::Law;
 
 use super::instructions::Instructions;
 use super::kernels::{Energy, Response, Stored};
 use super::laws::{BlockLaws, Bonds, FamilyLaw, with_laws};
-use super::measures::{Constant, Dilatation, Expansion, Stiffness, Stress};
+use super::measures::{Constant, Dilatation, Expansion, FamilyVolume, Stiffness, Stress};
 use super::model::Model;
 use super::passes::{Pass, Passes, sweep_all};
 
@@ -36,6 +37,9 @@ pub struct ForceTimes {
 impl<const D: usize> Forces<D> {
     /// Puts together the bonds, the halo plan and the blocks' laws, and finds the points' constants
     /// from their whole families; collective.
+    ///
+    /// # Errors
+    /// When the wish for [instructions](Instructions::of_all) is none; the same on all ranks.
     pub fn new(
         comm: &dyn Communicator,
         model: &Model<D>,
@@ -43,14 +47,14 @@ impl<const D: usize> Forces<D> {
         grids: Vec<Arc<Grid>>,
         halo: Halo,
         blocks: Vec<BlockLaws>,
-    ) -> Self {
-        let instructions = Instructions::of_all(comm);
+    ) -> Result<Self> {
+        let instructions = Instructions::of_all(comm)?;
         let passes = Passes::new(bonds, grids, blocks, model, instructions);
         let mut forces = Self { passes, halo };
         if !forces.passes.constants.is_empty() {
             forces.find_constants(comm, model);
         }
-        forces
+        Ok(forces)
     }
 
     fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
@@ -81,10 +85,24 @@ impl<const D: usize> Forces<D> {
             .sum()
     }
 
+    /// Those of [`Self::directed_bonds`] that are kept as lattices.
+    pub fn lattice_bonds(&self) -> u64 {
+        let families = self.passes.bonds.iter().map(|bonds| &bonds.family);
+        families
+            .filter(|family| matches!(family, Family::Lattice(_)))
+            .map(Family::bonds)
+            .sum()
+    }
+
     /// Memory of the bonds and of what they read of the points, bytes.
     pub fn bytes(&self) -> usize {
         let families = self.passes.bonds.iter().map(|bonds| bonds.family.bytes());
         families.sum::<usize>() + self.passes.bytes()
+    }
+
+    /// The vector instructions of the loops.
+    pub fn instructions(&self) -> Instructions {
+        self.passes.instructions
     }
 
     /// The halo plan.
@@ -223,6 +241,9 @@ impl<const D: usize> Forces<D> {
     /// Finds the states of the owned points at displacements whose ghosts are up to date, without
     /// breaking bonds.
     pub fn refresh_states(&mut self, model: &Model<D>, displacement: &[Vec<f64>; D]) {
+        if self.passes.states.is_empty() {
+            return;
+        }
         let stored = self.stored(model, displacement);
         let passes = &mut self.passes;
         for (point, state) in passes.states.iter_mut().enumerate().take(stored.len()) {
@@ -230,6 +251,13 @@ impl<const D: usize> Forces<D> {
             *state = law.state(stored[point].state_sum, passes.constants[point]);
         }
         passes.bring(Some(Pass::States), Which::Owned, model, displacement);
+    }
+
+    /// Volume of the intact neighbours of each owned point, m³.
+    pub fn family_volume(&mut self, model: &Model<D>) -> Vec<f64> {
+        self.passes.sum(model.owned(), |bonds, volume, source| {
+            sweep_all(&mut bonds.family, volume, &FamilyVolume, source);
+        })
     }
 
     /// D = Σ V C n⊗n of each owned point (N/m⁴): xx, yy, zz, xy, yz, xz.

@@ -24,6 +24,8 @@ pub struct Reference<const D: usize> {
     pub length: Lanes,
     /// 1/|ξ|, 1/m.
     pub inverse: Lanes,
+    /// 1/|ξ|², 1/m².
+    pub inverse_square: Lanes,
 }
 
 /// Eight bonds.
@@ -96,9 +98,9 @@ pub struct Deformed<const D: usize> {
     pub inverse_length: Lanes,
 }
 
-/// |Y|² = |ξ|² + γ with γ = η·(2ξ + η), and the stretch solves s² + 2s = γ/|ξ|²: its value from |Y| is
-/// improved by a Newton step on that, so that it loses no digits when |Y| is close to |ξ|. All of it is
-/// the same to the bit from both ends. `linear` takes what is linear in η instead.
+/// With γ = η·(2ξ + η), |Y|² = |ξ|² + γ and the stretch is s = γ/(|ξ|² (2 + s)), which loses no digits
+/// when |Y| is close to |ξ| and is the same to the bit from both ends. `linear` takes what is linear
+/// in η instead.
 #[inline(always)]
 pub fn deform<A: Arithmetic, const D: usize>(
     reference: &Reference<D>,
@@ -110,8 +112,8 @@ pub fn deform<A: Arithmetic, const D: usize>(
         square,
         length,
         inverse,
+        inverse_square,
     } = *reference;
-    let inverse_square = inverse * inverse;
     if linear {
         let mut growth = eta[0] * xi[0];
         for d in 1..D {
@@ -133,16 +135,12 @@ pub fn deform<A: Arithmetic, const D: usize>(
     }
     let deformed = square + growth;
     let inverse_length = A::inverse_sqrt(deformed);
-    let rough = A::multiply_add(deformed * inverse_length, inverse, Lanes::splat(-1.0));
-    let wanted = growth * inverse_square;
-    // s² + 2s − γ/|ξ|², where 2s − γ/|ξ|² is small.
-    let excess = A::multiply_add(rough, rough, rough + rough - wanted);
-    // −1/(2 (1 + s)) = −|ξ|/(2|Y|).
-    let slope = length * inverse_length * -0.5;
+    // 1 + |Y|/|ξ| = 2 + s.
+    let sum = A::multiply_add(deformed * inverse_length, inverse, Lanes::splat(1.0));
     Deformed {
         bond: Bond {
             length,
-            stretch: A::multiply_add(excess, slope, rough),
+            stretch: growth * inverse_square / sum,
         },
         along,
         inverse_length,
@@ -161,6 +159,7 @@ mod tests {
             square: Lanes::splat(square),
             length: Lanes::splat(square.sqrt()),
             inverse: Lanes::splat(1.0 / square.sqrt()),
+            inverse_square: Lanes::splat(1.0 / square),
         }
     }
 

@@ -4,7 +4,8 @@
 //! Between two kinds results differ in the last bits, see [`crate::material::arithmetic`]; between
 //! ranks they never do.
 
-use crate::comm::{self, Communicator};
+use crate::comm::{self, Communicator, agree};
+use crate::error::{Error, Result};
 
 /// Sets of vector instructions, each with all that come before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,13 +18,39 @@ pub enum Instructions {
     Avx512,
 }
 
+/// The environment variable that names the most to use: for machines of several kinds that are to
+/// come to the same bits.
+pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
+
+const ALL: [Instructions; 3] = [
+    Instructions::Baseline,
+    Instructions::Avx2,
+    Instructions::Avx512,
+];
+
 impl Instructions {
-    /// The best that all ranks have; collective.
-    pub fn of_all(comm: &dyn Communicator) -> Self {
-        let mut level = [f64::from(Self::of_this_machine() as u8)];
+    /// The best that all ranks have, or the most that [`VARIABLE`] allows; collective.
+    ///
+    /// # Errors
+    /// When the variable names none; the same on all ranks.
+    pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
+        let allowed = match std::env::var(VARIABLE) {
+            Err(_) => Ok(Self::Avx512),
+            Ok(name) => Self::named(&name),
+        };
+        let own = Self::of_this_machine().min(agree(comm, allowed)?);
+        let mut level = [f64::from(own as u8)];
         comm::min(comm, &mut level);
-        let all = [Self::Baseline, Self::Avx2, Self::Avx512];
-        all[level[0] as usize]
+        Ok(ALL[level[0] as usize])
+    }
+
+    fn named(name: &str) -> Result<Self> {
+        let short = |instructions: Self| instructions.name().replace('-', "").to_lowercase();
+        let found = ALL.into_iter().find(|known| short(*known) == name);
+        found.ok_or_else(|| {
+            let known = ALL.map(short).join(", ");
+            Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
+        })
     }
 
     /// Its name, as a summary shows it.
@@ -54,5 +81,21 @@ impl Instructions {
     #[cfg(not(target_arch = "x86_64"))]
     fn of_this_machine() -> Self {
         Self::Baseline
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_the_variable() {
+        assert_eq!(Instructions::named("avx512").unwrap(), Instructions::Avx512);
+        assert_eq!(
+            Instructions::named("baseline").unwrap(),
+            Instructions::Baseline
+        );
+        let error = Instructions::named("sse").unwrap_err();
+        assert!(error.message.contains("baseline, avx2, avx512"), "{error}");
     }
 }

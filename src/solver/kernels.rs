@@ -18,7 +18,7 @@ pub trait Pick {
 }
 
 /// Something that is summed over the bonds of points.
-pub trait Kernel<const D: usize>: Sync {
+pub trait Kernel<const D: usize>: Copy + Sync {
     /// Eight sums of each quantity.
     type Sums: Copy;
 
@@ -104,6 +104,7 @@ impl<const D: usize> Default for Response<D> {
 }
 
 /// Breaks bonds, unless that has been done, and sums their forces.
+#[derive(Clone, Copy)]
 pub struct Force<L, F> {
     /// Laws of the own and of the far end.
     pub laws: [L; 2],
@@ -184,6 +185,7 @@ pub struct StateSums {
 }
 
 /// Breaks bonds and sums the states of points.
+#[derive(Clone, Copy)]
 pub struct State<L, F> {
     /// Laws of the own and of the far end.
     pub laws: [L; 2],
@@ -235,6 +237,7 @@ impl<L: Law, F: Failure, const D: usize> Kernel<D> for State<L, F> {
 }
 
 /// The smallest stretch s_min of the intact bonds; outputs start at +∞.
+#[derive(Clone, Copy)]
 pub struct SmallestStretch;
 
 impl<const D: usize> Kernel<D> for SmallestStretch {
@@ -278,6 +281,7 @@ pub struct Stored {
 }
 
 /// Sums up what the intact bonds hold.
+#[derive(Clone, Copy)]
 pub struct Energy<L> {
     /// Law of the own end.
     pub law: L,

@@ -6,6 +6,7 @@ use super::geometry::Loaded;
 use super::kernels::{Kernel, Pick};
 
 /// Sums what gives a point's constant, over its whole family.
+#[derive(Clone, Copy)]
 pub struct Constant<L> {
     /// The law of the own end.
     pub law: L,
@@ -29,6 +30,35 @@ impl<L: Law, const D: usize> Kernel<D> for Constant<L> {
     fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sum: &mut Lanes) -> u8 {
         let share = self.law.constant_share(bonds.bond.length) * bonds.volume;
         *sum += A::select(share * bonds.weights.own(), bonds.filled, 0.0);
+        bonds.intact
+    }
+
+    #[inline(always)]
+    fn finish(&self, sum: &Lanes, pick: &impl Pick, output: &mut f64) {
+        *output += pick.sum(*sum);
+    }
+}
+
+/// Sums the volume of the neighbours in each point's own family, m³.
+#[derive(Clone, Copy)]
+pub struct FamilyVolume;
+
+impl<const D: usize> Kernel<D> for FamilyVolume {
+    type Sums = Lanes;
+    type Output = f64;
+
+    fn linear(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn start(&self) -> Lanes {
+        Lanes::splat(0.0)
+    }
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, sum: &mut Lanes) -> u8 {
+        *sum += A::select(bonds.volume, bonds.family(), 0.0);
         bonds.intact
     }
 
@@ -64,6 +94,7 @@ fn finish_tensor(sums: &[Lanes; 6], pick: &impl Pick, output: &mut [f64; 6]) {
 
 /// Sums D = Σ V C n⊗n over the intact bonds, undeformed (N/m⁴), as xx, yy, zz, xy, yz, xz; C adds up
 /// [`Law::stiffness`] of both ends.
+#[derive(Clone, Copy)]
 pub struct Stiffness<L> {
     /// Laws of the own and of the far end.
     pub laws: [L; 2],
@@ -104,6 +135,7 @@ impl<L: Law, const D: usize> Kernel<D> for Stiffness<L> {
 /// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as
 /// Σ T⊗ξ Ṽ; times Fᵀ it is this, the Kirchhoff stress, symmetric and turning with the body. Linear
 /// laws have ξ in place of Y.
+#[derive(Clone, Copy)]
 pub struct Stress<L> {
     /// Law of the own end.
     pub law: L,
@@ -148,6 +180,7 @@ pub struct Expansion {
 }
 
 /// Sums what gives the dilatation θ = (d/m) Σ ω|ξ|εṼ.
+#[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether to take ε linear in η.
     pub linear: bool,

@@ -44,7 +44,8 @@ pub struct Passes<const D: usize> {
     nodes: Vec<Node>,
     /// The points as lattices read them, by grid.
     places: Vec<Places<D>>,
-    instructions: Instructions,
+    /// The vector instructions of the loops.
+    pub instructions: Instructions,
     /// The laws of each block.
     pub blocks: Vec<BlockLaws>,
     /// Constant of each local point; empty if no law reads it.

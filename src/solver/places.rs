@@ -20,6 +20,15 @@ pub struct Places<const D: usize> {
     thresholds: Vec<f64>,
 }
 
+/// The arrays of [`Places`], to be kept at hand in a loop.
+#[derive(Clone, Copy)]
+pub struct View<'a, const D: usize> {
+    displacement: [&'a [f64]; D],
+    constants: &'a [f64],
+    states: &'a [f64],
+    thresholds: &'a [f64],
+}
+
 /// What is read of the own ends of bonds.
 #[derive(Clone, Copy)]
 pub struct Here<const D: usize> {
@@ -94,6 +103,18 @@ impl<const D: usize> Places<D> {
         );
     }
 
+    /// The arrays.
+    pub fn view(&self) -> View<'_, D> {
+        View {
+            displacement: self.displacement.each_ref().map(Vec::as_slice),
+            constants: &self.constants,
+            states: &self.states,
+            thresholds: &self.thresholds,
+        }
+    }
+}
+
+impl<const D: usize> View<'_, D> {
     /// The own ends of the bonds of eight points from a place on.
     ///
     /// # Safety
@@ -103,12 +124,12 @@ impl<const D: usize> Places<D> {
         // SAFETY: passed on to the caller.
         let of = |needed, values: &[f64]| unsafe { eight(needed, values, place) };
         Here {
-            displacement: std::array::from_fn(|d| of(true, &self.displacement[d])),
+            displacement: std::array::from_fn(|d| of(true, self.displacement[d])),
             end: End {
-                constant: of(K::CONSTANT, &self.constants),
-                state: of(K::STATE, &self.states),
+                constant: of(K::CONSTANT, self.constants),
+                state: of(K::STATE, self.states),
             },
-            threshold: of(K::THRESHOLD, &self.thresholds),
+            threshold: of(K::THRESHOLD, self.thresholds),
         }
     }
 
@@ -129,17 +150,18 @@ impl<const D: usize> Places<D> {
         let far = vector.far(offset);
         // SAFETY: passed on to the caller; `far` is a place with seven more after it.
         let of = |needed, values: &[f64]| unsafe { eight(needed, values, far) };
-        let eta = std::array::from_fn(|d| of(true, &self.displacement[d]) - here.displacement[d]);
+        let eta = std::array::from_fn(|d| of(true, self.displacement[d]) - here.displacement[d]);
         let reference = Reference {
             along: std::array::from_fn(|d| Lanes::splat(offset.reference[d])),
             square: Lanes::splat(offset.square),
             length: Lanes::splat(offset.length),
             inverse: Lanes::splat(offset.inverse),
+            inverse_square: Lanes::splat(offset.inverse_square),
         };
         let deformed = deform::<A, D>(&reference, eta, kernel.linear());
         let there = End {
-            constant: of(K::CONSTANT, &self.constants),
-            state: of(K::STATE, &self.states),
+            constant: of(K::CONSTANT, self.constants),
+            state: of(K::STATE, self.states),
         };
         Loaded {
             bond: deformed.bond,
@@ -154,7 +176,7 @@ impl<const D: usize> Places<D> {
                 [true, true] => Weights::Each(offset.weights.map(Lanes::splat)),
             },
             ends: [here.end, there],
-            thresholds: [here.threshold, of(K::THRESHOLD, &self.thresholds)],
+            thresholds: [here.threshold, of(K::THRESHOLD, self.thresholds)],
             intact: vector.intact[o],
             filled: 0,
             breakable: vector.breakable.map_or(u8::MAX, |bits| bits[o]),

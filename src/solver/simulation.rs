@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::comm::{self, Communicator, agree};
 use crate::deck::plan::{Plan, StepRule};
 use crate::error::{Error, Result};
-use crate::partition::{Domain, distribute};
+use crate::partition::distribute;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, grids};
@@ -88,18 +88,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let bodies = plan.bodies.iter();
         let blocks: Vec<_> = bodies.map(|body| block_laws(plan, body)).collect();
         let halo = std::mem::take(&mut domain.halo);
-        let bonds = assign(plan, &domain, &blocks, families);
-        let mut forces = Forces::new(comm, &model, bonds, grids, halo, blocks);
-        let mut state = State::new(&model);
-
-        let stiffness = forces.stiffness(&model);
-        let stable = stable_step(comm, &model, &stiffness);
-        let (step, last) = choose_step(plan, stable)?;
-        let stored = forces.stored(&model, &state.displacement);
-        let family_volume = stored.iter().map(|stored| stored.volume).collect();
-        pre_crack(plan, &domain, &mut forces);
-        protect(plan, &model, comm, &mut forces);
+        // The points are known to the model from here on.
         drop(domain);
+        let bonds = assign(plan, &model, &blocks, families);
+        let mut forces = Forces::new(comm, &model, bonds, grids, halo, blocks)?;
+        let stable = stable_step(comm, &model, &forces.stiffness(&model));
+        let mut state = State::new(&model);
+        let (step, last) = choose_step(plan, stable)?;
+        let family_volume = forces.family_volume(&model);
+        pre_crack(plan, &model, &mut forces);
+        protect(plan, &model, comm, &mut forces);
 
         apply_initials(plan, comm, &model, &mut state)?;
         let conditions = Conditions::new(plan, comm, &model)?;
@@ -268,16 +266,19 @@ pub(super) fn steps_to(end: f64, step: f64) -> f64 {
 }
 
 /// Breaks the bonds that cross a pre-crack. Both ends ask with the lower id first.
-fn pre_crack<const D: usize>(plan: &Plan, domain: &Domain, forces: &mut Forces<D>) {
+fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<D>) {
     if plan.cracks.is_empty() {
         return;
     }
     forces.cut(|here, there| {
-        let (a, b) = (&domain.points[here], &domain.points[there]);
-        let (first, second) = if a.id < b.id { (a, b) } else { (b, a) };
+        let (first, second) = match model.ids[here] < model.ids[there] {
+            true => (here, there),
+            false => (there, here),
+        };
+        let [from, to] = [first, second].map(|point| model.position(point));
         plan.cracks
             .iter()
-            .any(|crack| points::crack::crosses(crack, first.position, second.position))
+            .any(|crack| points::crack::crosses(crack, from, to))
     });
 }
 

@@ -212,7 +212,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(&self, mut rows: Rows<'b>, base: usize, outputs: &mut [K::Output]) {
-        let Self { kernel, cloud } = self;
+        let (kernel, cloud) = (*self.kernel, self.cloud);
         for k in 0..rows.len() {
             let row: Row<'_> = rows.row(k);
             let mut sums = kernel.start();
@@ -220,7 +220,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
             let here = unsafe { cloud.here::<K, D>(row.point) };
             for group in 0..row.neighbours.len() {
                 // SAFETY: as above.
-                let bonds = unsafe { cloud.load::<A, K, D>(*kernel, &here, &row, group) };
+                let bonds = unsafe { cloud.load::<A, K, D>(&kernel, &here, &row, group) };
                 let bits = kernel.add::<A>(&bonds, &mut sums);
                 if bits != bonds.intact {
                     row.intact[group] = bits;
@@ -267,6 +267,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
             volumes,
             filled,
         } = self;
+        // Copies, which the loop can keep in registers.
+        let (kernel, volumes, places) = (**kernel, *volumes, places.view());
         for k in 0..vectors.len() {
             let vector: Adjacent<'_> = vectors.vector(k);
             let filled = filled.get(vector.bits.clone());
@@ -275,8 +277,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
             let here = unsafe { places.here::<K>(vector.place) };
             for o in 0..vector.offsets.len() {
                 // SAFETY: as above.
-                let mut bonds =
-                    unsafe { places.load::<A, K>(*kernel, &here, &vector, o, *volumes) };
+                let mut bonds = unsafe { places.load::<A, K>(&kernel, &here, &vector, o, volumes) };
                 if K::FILLED {
                     bonds.filled = filled.map_or(0, |bits| bits[o]);
                 }
