@@ -182,9 +182,9 @@ fn run_with(
 
 #[test]
 fn all_instructions_agree() {
-    let folder = Folder::new("instructions");
     let ratio = ", poisson_ratio = 0.3";
     for family in ["list", "lattice"] {
+        let folder = Folder::new(&format!("instructions-{family}"));
         let grid = format!("horizon = 2.3\nfamily = '{family}'");
         let deck = deck(PLANE, "ordinary", ratio, &grid, "0.25");
         let best = run_with("avx512", &folder, 1, &deck);
@@ -208,9 +208,15 @@ fn all_instructions_agree() {
             assert_eq!(difference(&found, &three), None, "{instructions}");
         }
     }
+}
+
+#[test]
+fn unknown_instructions_are_told() {
+    let folder = Folder::new("no-instructions");
+    let deck = folder.write("deck.toml", &deck(PLANE, "pmb", "", "horizon = 3", "0"));
     let mut command = fissure(2);
     command.env("FISSURE_INSTRUCTIONS", "sse9");
-    let output = finish(command.arg("run").arg(folder.join("avx2.toml")));
+    let output = finish(command.arg("run").arg(deck));
     assert_eq!(output.status.code(), Some(2));
     assert!(
         text(&output).contains("`sse9` is none of"),
