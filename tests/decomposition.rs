@@ -134,9 +134,10 @@ every_steps = 10
 const FEW: &str = "
 dimension = '1d'
 grid = { spacing = 1, horizon = 1.5 }
-material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+material.rubber.pmb = { density = 2, youngs_modulus = 5, damping = 0.1 }
 body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [3] } }
 initial.pull.displacement = ['0.01*x']
+condition.push = { set = 'all', body_force = ['0.01*x'] }
 time = { end = 5 }
 ";
 
@@ -197,6 +198,13 @@ fn a_plate_of_two_materials() {
 fn a_plate_of_two_materials_with_listed_bonds() {
     let deck = PLATE.replace("[grid]", "[grid]\nfamily = 'list'");
     same_everywhere("listed", &deck, true);
+}
+
+#[test]
+fn bonds_as_long_as_the_volume_correction_reaches() {
+    let horizon = "horizon = '2.5*dx'\nvolume_correction = 'linear'";
+    let deck = PLATE.replace("horizon = '3*dx'", horizon);
+    same_everywhere("tie", &deck, true);
 }
 
 #[test]

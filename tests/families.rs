@@ -165,6 +165,94 @@ fn normalised_bonds() {
     compare::<2>(&deck(PLANE, "normalised_pmb", "", grid, "0.25"));
 }
 
+/// A plate from a file, regular but for what `place` does to it, written with few digits.
+fn plate_from_file(place: impl Fn(f64) -> f64) -> String {
+    let mut text = String::from("x y volume block\n");
+    for k in 0..600 {
+        let [x, y] = [k % 30, k / 30].map(f64::from);
+        if (x - 12.0).hypot(y - 9.0) > 3.0 {
+            text += &format!("{:.6} {:.6} 0.06 1\n", 0.3 * place(x) + 0.1, 0.2 * y - 0.7);
+        }
+    }
+    text
+}
+
+const FROM_FILE: &str = "
+dimension = 'plane-stress'
+[grid]
+horizon = 0.95
+[material.one.pmb]
+density = 2
+youngs_modulus = 5
+[body.plate]
+material = 'one'
+points.file = 'points.txt'
+[initial.burst]
+velocity = ['0.02*x', '0.02*y + 0.003*sin(x)']
+[time]
+end = 2
+";
+
+#[test]
+fn a_grid_is_found_in_a_file() {
+    let folder = Folder::new("grid-in-a-file");
+    let with = |family: &str| {
+        let text = FROM_FILE.replace("[grid]", &format!("[grid]\nfamily = '{family}'"));
+        folder.write(&format!("{family}.toml"), &text)
+    };
+    let check = |family: &str| {
+        let mut command = fissure(1);
+        command.arg("check").arg(with(family));
+        finish(&mut command)
+    };
+    folder.write("points.txt", &plate_from_file(|x| x));
+    let count = |checked: &str, name: &str| {
+        let mut lines = checked.lines().map(str::trim);
+        let number = lines.find_map(|line| line.strip_prefix(name));
+        number.unwrap().trim().to_owned()
+    };
+    let checked = text(&check("auto"));
+    let [bonds, kept] = ["bonds", "of them as lattice"].map(|name| count(&checked, name));
+    assert_eq!(bonds, kept, "{checked}");
+    // The same bits however the file's points are dealt out, and the same physics as with lists.
+    let run = |family: &str, ranks: usize| {
+        let out = folder.join(format!("{family}{ranks}"));
+        let mut command = fissure(ranks);
+        command
+            .arg("run")
+            .arg(with(family))
+            .arg("--output")
+            .arg(&out);
+        succeed(&mut command);
+        datasets(&out.join("result.vtkhdf"))
+    };
+    let [one, three, list] = [run("lattice", 1), run("auto", 3), run("list", 1)];
+    assert_eq!(difference(&one, &three), None);
+    let last = |all: &BTreeMap<String, Vec<u64>>| -> Vec<f64> {
+        let (_, bits) = all
+            .iter()
+            .rfind(|(name, _)| name.starts_with("displacement"))
+            .unwrap();
+        bits.iter().map(|bits| f64::from_bits(*bits)).collect()
+    };
+    for (a, b) in last(&one).into_iter().zip(last(&list)) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    // A column that is a little off.
+    folder.write(
+        "points.txt",
+        &plate_from_file(|x| if x == 7.0 { 7.01 } else { x }),
+    );
+    let wrong = check("lattice");
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(
+        text(&wrong).contains("do not lie on a regular grid"),
+        "{}",
+        text(&wrong)
+    );
+    assert_eq!(count(&text(&check("auto")), "of them as lattice"), "0");
+}
+
 /// The values of all datasets under a limit to the instructions.
 fn run_with(
     instructions: &str,

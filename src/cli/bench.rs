@@ -204,6 +204,10 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         ("peak", resident(|r| r.peak, after)),
     ];
     let instructions = simulation.forces.instructions();
+    let family = match total(simulation.forces.lattice_bonds()) > 0.0 {
+        true => Family::Lattice,
+        false => Family::List,
+    };
     drop(simulation);
     let limits = match arguments.no_limits {
         true => None,
@@ -223,7 +227,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     };
     Ok(Figures {
         law: arguments.law,
-        family: arguments.family,
+        family,
         instructions,
         failure: !arguments.no_failure,
         edges: arguments.points,

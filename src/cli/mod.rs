@@ -247,7 +247,9 @@ Examples:
   fissure bench --law lps --no-failure --threads 1
   fissure bench --points 128,128,64             edges of a block
   mpirun -n 2 --bind-to none fissure bench --threads 1
-  fissure bench --json                          one line for scripts")]
+  fissure bench --json                          one line for scripts
+
+FISSURE_INSTRUCTIONS=avx2 or baseline limits the vector instructions of the loops.")]
 struct BenchArguments {
     /// The law of the bonds.
     #[arg(long, value_enum, default_value_t = bench::Law::Pmb)]

@@ -77,6 +77,7 @@ impl Keeper {
             rows: recorder.file.history_rows(),
             start: recorder.observer.start().unwrap_or_default(),
             deck: self.deck.clone(),
+            instructions: simulation.forces.instructions().name().to_owned(),
         };
         let saved = simulation.save(&recorder.order);
         self.checkpoints
@@ -120,6 +121,14 @@ pub fn restart<const D: usize>(
             path.display(),
             lines.join("\n  ")
         )));
+    }
+    let instructions = simulation.forces.instructions().name();
+    if header.instructions != instructions {
+        warn(format!(
+            "the run used {} instructions until now, and goes on with {instructions}: it will end \
+             with other last digits than without the stop; see FISSURE_INSTRUCTIONS",
+            header.instructions
+        ));
     }
     let fingerprint = fingerprint(simulation);
     if header.points != simulation.model.total || header.fingerprint != fingerprint {

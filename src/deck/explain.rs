@@ -39,9 +39,27 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
     }
     for material in deck.material.values_mut() {
-        let any_ratio = matches!(material.get_ref(), super::grammar::Material::Ordinary(_));
+        use super::grammar::{Form, Influence, Material, SurfaceCorrection};
+        let any_ratio = matches!(material.get_ref(), Material::Ordinary(_));
+        let corrected = matches!(
+            material.get_ref(),
+            Material::Pmb(_) | Material::Proportional(_) | Material::LinearMicroelastic(_)
+        );
+        let normalised = matches!(material.get_ref(), Material::NormalisedPmb(_));
         let elastic = material.get_mut().elastic_mut();
         elastic.damping = elastic.damping.take().or(number(0.0));
+        fn unless_given<T>(key: &mut Option<Spanned<T>>, value: T) {
+            key.get_or_insert_with(|| Spanned::new(0..0, value));
+        }
+        if corrected {
+            unless_given(&mut elastic.surface_correction, SurfaceCorrection::None);
+        }
+        if normalised {
+            unless_given(&mut elastic.form, Form::Energy);
+        }
+        if any_ratio {
+            unless_given(&mut elastic.influence, Influence::Constant);
+        }
         let own = plan.dimension.bond_based_poisson_ratio();
         let without_ratio = [
             &elastic.youngs_modulus,

@@ -112,8 +112,9 @@ pub struct Grid {
     /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
-    /// How bonds are kept: `"lattice"`, one bit each, for points at the centres of lattice cells,
-    /// `"list"` for any, or `"auto"`, a lattice where possible. Results differ by rounding only.
+    /// How bonds are kept: `"lattice"`, one bit each, for points on a regular grid (those of a file
+    /// may be), `"list"` for any, or `"auto"`, a lattice where possible. Bonds between bodies on
+    /// different grids are always listed. Results differ by rounding only.
     #[serde(default = "automatic")]
     pub family: Spanned<Family>,
 }

@@ -157,6 +157,8 @@ pub enum FamilyRule {
     Auto,
     /// In lists.
     List,
+    /// As bits; every body must lie on a lattice.
+    Lattice,
 }
 
 /// The bonds between blocks.

@@ -32,7 +32,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     })?;
     let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(&scope, deck, &bodies)?;
-    let family = family(&scope, deck, &bodies)?;
+    let family = family(&scope, deck)?;
     let interface = interface::interface(&scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| {
         shapes::crack(&scope, name, table)
@@ -133,18 +133,19 @@ fn volume_correction(
         VolumeCorrection::Linear => plan::VolumeCorrection::Linear,
         VolumeCorrection::Exact => plan::VolumeCorrection::Exact,
     };
-    let unequal = |body: &plan::Body| match &body.points {
-        plan::PointSource::File { .. } => None,
+    let gauss = grid.quadrature == Quadrature::Gauss;
+    let without_cells = |body: &plan::Body| match &body.points {
+        plan::PointSource::File { .. } => Some("has its points from a file"),
+        plan::PointSource::Lattice { .. } if gauss => Some("has Gauss points"),
         plan::PointSource::Lattice { spacing, .. } => {
             let edges = &spacing[..scope.dimension];
             let alike = edges.iter().all(|edge| *edge == edges[0]);
             (!alike).then_some("has cells with edges of different lengths")
         }
     };
-    let reason = |body| not_at_centres(grid, body).or_else(|| unequal(body));
     let reason = bodies
         .iter()
-        .find_map(|body| Some((&body.name, reason(body)?)));
+        .find_map(|body| Some((&body.name, without_cells(body)?)));
     let Some((name, reason)) = reason else {
         return Ok(correction);
     };
@@ -155,30 +156,15 @@ fn volume_correction(
     Err(scope.error(grid.volume_correction.span(), message))
 }
 
-/// Why a body's points do not lie at the centres of lattice cells, if they do not.
-fn not_at_centres(grid: &Grid, body: &plan::Body) -> Option<&'static str> {
-    match body.points {
-        plan::PointSource::File { .. } => Some("has its points from a file"),
-        plan::PointSource::Lattice { .. } if grid.quadrature == Quadrature::Gauss => {
-            Some("has Gauss points")
-        }
-        plan::PointSource::Lattice { .. } => None,
-    }
-}
-
-fn family(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::FamilyRule> {
+fn family(scope: &Scope, deck: &Deck) -> Result<plan::FamilyRule> {
     let grid = deck.grid.get_ref();
-    let reason = bodies
-        .iter()
-        .find_map(|body| Some((&body.name, not_at_centres(grid, body)?)));
-    match (grid.family.get_ref(), reason) {
-        (Family::List, _) => Ok(plan::FamilyRule::List),
-        (Family::Auto, _) | (Family::Lattice, None) => Ok(plan::FamilyRule::Auto),
-        (Family::Lattice, Some((name, reason))) => {
-            let message = format!(
-                "[grid] family: only points at the centres of lattice cells have the same \
-                 neighbours all over, and [body.{name}] {reason}; take \"auto\" or \"list\""
-            );
+    match grid.family.get_ref() {
+        Family::Auto => Ok(plan::FamilyRule::Auto),
+        Family::List => Ok(plan::FamilyRule::List),
+        Family::Lattice if grid.quadrature == Quadrature::Midpoint => Ok(plan::FamilyRule::Lattice),
+        Family::Lattice => {
+            let message = "[grid] family: Gauss points do not have the same neighbours all over, \
+                           as those of a lattice do; take \"auto\" or \"list\"";
             Err(scope.error(grid.family.span(), message))
         }
     }

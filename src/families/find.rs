@@ -21,10 +21,8 @@ pub fn find(
     dimension: usize,
 ) -> Result<(Vec<Family>, Vec<Arc<Grid>>)> {
     let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-    let grids: Vec<Arc<Grid>> = frames
-        .iter()
-        .map(|frame| Arc::new(Grid::new(frame.clone(), domain, longest)))
-        .collect();
+    let layout = |frame: &GridFrame| Grid::new(frame.clone(), domain, longest).map(Arc::new);
+    let grids = frames.iter().map(layout).collect::<Result<Vec<_>>>()?;
     let shared = |pair: usize| {
         let [here, there] = [pair / blocks, pair % blocks];
         frames

@@ -10,8 +10,11 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
+use crate::error::{Error, Result};
 use crate::material::lanes::WIDTH;
 use crate::partition::Domain;
+
+use super::search::at_one_place;
 
 /// A block number for holes.
 pub(super) const HOLE: u16 = u16::MAX;
@@ -78,7 +81,10 @@ pub struct Grid {
 impl Grid {
     /// Lays out the points of a domain that lie on a grid; `longest` is the length of the longest
     /// bond, m.
-    pub fn new(frame: GridFrame, domain: &Domain, longest: f64) -> Self {
+    ///
+    /// # Errors
+    /// When two points lie at the same place, or there are too many holes between them.
+    pub fn new(frame: GridFrame, domain: &Domain, longest: f64) -> Result<Self> {
         let cells: Vec<([i64; 3], u32)> = domain
             .points
             .iter()
@@ -94,6 +100,10 @@ impl Grid {
         let band = |x: i64| starts.partition_point(|start| *start <= x) as i64;
         let mut cells = cells;
         cells.par_sort_unstable_by_key(|([z, y, x], _)| [band(*x), *z, *y, *x]);
+        if let Some(pair) = cells.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let [a, b] = [pair[0].1, pair[1].1].map(|index| &domain.points[index as usize]);
+            return Err(at_one_place(a, b));
+        }
         let line_of = |([z, y, x], _): &([i64; 3], u32)| [band(*x), *y, *z];
         let mut lines: Vec<Line> = Vec::new();
         let mut total = 0;
@@ -125,6 +135,12 @@ impl Grid {
             [most[0].max(next[0]), most[1].max(next[1])]
         });
         let places = front as usize + total + back as usize;
+        if places > i32::MAX as usize {
+            return Err(Error::run(
+                "a rank's part of a grid has too many holes for a lattice (2³¹ places at most); \
+                 use more ranks or `family = \"list\"`",
+            ));
+        }
         let (mut points, mut blocks) = (vec![0; places], vec![HOLE; places]);
         let chunks = cells.chunk_by(|a, b| line_of(a) == line_of(b));
         for (line, own) in lines.iter_mut().zip(chunks) {
@@ -142,14 +158,14 @@ impl Grid {
             };
             runs(&points, wanted)
         });
-        Self {
+        Ok(Self {
             frame,
             lines,
             points,
             blocks,
             runs,
             by_line,
-        }
+        })
     }
 
     /// Number of places, those before and after all lines included.
@@ -225,7 +241,7 @@ fn runs(points: &[u32], wanted: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) 
     let mut runs: Vec<Run> = Vec::new();
     let mut starts = Vec::new();
     for place in 0..points.len() {
-        if place % CHUNK == 0 {
+        if place.is_multiple_of(CHUNK) {
             starts.push(runs.len() as u32);
         }
         if !wanted(place) {
@@ -234,7 +250,7 @@ fn runs(points: &[u32], wanted: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) 
         let (point, place) = (points[place], place as u32);
         match runs.last_mut() {
             Some(run)
-                if place as usize % CHUNK != 0
+                if !(place as usize).is_multiple_of(CHUNK)
                     && run.place + run.length == place
                     && run.point + run.length == point =>
             {

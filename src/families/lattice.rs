@@ -130,8 +130,14 @@ impl BondLattice {
     ) -> Self {
         let (offsets, around) = offsets(grid.frame.spacing, cutoff, dimension);
         let mut shifts = vec![0; grid.lines.len() * around.len()];
+        // A body whose points are farther apart than its bonds reach has none.
+        let none = offsets.is_empty();
         let origin = |line: &super::grid::Line| line.start as i64 - line.first;
-        for (line, shifts) in grid.lines.iter().zip(shifts.chunks_mut(around.len())) {
+        for (line, shifts) in grid
+            .lines
+            .iter()
+            .zip(shifts.chunks_mut(around.len().max(1)))
+        {
             for ([y, z], shift) in around.iter().zip(shifts) {
                 // Where there is no line there is no bond either, so any place will do.
                 if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
@@ -153,7 +159,10 @@ impl BondLattice {
             own_volume: volume(here),
             offsets,
             weighted: [false; 2],
-            vectors: vectors(&grid, domain.owned),
+            vectors: match none {
+                true => Vec::new(),
+                false => vectors(&grid, domain.owned),
+            },
             around,
             shifts,
             intact: Vec::new(),
@@ -167,7 +176,7 @@ impl BondLattice {
 
     /// Sets all bits of bonds and keeps the vectors that have any.
     fn find_bonds(&mut self) {
-        let count = self.offsets.len();
+        let count = self.offsets.len().max(1);
         let mut intact = vec![0; self.vectors.len() * count];
         intact
             .par_chunks_mut(CHUNK * count)

@@ -73,6 +73,16 @@ struct Chunk {
     places: Vec<u32>,
 }
 
+/// The error that two points lie at the same place.
+pub(super) fn at_one_place(a: &Point, b: &Point) -> Error {
+    Error::input(format!(
+        "points {} and {} lie at the same place, {:?} m; do two bodies overlap?",
+        a.id.min(b.id),
+        a.id.max(b.id),
+        a.position,
+    ))
+}
+
 /// The bond lists of a domain, for blocks 0 … `blocks` − 1; `cutoffs` has the longest bond (m) of each
 /// pair of them, row by row, and is symmetric.
 ///
@@ -110,7 +120,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
         list.intact.shrink_to_fit();
         let groups = list.neighbours.par_iter();
         let largest = groups.map(|group| group.iter().copied().fold(0, u32::max));
-        list.reach = largest.max().map_or(0, |index| index as usize + 1);
+        let largest = largest.max().max(list.points.last().copied());
+        list.reach = largest.map_or(0, |index| index as usize + 1);
     }
     Ok(lists)
 }
@@ -137,19 +148,14 @@ impl Chunk {
                 if squared == 0.0 {
                     let other = order.local[place as usize] as usize;
                     if other != index {
-                        coincident = Some(domain.points[other].id);
+                        coincident = Some(other);
                     }
                 } else if blocks == 1 || squared <= squares[order.block(place)] {
                     self.places.push(place);
                 }
             });
             if let Some(other) = coincident {
-                return Err(Error::input(format!(
-                    "points {} and {} lie at the same place, {:?} m; do two bodies overlap?",
-                    here.id.min(other),
-                    here.id.max(other),
-                    here.position,
-                )));
+                return Err(at_one_place(here, &domain.points[other]));
             }
             self.places.sort_unstable();
             let mut rest = &self.places[..];

@@ -17,6 +17,12 @@ const SLICES: u32 = 256;
 /// Offsets are told apart to this share of the cell's edge.
 const RESOLUTION: f64 = 1e-6;
 
+/// The longest bond (m) whose cell counts, where those of a length (m) count nothing any more: what
+/// rounding makes of them must not matter.
+fn inside(length: f64) -> f64 {
+    length * (1.0 - 1e-9)
+}
+
 /// The share of the cells of one edge in the families of one horizon.
 pub struct CellShare {
     correction: VolumeCorrection,
@@ -43,8 +49,8 @@ impl CellShare {
         let half = 0.5 * self.edge;
         match self.correction {
             VolumeCorrection::None => cutoff(self.horizon),
-            VolumeCorrection::Linear => self.horizon + half,
-            VolumeCorrection::Exact => self.horizon + half * (self.dimension as f64).sqrt(),
+            VolumeCorrection::Linear => inside(self.horizon + half),
+            VolumeCorrection::Exact => inside(self.horizon + half * (self.dimension as f64).sqrt()),
         }
     }
 

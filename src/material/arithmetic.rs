@@ -101,6 +101,15 @@ mod wide {
         store(root)
     }
 
+    /// What [`super::Wide`] starts from: 1/√a to 14 bits, of which makers are free to choose.
+    ///
+    /// # Safety
+    /// The machine must have AVX-512F.
+    #[target_feature(enable = "avx512f")]
+    pub unsafe fn estimate_of_inverse_sqrt(a: Lanes) -> Lanes {
+        store(_mm512_rsqrt14_pd(load(a)))
+    }
+
     /// # Safety
     /// The machine must have AVX-512F.
     #[inline]
@@ -191,6 +200,9 @@ mod wide {
         unsafe { std::mem::transmute(a) }
     }
 }
+
+#[cfg(target_arch = "x86_64")]
+pub use wide::estimate_of_inverse_sqrt;
 
 #[cfg(target_arch = "x86_64")]
 impl Arithmetic for Wide {

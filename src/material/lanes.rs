@@ -1,7 +1,7 @@
 //! Eight numbers that are worked on together: the same quantity of eight bonds.
 //!
 //! Plain arrays and IEEE operations without contraction: whatever instructions the compiler picks,
-//! the bits are the same.
+//! the bits are the same. Operations of which this does not hold are in [`super::arithmetic`].
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 

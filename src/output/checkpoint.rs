@@ -22,7 +22,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 1;
+const VERSION: i64 = 2;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +43,8 @@ pub struct Header {
     pub start: (f64, u64),
     /// The deck with every default filled in.
     pub deck: String,
+    /// The vector instructions that the run used.
+    pub instructions: String,
 }
 
 /// The two checkpoints of a folder.
@@ -165,6 +167,10 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let mut file = CollectiveFile::open(path, comm)?;
     let numbers = file.integers_attribute("/", "numbers")?;
     let deck = file.text_attribute("/", "deck")?;
+    let instructions = match numbers.first() {
+        Some(&VERSION) => file.text_attribute("/", "instructions")?,
+        _ => String::new(),
+    };
     file.close()?;
     match numbers[..] {
         [
@@ -186,6 +192,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             rows: rows as u64,
             start: (f64::from_bits(energy as u64), intact as u64),
             deck,
+            instructions,
         }),
         _ => Err(Error::input(format!(
             "{} was written by another version of Fissure",
@@ -240,6 +247,7 @@ fn write_file(
     ];
     file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
+    file.set_attribute("/", "instructions", Attribute::Text(&header.instructions))?;
     let points = Rows::Fixed(header.points);
     let (start, total) = crate::comm::scan(comm, saved.bonds.len() as u64);
     let values = file.create_dataset::<f64>("/values", points, Some(saved.width))?;

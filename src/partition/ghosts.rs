@@ -13,6 +13,7 @@ use crate::points::bins::Bins;
 
 use super::cells::Cells;
 use super::domain::Domain;
+use super::graph::NOBODY;
 use super::received;
 
 /// The widest message: three components a point.
@@ -91,7 +92,9 @@ fn offers(
     for points in owned.chunk_by(|a, b| cell(a) == cell(b)) {
         let adjacent = cells.adjacent(cell(&points[0]));
         let touching: BTreeSet<usize> = adjacent
-            .map(|(other, _)| owner[other] as usize)
+            .map(|(other, _)| owner[other])
+            .filter(|other| *other != NOBODY)
+            .map(|other| other as usize)
             .filter(|other| *other != comm.rank())
             .collect();
         for other in &touching {

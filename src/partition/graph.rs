@@ -11,10 +11,13 @@ const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 /// worked on together.
 const ALONG_X: f64 = 1.5;
 
+/// The rank of cells without points.
+pub const NOBODY: u32 = u32::MAX;
+
 /// Below this many cells a part recursive bisection is used: the k-way method leaves parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// The rank of each cell, given the number of points in each. A cell's weight is the bonds of its
+/// The rank of each cell, [`NOBODY`] where there is no point, given the number of points in each. A cell's weight is the bonds of its
 /// points, an edge's weight the bonds across.
 ///
 /// # Errors
@@ -23,7 +26,7 @@ pub fn partition(cells: &Cells, occupation: &[u64], ranks: usize) -> Result<Vec<
     let occupied: Vec<usize> = (0..cells.count())
         .filter(|cell| occupation[*cell] > 0)
         .collect();
-    let mut owner = vec![0; cells.count()];
+    let mut owner = vec![NOBODY; cells.count()];
     if occupied.len() <= ranks {
         for (rank, cell) in occupied.iter().enumerate() {
             owner[*cell] = rank as u32;

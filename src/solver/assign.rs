@@ -2,20 +2,16 @@
 
 use crate::damage::CriticalStretch;
 use crate::deck::plan::{
-    Body, FamilyRule, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Quadrature, Toughness,
-    VolumeCorrection,
+    Body, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Toughness, VolumeCorrection,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::families::{CellShare, Family, GridFrame};
+use crate::families::{CellShare, Family};
 use crate::material::{AnyLaw, Influence, LinearMicroelastic, Normalised, Ordinary, Pmb};
 use crate::points::distance_squared;
 
 use super::laws::{BlockLaws, Bonds, FamilyFailure, FamilyLaw};
 use super::model::Model;
-
-/// The share of a cell's edge by which two grids may be apart and still be one.
-const ON_GRID: f64 = 1e-6;
 
 /// The elastic constants and the horizon (m) that an end of bonds has.
 #[derive(Clone, Copy)]
@@ -145,44 +141,6 @@ pub fn cutoffs(plan: &Plan) -> Vec<f64> {
     pairs
         .map(|(here, there)| reach(here, there).max(reach(there, here)))
         .collect()
-}
-
-/// The grids on which the points of bodies lie. Bodies are on the same one if their cells have the
-/// same edges and coincide.
-pub fn grids(plan: &Plan) -> Vec<GridFrame> {
-    let mut grids: Vec<GridFrame> = Vec::new();
-    let midpoint = plan.quadrature == Quadrature::Midpoint;
-    if plan.family == FamilyRule::List || !midpoint {
-        return grids;
-    }
-    let dimension = plan.dimension.count();
-    for (index, body) in plan.bodies.iter().enumerate() {
-        let PointSource::Lattice {
-            spacing, origin, ..
-        } = body.points
-        else {
-            continue;
-        };
-        let mut centre = [0.0; 3];
-        for k in 0..dimension {
-            centre[k] = origin[k] + 0.5 * spacing[k];
-        }
-        let coincides = |frame: &&mut GridFrame| {
-            (0..dimension).all(|k| {
-                let steps = (centre[k] - frame.origin[k]) / spacing[k];
-                frame.spacing[k] == spacing[k] && (steps - steps.round()).abs() < ON_GRID
-            })
-        };
-        match grids.iter_mut().find(coincides) {
-            Some(frame) => frame.blocks[index] = true,
-            None => grids.push(GridFrame {
-                origin: centre,
-                spacing,
-                blocks: (0..plan.bodies.len()).map(|other| other == index).collect(),
-            }),
-        }
-    }
-    grids
 }
 
 /// What the points of a block follow.

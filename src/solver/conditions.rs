@@ -79,6 +79,8 @@ pub struct Conditions<const D: usize> {
     supports: Vec<Support>,
     /// Work done on each owned point so far, J; empty if nothing acts.
     work: Vec<f64>,
+    /// Whether anything acts on any point of any rank.
+    acts: bool,
 }
 
 /// Local indices of the owned points of a set, by index.
@@ -216,6 +218,7 @@ impl<const D: usize> Conditions<D> {
             loads,
             supports,
             work: vec![0.0; if acts { model.owned() } else { 0 }],
+            acts,
         })
     }
 
@@ -358,7 +361,7 @@ impl<const D: usize> Conditions<D> {
 
     /// Whether nothing acts on any point of any rank.
     pub fn are_none(&self) -> bool {
-        self.work.is_empty()
+        !self.acts
     }
 
     /// What a checkpoint must hold: the work done on each owned point (J), then the force density of

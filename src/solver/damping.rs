@@ -9,6 +9,8 @@ use super::state::State;
 pub struct Damping {
     /// Power that each owned point loses now, W; empty without damping.
     power: Vec<f64>,
+    /// Whether any point of any rank is damped.
+    pub damped: bool,
     /// Energy that each owned point has lost so far, J; empty without damping.
     pub dissipated: Vec<f64>,
 }
@@ -20,6 +22,7 @@ impl Damping {
         let zeros = vec![0.0; if damped { model.owned() } else { 0 }];
         Self {
             power: zeros.clone(),
+            damped,
             dissipated: zeros,
         }
     }

@@ -7,6 +7,8 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{Family, Grid, Which};
@@ -24,6 +26,9 @@ pub struct Forces<const D: usize> {
     passes: Passes<D>,
     halo: Halo,
 }
+
+/// Points handled by one task.
+const CHUNK: usize = 4096;
 
 /// Where the time of a force evaluation went.
 #[derive(Debug, Clone, Copy, Default)]
@@ -49,9 +54,11 @@ impl<const D: usize> Forces<D> {
         blocks: Vec<BlockLaws>,
     ) -> Result<Self> {
         let instructions = Instructions::of_all(comm)?;
+        // The same on all ranks, whether they have points or not.
+        let with_constants = blocks.iter().any(|block| block.law.has_constant());
         let passes = Passes::new(bonds, grids, blocks, model, instructions);
         let mut forces = Self { passes, halo };
-        if !forces.passes.constants.is_empty() {
+        if with_constants {
             forces.find_constants(comm, model);
         }
         Ok(forces)
@@ -188,9 +195,10 @@ impl<const D: usize> Forces<D> {
             work();
             in_bonds += start.elapsed();
         };
-        for response in responses.iter_mut() {
-            response.force = [0.0; D];
-        }
+        responses
+            .par_chunks_mut(CHUNK)
+            .flatten_iter()
+            .for_each(|response| response.force = [0.0; D]);
         let mut before = None;
         for turn in 0..passes.order.len() {
             let pass = passes.order[turn];

@@ -35,18 +35,30 @@ impl Instructions {
     /// When the variable names none; the same on all ranks.
     pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
         let allowed = match std::env::var(VARIABLE) {
-            Err(_) => Ok(Self::Avx512),
-            Ok(name) => Self::named(&name),
+            Ok(name) if !name.is_empty() => Self::named(&name),
+            _ => Ok(Self::Avx512),
         };
         let own = Self::of_this_machine().min(agree(comm, allowed)?);
         let mut level = [f64::from(own as u8)];
         comm::min(comm, &mut level);
-        Ok(ALL[level[0] as usize])
+        let best = ALL[level[0] as usize];
+        if best < Self::Avx512 {
+            return Ok(best);
+        }
+        // Makers are free in the estimates that roots start from.
+        let estimates = estimates_of_roots();
+        let mut extremes = [estimates, -estimates];
+        comm.max(&mut extremes);
+        Ok(match extremes[0] == -extremes[1] {
+            true => Self::Avx512,
+            false => Self::Avx2,
+        })
     }
 
     fn named(name: &str) -> Result<Self> {
         let short = |instructions: Self| instructions.name().replace('-', "").to_lowercase();
-        let found = ALL.into_iter().find(|known| short(*known) == name);
+        let wanted = name.replace('-', "").to_lowercase();
+        let found = ALL.into_iter().find(|known| short(*known) == wanted);
         found.ok_or_else(|| {
             let known = ALL.map(short).join(", ");
             Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
@@ -84,6 +96,30 @@ impl Instructions {
     }
 }
 
+/// A number that is the same only where AVX-512 gives the same estimates of 1/√a; only on machines
+/// that have it.
+fn estimates_of_roots() -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use crate::material::Lanes;
+        use crate::material::arithmetic::estimate_of_inverse_sqrt;
+        let mut hash = 0_u64;
+        for k in 0..2048 {
+            let a = Lanes(std::array::from_fn(|lane| {
+                1.0 + f64::from(8 * k + lane as u32) * (3.0 / 16384.0)
+            }));
+            // SAFETY: the machine has AVX-512.
+            let estimates = unsafe { estimate_of_inverse_sqrt(a) };
+            for estimate in estimates.0 {
+                hash = (hash ^ estimate.to_bits()).wrapping_mul(0x0000_0100_0000_01b3);
+            }
+        }
+        (hash >> 12) as f64
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,6 +127,10 @@ mod tests {
     #[test]
     fn names_of_the_variable() {
         assert_eq!(Instructions::named("avx512").unwrap(), Instructions::Avx512);
+        assert_eq!(
+            Instructions::named("AVX-512").unwrap(),
+            Instructions::Avx512
+        );
         assert_eq!(
             Instructions::named("baseline").unwrap(),
             Instructions::Baseline

@@ -236,7 +236,7 @@ impl<L: Law, F: Failure, const D: usize> Kernel<D> for State<L, F> {
     }
 }
 
-/// The smallest stretch s_min of the intact bonds; outputs start at +∞.
+/// The smallest stretch s_min of the intact bonds of each point's own family; outputs start at +∞.
 #[derive(Clone, Copy)]
 pub struct SmallestStretch;
 
@@ -256,7 +256,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
 
     #[inline(always)]
     fn add<A: Arithmetic>(&self, bonds: &Loaded<D>, smallest: &mut Lanes) -> u8 {
-        let stretch = A::select(bonds.bond.stretch, bonds.intact, f64::INFINITY);
+        let stretch = A::select(bonds.bond.stretch, bonds.family(), f64::INFINITY);
         *smallest = stretch.min(*smallest);
         bonds.intact
     }

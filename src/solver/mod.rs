@@ -9,6 +9,7 @@ pub mod forces;
 mod foremost;
 mod front;
 mod geometry;
+mod grids;
 pub mod instructions;
 mod kernels;
 pub mod laws;

@@ -249,14 +249,15 @@ impl<const D: usize> Passes<D> {
         match pass {
             Pass::Thresholds => {
                 let owned = &mut self.thresholds[..responses.len()];
-                for (value, block) in owned.iter_mut().zip(&model.block) {
+                let each = owned.par_iter_mut().with_min_len(CHUNK);
+                each.zip(&model.block).for_each(|(value, block)| {
                     *value = match blocks[usize::from(*block)].damage {
                         // A point without intact bonds has no smallest stretch.
                         Some(law) if value.is_infinite() => law.critical,
                         Some(law) => law.threshold(*value),
                         None => f64::INFINITY,
                     };
-                }
+                });
             }
             Pass::States => {
                 let owned = responses.len();

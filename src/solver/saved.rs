@@ -26,7 +26,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Numbers that are saved a point.
     pub fn saved_width(&self) -> usize {
         let conditions = if self.conditions.are_none() { 0 } else { 1 + D };
-        3 * D + 1 + usize::from(!self.damping.dissipated.is_empty()) + conditions
+        3 * D + 1 + usize::from(self.damping.damped) + conditions
     }
 
     /// The present state, dealt out by id. Collective.

@@ -8,14 +8,19 @@ use crate::error::{Error, Result};
 use crate::partition::distribute;
 use crate::{families, points};
 
-use super::assign::{assign, block_laws, cutoffs, grids};
+use super::assign::{assign, block_laws, cutoffs};
 use super::conditions::{Conditions, apply_initials, members};
 use super::damping::Damping;
 use super::forces::{ForceTimes, Forces};
+use super::grids::grids;
 use super::model::Model;
 use super::stable_step::stable_step;
 use super::state::State;
 use super::verlet;
+
+/// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
+/// cell off their grid.
+const SLACK: f64 = 1e-5;
 
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
@@ -78,8 +83,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (pieces, total) = points::generate(plan, comm)?;
         let cutoffs = cutoffs(plan);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-        let mut domain = distribute(comm, pieces, total, longest)?;
-        let frames = grids(plan);
+        // Bonds at the limit must find their ghosts however their length is rounded.
+        let mut domain = distribute(comm, pieces, total, longest * (1.0 + SLACK))?;
+        let frames = grids(plan, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
         let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
         let found = families::find(&domain, &frames, bodies, &cutoffs, dimension);

@@ -1,0 +1,168 @@
+//! The regular grids on which the points of bodies lie: those that decks describe, and those that
+//! point files turn out to hold.
+
+use rayon::prelude::*;
+
+use crate::comm::{self, Communicator, agree};
+use crate::deck::plan::{FamilyRule, Plan, PointSource, Quadrature};
+use crate::error::Result;
+use crate::families::GridFrame;
+use crate::partition::Domain;
+use crate::points::Point;
+use crate::points::bins::Bins;
+
+/// The share of a cell's edge by which a point may be off its place, and two grids apart.
+const ON_GRID: f64 = 1e-6;
+
+/// The share by which the volume of a file's points may differ from that of a cell.
+const VOLUME: f64 = 1e-2;
+
+/// A cell's centre and the edges of the cells, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Cells {
+    centre: [f64; 3],
+    edges: [f64; 3],
+}
+
+/// The grids of a deck; `longest` is the length of the longest bond, m. Collective.
+///
+/// # Errors
+/// When the deck wants lattices and the points of a file do not lie on a grid; the same on all ranks.
+pub fn grids(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    domain: &Domain,
+    longest: f64,
+) -> Result<Vec<GridFrame>> {
+    let mut grids: Vec<GridFrame> = Vec::new();
+    if plan.family == FamilyRule::List || plan.quadrature == Quadrature::Gauss {
+        return Ok(grids);
+    }
+    let dimension = plan.dimension.count();
+    for (index, body) in plan.bodies.iter().enumerate() {
+        let found = match body.points {
+            PointSource::Lattice {
+                spacing, origin, ..
+            } => Some(described(origin, spacing, dimension)),
+            PointSource::File { .. } => detected(plan, comm, domain, index, longest),
+        };
+        let Some(Cells { centre, edges }) = found else {
+            let message = format!(
+                "[body.{}]: its points do not lie on a regular grid with one volume for all, as \
+                 `family = \"lattice\"` wants; take \"auto\" or \"list\"",
+                body.name
+            );
+            let wanted = plan.family == FamilyRule::Lattice;
+            let error = || plan.source.error(body.span.clone(), message);
+            agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
+            continue;
+        };
+        let coincides = |frame: &&mut GridFrame| {
+            (0..dimension).all(|k| {
+                let steps = (centre[k] - frame.origin[k]) / edges[k];
+                let same = (frame.spacing[k] / edges[k] - 1.0).abs() < 1e-12;
+                same && (steps - steps.round()).abs() < ON_GRID
+            })
+        };
+        match grids.iter_mut().find(coincides) {
+            Some(frame) => frame.blocks[index] = true,
+            None => grids.push(GridFrame {
+                origin: centre,
+                spacing: edges,
+                blocks: (0..plan.bodies.len()).map(|other| other == index).collect(),
+            }),
+        }
+    }
+    Ok(grids)
+}
+
+/// The lattice of a deck, from a corner of a cell (m) and the edges (m).
+fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
+    let mut centre = [0.0; 3];
+    for k in 0..dimension {
+        centre[k] = origin[k] + 0.5 * edges[k];
+    }
+    Cells { centre, edges }
+}
+
+/// The grid that the points of a body lie on, if they all do, and if each has the volume of a cell;
+/// collective.
+fn detected(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    domain: &Domain,
+    body: usize,
+    longest: f64,
+) -> Option<Cells> {
+    let dimension = plan.dimension.count();
+    let points = || {
+        let owned = &domain.points[..domain.owned];
+        owned.iter().filter(|point| point.block as usize == body)
+    };
+    // Coordinates, coordinates with the sign turned, gaps, volume, volume with the sign turned.
+    let mut smallest = [f64::MAX; 11];
+    let [gap_x, gap_y, gap_z] = smallest_gaps(domain, body, longest);
+    (smallest[6], smallest[7], smallest[8]) = (gap_x, gap_y, gap_z);
+    for point in points() {
+        for k in 0..dimension {
+            smallest[k] = smallest[k].min(point.position[k]);
+            smallest[3 + k] = smallest[3 + k].min(-point.position[k]);
+        }
+        smallest[9] = smallest[9].min(point.volume);
+        smallest[10] = smallest[10].min(-point.volume);
+    }
+    comm::min(comm, &mut smallest);
+    let (mut centre, mut edges) = ([0.0; 3], [1.0; 3]);
+    for k in 0..dimension {
+        let (low, high, gap) = (smallest[k], -smallest[3 + k], smallest[6 + k]);
+        centre[k] = low;
+        // One layer of points fits any edge.
+        edges[k] = match gap < f64::MAX {
+            true => (high - low) / ((high - low) / gap).round(),
+            false => longest,
+        };
+    }
+    let cell: f64 = edges[..dimension].iter().product::<f64>() * plan.dimension.section();
+    let layers = (0..dimension).any(|k| smallest[6 + k] == f64::MAX);
+    let [volume, largest] = [smallest[9], -smallest[10]];
+    let fits = volume == largest && (layers || (volume / cell - 1.0).abs() < VOLUME);
+    let on_grid = points().all(|point| {
+        (0..dimension).all(|k| {
+            let steps = (point.position[k] - centre[k]) / edges[k];
+            (steps - steps.round()).abs() < ON_GRID
+        })
+    });
+    let mut good = [f64::from(u8::from(fits && on_grid))];
+    comm::min(comm, &mut good);
+    (good[0] == 1.0).then_some(Cells { centre, edges })
+}
+
+/// By direction, how little the points of a body differ that are no farther apart than the longest
+/// bond (m), where they differ at all. Over all ranks the smallest do not depend on their number.
+fn smallest_gaps(domain: &Domain, body: usize, longest: f64) -> [f64; 3] {
+    let of_body = |point: &&Point| point.block as usize == body;
+    let places: Vec<[f64; 3]> = domain
+        .points
+        .iter()
+        .filter(of_body)
+        .map(|p| p.position)
+        .collect();
+    let bins = Bins::new(&places, longest);
+    let none = [f64::MAX; 3];
+    let least = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|k| a[k].min(b[k]));
+    places
+        .par_iter()
+        .map(|here| {
+            let mut gaps = none;
+            bins.within(*here, |other, _| {
+                for k in 0..3 {
+                    let gap = (places[other as usize][k] - here[k]).abs();
+                    if gap > ON_GRID * longest {
+                        gaps[k] = gaps[k].min(gap);
+                    }
+                }
+            });
+            gaps
+        })
+        .reduce(|| none, least)
+}
