@@ -8,43 +8,13 @@ use rayon::prelude::*;
 
 use crate::material::lanes::WIDTH;
 use crate::partition::Domain;
-use crate::points::distance_squared;
 
-use super::grid::{Grid, HOLE};
+use super::grid::Grid;
+use super::offset::{Offset, offsets};
+use super::vectors::{Shared, Vector, Vectors, vectors};
 
 /// Vectors set up by one task.
 const CHUNK: usize = 256;
-
-/// A bond of every point: where its far end lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Offset {
-    /// ξ, m.
-    pub reference: [f64; 3],
-    /// |ξ|, m.
-    pub length: f64,
-    /// |ξ|², m².
-    pub square: f64,
-    /// 1/|ξ|, 1/m.
-    pub inverse: f64,
-    /// 1/|ξ|², 1/m².
-    pub inverse_square: f64,
-    /// What volumes are multiplied by in the sums of the own and of the far end.
-    pub weights: [f64; 2],
-    /// Steps along x.
-    pub(super) x: i32,
-    /// Which of the lines around.
-    pub(super) line: u32,
-}
-
-/// Up to eight adjacent points: the first one's place and local index; the others follow.
-#[derive(Debug, Clone, Copy)]
-struct Vector {
-    place: u32,
-    point: u32,
-    line: u32,
-    /// A bit for each of the points that has a neighbour.
-    members: u8,
-}
 
 /// The bonds from points of one block to points of one block on the same grid.
 #[derive(Debug, Clone)]
@@ -77,45 +47,6 @@ pub struct BondLattice {
     /// As `intact`, clear where a bond can never break; all can break if there is none.
     breakable: Option<Vec<u8>>,
     bonds: u64,
-}
-
-/// The bonds of up to eight adjacent points.
-pub struct Adjacent<'a> {
-    /// The first point's place on the grid.
-    pub place: usize,
-    /// Its local index.
-    pub point: usize,
-    /// A bit for each of the points that has a neighbour.
-    pub members: u8,
-    /// Where its bits stand among those of all vectors.
-    pub bits: Range<usize>,
-    /// The offsets.
-    pub offsets: &'a [Offset],
-    /// Which bonds are still there; a byte for each offset.
-    pub intact: &'a mut [u8],
-    /// Which bonds can break.
-    pub breakable: Option<&'a [u8]>,
-    /// Whether any weight is not 1, and whether those of the ends differ.
-    pub weighted: [bool; 2],
-    shifts: &'a [i32],
-}
-
-/// A range of vectors that can be split between threads.
-pub struct Vectors<'a> {
-    lattice: Shared<'a>,
-    vectors: &'a [Vector],
-    first: usize,
-    intact: &'a mut [u8],
-    breakable: Option<&'a [u8]>,
-}
-
-/// What all vectors of a lattice share.
-#[derive(Clone, Copy)]
-struct Shared<'a> {
-    offsets: &'a [Offset],
-    weighted: [bool; 2],
-    shifts: &'a [i32],
-    around: usize,
 }
 
 impl BondLattice {
@@ -413,186 +344,9 @@ impl BondLattice {
     }
 }
 
-/// The offsets up to a length (m) by z, y and x, and the lines that they lead to.
-fn offsets(spacing: [f64; 3], cutoff: f64, dimension: usize) -> (Vec<Offset>, Vec<[i64; 2]>) {
-    let range = |k: usize| match k < dimension {
-        true => {
-            let reach = (cutoff / spacing[k]).floor() as i64;
-            -reach..=reach
-        }
-        false => 0..=0,
-    };
-    let (mut offsets, mut around) = (Vec::new(), Vec::new());
-    for z in range(2) {
-        for y in range(1) {
-            let mut used = false;
-            for x in range(0) {
-                let steps = [x, y, z];
-                let reference: [f64; 3] = std::array::from_fn(|k| steps[k] as f64 * spacing[k]);
-                let square = distance_squared([0.0; 3], reference);
-                let length = square.sqrt();
-                if square == 0.0 || length > cutoff {
-                    continue;
-                }
-                used = true;
-                offsets.push(Offset {
-                    reference,
-                    length,
-                    square,
-                    inverse: 1.0 / length,
-                    inverse_square: 1.0 / square,
-                    weights: [1.0; 2],
-                    x: x as i32,
-                    line: around.len() as u32,
-                });
-            }
-            if used {
-                around.push([y, z]);
-            }
-        }
-    }
-    (offsets, around)
-}
-
 /// A bit for each of eight places with a point of a block.
 fn mask(grid: &Grid, place: usize, block: usize) -> u8 {
     let blocks = &grid.blocks[place..place + WIDTH];
     let bit = |k: usize| u8::from(blocks[k] as usize == block) << k;
     (0..WIDTH).fold(0, |all, k| all | bit(k))
-}
-
-/// The vectors of a grid by local index; all their points are members.
-fn vectors(grid: &Grid, owned: usize) -> Vec<Vector> {
-    let mut vectors = Vec::new();
-    for (line, index) in grid.lines.iter().zip(0..) {
-        let mut open: Option<(Vector, u32)> = None;
-        for place in line.start..line.start + line.length {
-            let point = grid.points[place];
-            if grid.blocks[place] == HOLE || point as usize >= owned {
-                vectors.extend(open.take().map(|(vector, _)| vector));
-                continue;
-            }
-            match &mut open {
-                Some((vector, length))
-                    if (*length as usize) < WIDTH && vector.point + *length == point =>
-                {
-                    vector.members |= 1 << *length;
-                    *length += 1;
-                }
-                _ => {
-                    let first = Vector {
-                        place: place as u32,
-                        point,
-                        line: index,
-                        members: 1,
-                    };
-                    vectors.extend(open.replace((first, 1)).map(|(vector, _)| vector));
-                }
-            }
-        }
-        vectors.extend(open.map(|(vector, _)| vector));
-    }
-    vectors.sort_unstable_by_key(|vector| vector.point);
-    vectors
-}
-
-impl<'a> Vectors<'a> {
-    /// Number of vectors.
-    pub fn len(&self) -> usize {
-        self.vectors.len()
-    }
-
-    /// Whether there is no vector.
-    pub fn is_empty(&self) -> bool {
-        self.vectors.is_empty()
-    }
-
-    /// The local index of a vector's first point.
-    pub fn point(&self, vector: usize) -> usize {
-        self.vectors[vector].point as usize
-    }
-
-    /// The vectors before `vector` and those from it on.
-    pub fn split_at(self, vector: usize) -> (Self, Self) {
-        let bits = vector * self.lattice.offsets.len();
-        let (vectors_a, vectors_b) = self.vectors.split_at(vector);
-        let (intact_a, intact_b) = self.intact.split_at_mut(bits);
-        let breakable = self.breakable.map(|all| all.split_at(bits));
-        let first = Self {
-            lattice: self.lattice,
-            vectors: vectors_a,
-            first: self.first,
-            intact: intact_a,
-            breakable: breakable.map(|(a, _)| a),
-        };
-        let second = Self {
-            lattice: self.lattice,
-            vectors: vectors_b,
-            first: self.first + vector,
-            intact: intact_b,
-            breakable: breakable.map(|(_, b)| b),
-        };
-        (first, second)
-    }
-
-    /// The bonds of one vector.
-    #[inline(always)]
-    pub fn vector(&mut self, vector: usize) -> Adjacent<'_> {
-        let Shared {
-            offsets,
-            weighted,
-            shifts,
-            around,
-        } = self.lattice;
-        let count = offsets.len();
-        let all = (self.first + vector) * count..(self.first + vector + 1) * count;
-        let bits = vector * count..(vector + 1) * count;
-        let vector = &self.vectors[vector];
-        Adjacent {
-            place: vector.place as usize,
-            point: vector.point as usize,
-            members: vector.members,
-            bits: all,
-            offsets,
-            breakable: self.breakable.map(|all| &all[bits.clone()]),
-            intact: &mut self.intact[bits],
-            weighted,
-            shifts: &shifts[vector.line as usize * around..(vector.line as usize + 1) * around],
-        }
-    }
-}
-
-impl Adjacent<'_> {
-    /// The place of the first of the eight far ends at an offset, with seven more after it. Where
-    /// none of the bonds exists it is meaningless, but still a place.
-    #[inline(always)]
-    pub fn far(&self, offset: &Offset) -> usize {
-        // SAFETY: lines around are numbered from 0, and there is a shift for each.
-        let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
-        (self.place as isize + (shift + offset.x) as isize) as usize
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn offsets_of_known_horizons() {
-        let count = |cutoff, dimension| offsets([1.0; 3], cutoff, dimension).0.len();
-        assert_eq!(count(3.015, 3), 122);
-        assert_eq!(count(2.52, 3), 80);
-        assert_eq!(count(3.0, 2), 28);
-        assert_eq!(count(3.0, 1), 6);
-    }
-
-    #[test]
-    fn both_ends_of_a_bond_have_the_same_length() {
-        let (offsets, _) = offsets([0.1, 0.2, 0.1], 0.35, 3);
-        for offset in &offsets {
-            let opposite = offset.reference.map(|x| -x);
-            let other = offsets.iter().find(|other| other.reference == opposite);
-            assert_eq!(other.unwrap().length, offset.length);
-        }
-    }
 }

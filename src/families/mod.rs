@@ -9,16 +9,20 @@ mod find;
 mod grid;
 mod lattice;
 mod list;
+mod offset;
 mod search;
+mod vectors;
 mod volume;
 
 pub use arrange::arrange;
 pub use find::find;
 pub use grid::{Grid, GridFrame, Which};
-pub use lattice::{Adjacent, BondLattice, Offset, Vectors};
+pub use lattice::BondLattice;
 pub use list::{BondList, Row, Rows};
+pub use offset::Offset;
 pub use search::cutoff;
 use search::search;
+pub use vectors::{Adjacent, Vectors};
 pub use volume::CellShare;
 
 /// The bonds from points of one block to points of one block.

@@ -1,4 +1,4 @@
-//! From the plan to the law, the failure rule and the weights of every list of bonds.
+//! From the plan to the law, the failure rule and the weights of every family.
 
 use crate::damage::CriticalStretch;
 use crate::deck::plan::{

@@ -1,0 +1,93 @@
+//! The offsets at which the neighbours of a point of a lattice lie.
+
+use crate::points::distance_squared;
+
+/// A bond of every point: where its far end lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Offset {
+    /// ξ, m.
+    pub reference: [f64; 3],
+    /// |ξ|, m.
+    pub length: f64,
+    /// |ξ|², m².
+    pub square: f64,
+    /// 1/|ξ|, 1/m.
+    pub inverse: f64,
+    /// 1/|ξ|², 1/m².
+    pub inverse_square: f64,
+    /// What volumes are multiplied by in the sums of the own and of the far end.
+    pub weights: [f64; 2],
+    /// Steps along x.
+    pub(super) x: i32,
+    /// Which of the lines around.
+    pub(super) line: u32,
+}
+
+/// The offsets up to a length (m) by z, y and x, and the lines that they lead to.
+pub(super) fn offsets(
+    spacing: [f64; 3],
+    cutoff: f64,
+    dimension: usize,
+) -> (Vec<Offset>, Vec<[i64; 2]>) {
+    let range = |k: usize| match k < dimension {
+        true => {
+            let reach = (cutoff / spacing[k]).floor() as i64;
+            -reach..=reach
+        }
+        false => 0..=0,
+    };
+    let (mut offsets, mut around) = (Vec::new(), Vec::new());
+    for z in range(2) {
+        for y in range(1) {
+            let mut used = false;
+            for x in range(0) {
+                let steps = [x, y, z];
+                let reference: [f64; 3] = std::array::from_fn(|k| steps[k] as f64 * spacing[k]);
+                let square = distance_squared([0.0; 3], reference);
+                let length = square.sqrt();
+                if square == 0.0 || length > cutoff {
+                    continue;
+                }
+                used = true;
+                offsets.push(Offset {
+                    reference,
+                    length,
+                    square,
+                    inverse: 1.0 / length,
+                    inverse_square: 1.0 / square,
+                    weights: [1.0; 2],
+                    x: x as i32,
+                    line: around.len() as u32,
+                });
+            }
+            if used {
+                around.push([y, z]);
+            }
+        }
+    }
+    (offsets, around)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_of_known_horizons() {
+        let count = |cutoff, dimension| offsets([1.0; 3], cutoff, dimension).0.len();
+        assert_eq!(count(3.015, 3), 122);
+        assert_eq!(count(2.52, 3), 80);
+        assert_eq!(count(3.0, 2), 28);
+        assert_eq!(count(3.0, 1), 6);
+    }
+
+    #[test]
+    fn both_ends_of_a_bond_have_the_same_length() {
+        let (offsets, _) = offsets([0.1, 0.2, 0.1], 0.35, 3);
+        for offset in &offsets {
+            let opposite = offset.reference.map(|x| -x);
+            let other = offsets.iter().find(|other| other.reference == opposite);
+            assert_eq!(other.unwrap().length, offset.length);
+        }
+    }
+}

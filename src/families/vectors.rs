@@ -1,0 +1,170 @@
+//! Up to eight adjacent points of a lattice, which are worked on together, and ranges of them.
+
+use std::ops::Range;
+
+use crate::material::lanes::WIDTH;
+
+use super::grid::{Grid, HOLE};
+use super::offset::Offset;
+
+/// Up to eight adjacent points: the first one's place and local index; the others follow.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Vector {
+    pub(super) place: u32,
+    pub(super) point: u32,
+    pub(super) line: u32,
+    /// A bit for each of the points that has a neighbour.
+    pub(super) members: u8,
+}
+
+/// The bonds of up to eight adjacent points.
+pub struct Adjacent<'a> {
+    /// The first point's place on the grid.
+    pub place: usize,
+    /// Its local index.
+    pub point: usize,
+    /// A bit for each of the points that has a neighbour.
+    pub members: u8,
+    /// Where its bits stand among those of all vectors.
+    pub bits: Range<usize>,
+    /// The offsets.
+    pub offsets: &'a [Offset],
+    /// Which bonds are still there; a byte for each offset.
+    pub intact: &'a mut [u8],
+    /// Which bonds can break.
+    pub breakable: Option<&'a [u8]>,
+    /// Whether any weight is not 1, and whether those of the ends differ.
+    pub weighted: [bool; 2],
+    shifts: &'a [i32],
+}
+
+/// A range of vectors that can be split between threads.
+pub struct Vectors<'a> {
+    pub(super) lattice: Shared<'a>,
+    pub(super) vectors: &'a [Vector],
+    /// Number of the first one.
+    pub(super) first: usize,
+    pub(super) intact: &'a mut [u8],
+    pub(super) breakable: Option<&'a [u8]>,
+}
+
+/// What all vectors of a lattice share.
+#[derive(Clone, Copy)]
+pub(super) struct Shared<'a> {
+    pub(super) offsets: &'a [Offset],
+    pub(super) weighted: [bool; 2],
+    pub(super) shifts: &'a [i32],
+    pub(super) around: usize,
+}
+
+/// The vectors of a grid by local index; all their points are members.
+pub(super) fn vectors(grid: &Grid, owned: usize) -> Vec<Vector> {
+    let mut vectors = Vec::new();
+    for (line, index) in grid.lines.iter().zip(0..) {
+        let mut open: Option<(Vector, u32)> = None;
+        for place in line.start..line.start + line.length {
+            let point = grid.points[place];
+            if grid.blocks[place] == HOLE || point as usize >= owned {
+                vectors.extend(open.take().map(|(vector, _)| vector));
+                continue;
+            }
+            match &mut open {
+                Some((vector, length))
+                    if (*length as usize) < WIDTH && vector.point + *length == point =>
+                {
+                    vector.members |= 1 << *length;
+                    *length += 1;
+                }
+                _ => {
+                    let first = Vector {
+                        place: place as u32,
+                        point,
+                        line: index,
+                        members: 1,
+                    };
+                    vectors.extend(open.replace((first, 1)).map(|(vector, _)| vector));
+                }
+            }
+        }
+        vectors.extend(open.map(|(vector, _)| vector));
+    }
+    vectors.sort_unstable_by_key(|vector| vector.point);
+    vectors
+}
+
+impl<'a> Vectors<'a> {
+    /// Number of vectors.
+    pub fn len(&self) -> usize {
+        self.vectors.len()
+    }
+
+    /// Whether there is no vector.
+    pub fn is_empty(&self) -> bool {
+        self.vectors.is_empty()
+    }
+
+    /// The local index of a vector's first point.
+    pub fn point(&self, vector: usize) -> usize {
+        self.vectors[vector].point as usize
+    }
+
+    /// The vectors before `vector` and those from it on.
+    pub fn split_at(self, vector: usize) -> (Self, Self) {
+        let bits = vector * self.lattice.offsets.len();
+        let (vectors_a, vectors_b) = self.vectors.split_at(vector);
+        let (intact_a, intact_b) = self.intact.split_at_mut(bits);
+        let breakable = self.breakable.map(|all| all.split_at(bits));
+        let first = Self {
+            lattice: self.lattice,
+            vectors: vectors_a,
+            first: self.first,
+            intact: intact_a,
+            breakable: breakable.map(|(a, _)| a),
+        };
+        let second = Self {
+            lattice: self.lattice,
+            vectors: vectors_b,
+            first: self.first + vector,
+            intact: intact_b,
+            breakable: breakable.map(|(_, b)| b),
+        };
+        (first, second)
+    }
+
+    /// The bonds of one vector.
+    #[inline(always)]
+    pub fn vector(&mut self, vector: usize) -> Adjacent<'_> {
+        let Shared {
+            offsets,
+            weighted,
+            shifts,
+            around,
+        } = self.lattice;
+        let count = offsets.len();
+        let all = (self.first + vector) * count..(self.first + vector + 1) * count;
+        let bits = vector * count..(vector + 1) * count;
+        let vector = &self.vectors[vector];
+        Adjacent {
+            place: vector.place as usize,
+            point: vector.point as usize,
+            members: vector.members,
+            bits: all,
+            offsets,
+            breakable: self.breakable.map(|all| &all[bits.clone()]),
+            intact: &mut self.intact[bits],
+            weighted,
+            shifts: &shifts[vector.line as usize * around..(vector.line as usize + 1) * around],
+        }
+    }
+}
+
+impl Adjacent<'_> {
+    /// The place of the first of the eight far ends at an offset, with seven more after it. Where
+    /// none of the bonds exists it is meaningless, but still a place.
+    #[inline(always)]
+    pub fn far(&self, offset: &Offset) -> usize {
+        // SAFETY: lines around are numbered from 0, and there is a shift for each.
+        let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
+        (self.place as isize + (shift + offset.x) as isize) as usize
+    }
+}
