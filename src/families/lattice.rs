@@ -192,12 +192,6 @@ impl BondLattice {
             .partition_point(|vector| (vector.point as usize) < limit)
     }
 
-    /// One more than the largest local index of a point that sums over these bonds.
-    pub fn reach(&self) -> usize {
-        let last = self.vectors.last();
-        last.map_or(0, |vector| vector.point as usize + WIDTH)
-    }
-
     /// The vectors of a range.
     pub fn vectors(&mut self, range: Range<usize>) -> Vectors<'_> {
         let count = self.offsets.len();
@@ -227,19 +221,15 @@ impl BondLattice {
         self.weighted[end] = true;
     }
 
-    /// Calls `found` with the index of each byte of bits, the bit, and the local indices of both
-    /// ends, for the bits that `which` picks from that byte's index.
-    fn for_each(
-        &self,
-        which: impl Fn(usize) -> u8,
-        mut found: impl FnMut(usize, usize, [usize; 2]),
-    ) {
+    /// Calls `found` with the index of the byte and the bit of each intact bond, and the local indices
+    /// of both ends.
+    fn for_each(&self, mut found: impl FnMut(usize, usize, [usize; 2])) {
         let count = self.offsets.len();
         for (k, vector) in self.vectors.iter().enumerate() {
             let shifts = &self.shifts[vector.line as usize * self.around.len()..];
             for (o, offset) in self.offsets.iter().enumerate() {
                 let byte = k * count + o;
-                let mut bits = which(byte);
+                let mut bits = self.intact[byte];
                 while bits != 0 {
                     let lane = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
@@ -255,37 +245,28 @@ impl BondLattice {
     /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let mut breakable = vec![u8::MAX; self.intact.len()];
-        self.for_each(
-            |byte| self.intact[byte],
-            |byte, lane, ends| {
-                if ends.into_iter().any(&protected) {
-                    breakable[byte] &= !(1 << lane);
-                }
-            },
-        );
+        self.for_each(|byte, lane, ends| {
+            if ends.into_iter().any(&protected) {
+                breakable[byte] &= !(1 << lane);
+            }
+        });
         self.breakable = Some(breakable);
     }
 
     /// Breaks the bonds for which `cut` (of the two local indices) holds.
     pub fn cut(&mut self, cut: impl Fn(usize, usize) -> bool) {
         let mut intact = self.intact.clone();
-        self.for_each(
-            |byte| self.intact[byte],
-            |byte, lane, [here, there]| {
-                if cut(here, there) {
-                    intact[byte] &= !(1 << lane);
-                }
-            },
-        );
+        self.for_each(|byte, lane, [here, there]| {
+            if cut(here, there) {
+                intact[byte] &= !(1 << lane);
+            }
+        });
         self.intact = intact;
     }
 
     /// Calls `found` with the local indices of both ends of every intact bond.
     pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
-        self.for_each(
-            |byte| self.intact[byte],
-            |_, _, [here, there]| found(here, there),
-        );
+        self.for_each(|_, _, [here, there]| found(here, there));
     }
 
     /// Bytes of bits a point.
