@@ -6,6 +6,7 @@ pub mod dimension;
 pub mod elastic;
 pub mod error;
 pub mod families;
+pub mod lanes;
 pub mod material;
 pub mod output;
 pub mod partition;

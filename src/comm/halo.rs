@@ -63,18 +63,19 @@ impl Halo {
         }
     }
 
-    /// Copies the values that other ranks need into the messages: `components` arrays over the local
-    /// points, each sent for every point.
-    pub fn pack(&mut self, components: &[&[f64]]) {
+    /// Copies the values that other ranks need into the messages: `components` are arrays over the
+    /// local points, each sent for every point.
+    pub fn pack<'a>(&mut self, components: impl ExactSizeIterator<Item = &'a [f64]> + Clone) {
         for (neighbour, message) in self.neighbours.iter().zip(&mut self.messages) {
             message.send.clear();
-            for component in components {
+            let count = components.len();
+            for component in components.clone() {
                 let values = neighbour.send.iter().map(|i| component[*i as usize]);
                 message.send.extend(values);
             }
             message
                 .receive
-                .resize(components.len() * neighbour.receive.len(), 0.0);
+                .resize(count * neighbour.receive.len(), 0.0);
         }
     }
 
@@ -88,10 +89,10 @@ impl Halo {
     }
 
     /// Copies what was received to the ghosts: the same arrays, in the same order, as in `pack`.
-    pub fn unpack(&self, components: &mut [&mut [f64]]) {
-        for (neighbour, message) in self.neighbours.iter().zip(&self.messages) {
-            let count = neighbour.receive.len();
-            for (k, component) in components.iter_mut().enumerate() {
+    pub fn unpack<'a>(&self, components: impl Iterator<Item = &'a mut [f64]>) {
+        for (k, component) in components.enumerate() {
+            for (neighbour, message) in self.neighbours.iter().zip(&self.messages) {
+                let count = neighbour.receive.len();
                 component[neighbour.receive.clone()]
                     .copy_from_slice(&message.receive[k * count..(k + 1) * count]);
             }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::material::lanes::WIDTH;
+use crate::lanes::WIDTH;
 use crate::partition::Domain;
 
 use super::grid::GridFrame;

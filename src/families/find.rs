@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::partition::Domain;
 
-use super::{BondLattice, Family, Grid, GridFrame, search};
+use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
 /// The families of a domain that has been [arranged](super::arrange) for these grids, for blocks
 /// 0 … `blocks` − 1, by blocks; and the layouts of the grids. `cutoffs` has the longest bond (m) of
@@ -19,7 +19,7 @@ pub fn find(
     blocks: usize,
     cutoffs: &[f64],
     dimension: usize,
-) -> Result<(Vec<Family>, Vec<Arc<Grid>>)> {
+) -> Result<(Vec<BlockBonds>, Vec<Arc<Grid>>)> {
     let longest = cutoffs.iter().copied().fold(0.0, f64::max);
     let layout = |frame: &GridFrame| Grid::new(frame.clone(), domain, longest).map(Arc::new);
     let grids = frames.iter().map(layout).collect::<Result<Vec<_>>>()?;
@@ -40,7 +40,7 @@ pub fn find(
         families.extend(
             search(domain, blocks, &listed)?
                 .into_iter()
-                .map(Family::List),
+                .map(BlockBonds::List),
         );
     }
     for (pair, cutoff) in cutoffs.iter().enumerate() {
@@ -49,10 +49,10 @@ pub fn find(
             let grid = grids[index].clone();
             let lattice = BondLattice::new(index, grid, domain, ends, *cutoff, dimension);
             if !lattice.is_empty() {
-                families.push(Family::Lattice(lattice));
+                families.push(BlockBonds::Lattice(lattice));
             }
         }
     }
-    families.sort_by_key(Family::blocks);
+    families.sort_by_key(BlockBonds::blocks);
     Ok((families, grids))
 }

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::material::lanes::WIDTH;
+use crate::lanes::WIDTH;
 use crate::partition::Domain;
 
 use super::search::at_one_place;
@@ -180,7 +180,7 @@ impl Grid {
     }
 
     /// Copies the values of the local points, or of the ghosts among them only, to their places.
-    pub fn bring(&self, which: Which, values: &[f64], places: &mut [f64]) {
+    pub fn update(&self, which: Which, values: &[f64], places: &mut [f64]) {
         let kinds = match which {
             Which::Owned => 0..1,
             Which::Ghosts => 1..2,

@@ -6,11 +6,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::material::lanes::WIDTH;
+use crate::lanes::WIDTH;
 use crate::partition::Domain;
 
 use super::grid::Grid;
 use super::offset::{Offset, offsets};
+use super::store::{Store, bit_bytes};
 use super::vectors::{Shared, Vector, Vectors, vectors};
 
 /// Vectors set up by one task.
@@ -41,11 +42,8 @@ pub struct BondLattice {
     /// For each line of the grid: how far from a place the place with the same x lies on each of the
     /// lines around.
     shifts: Vec<i32>,
-    /// For each vector and offset a byte with a bit for each of the points, clear where there is no
-    /// bond or it is broken.
-    intact: Vec<u8>,
-    /// As `intact`, clear where a bond can never break; all can break if there is none.
-    breakable: Option<Vec<u8>>,
+    /// For each vector and offset what is kept of the bonds of the vector's points.
+    pub(super) store: Store,
     bonds: u64,
 }
 
@@ -96,8 +94,7 @@ impl BondLattice {
             },
             around,
             shifts,
-            intact: Vec::new(),
-            breakable: None,
+            store: Store::default(),
             bonds: 0,
             grid,
         };
@@ -135,7 +132,7 @@ impl BondLattice {
         self.vectors.shrink_to_fit();
         intact.truncate(kept * count);
         intact.shrink_to_fit();
-        self.intact = intact;
+        self.store.intact = intact;
     }
 
     /// The bits of a vector's bonds, broken ones included.
@@ -205,8 +202,7 @@ impl BondLattice {
             },
             first: range.start,
             vectors: &self.vectors[range],
-            breakable: self.breakable.as_ref().map(|all| &all[bits.clone()]),
-            intact: &mut self.intact[bits],
+            groups: self.store.groups(bits),
         }
     }
 
@@ -229,7 +225,7 @@ impl BondLattice {
             let shifts = &self.shifts[vector.line as usize * self.around.len()..];
             for (o, offset) in self.offsets.iter().enumerate() {
                 let byte = k * count + o;
-                let mut bits = self.intact[byte];
+                let mut bits = self.store.intact[byte];
                 while bits != 0 {
                     let lane = bits.trailing_zeros() as usize;
                     bits &= bits - 1;
@@ -244,24 +240,24 @@ impl BondLattice {
 
     /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
-        let mut breakable = vec![u8::MAX; self.intact.len()];
+        let mut breakable = vec![u8::MAX; self.store.intact.len()];
         self.for_each(|byte, lane, ends| {
             if ends.into_iter().any(&protected) {
                 breakable[byte] &= !(1 << lane);
             }
         });
-        self.breakable = Some(breakable);
+        self.store.breakable = Some(breakable);
     }
 
     /// Breaks the bonds for which `cut` (of the two local indices) holds.
     pub fn cut(&mut self, cut: impl Fn(usize, usize) -> bool) {
-        let mut intact = self.intact.clone();
+        let mut intact = self.store.intact.clone();
         self.for_each(|byte, lane, [here, there]| {
             if cut(here, there) {
                 intact[byte] &= !(1 << lane);
             }
         });
-        self.intact = intact;
+        self.store.intact = intact;
     }
 
     /// Calls `found` with the local indices of both ends of every intact bond.
@@ -269,9 +265,9 @@ impl BondLattice {
         self.for_each(|_, _, [here, there]| found(here, there));
     }
 
-    /// Bytes of bits a point.
+    /// Bytes of a checkpoint that the bonds of a point take.
     pub fn row_length(&self) -> usize {
-        self.offsets.len().div_ceil(8)
+        bit_bytes(self.offsets.len()) + self.offsets.len() * self.store.number_bytes()
     }
 
     /// Calls `row` with the local index of each point and the number of the vector and lane that it
@@ -284,32 +280,39 @@ impl BondLattice {
         }
     }
 
-    /// Copies the bits of a point's bonds to a row of bytes.
+    /// Copies what is kept of a point's bonds to bytes: first all bits, then the numbers.
     pub fn save_row(&self, vector: usize, lane: usize, row: &mut [u8]) {
         let count = self.offsets.len();
-        row.fill(0);
-        for (o, bits) in self.intact[vector * count..(vector + 1) * count]
-            .iter()
-            .enumerate()
-        {
-            row[o / 8] |= (bits >> lane & 1) << (o % 8);
+        let (bits, numbers) = row.split_at_mut(bit_bytes(count));
+        bits.fill(0);
+        let width = self.store.number_bytes();
+        for o in 0..count {
+            let group = vector * count + o;
+            bits[o / 8] |= (self.store.intact[group] >> lane & 1) << (o % 8);
+            let place = o * width..(o + 1) * width;
+            self.store.save_numbers(group, lane, &mut numbers[place]);
         }
     }
 
-    /// Takes the bits of a point's bonds from a row of bytes.
+    /// Puts back what [`Self::save_row`] gave.
     pub fn restore_row(&mut self, vector: usize, lane: usize, row: &[u8]) {
         let count = self.offsets.len();
-        let all = &mut self.intact[vector * count..(vector + 1) * count];
-        for (o, bits) in all.iter_mut().enumerate() {
-            let bit = row[o / 8] >> (o % 8) & 1;
-            *bits = *bits & !(1 << lane) | bit << lane;
+        let (bits, numbers) = row.split_at(bit_bytes(count));
+        let width = self.store.number_bytes();
+        for o in 0..count {
+            let group = vector * count + o;
+            let bit = bits[o / 8] >> (o % 8) & 1;
+            let intact = &mut self.store.intact[group];
+            *intact = *intact & !(1 << lane) | bit << lane;
+            let place = o * width..(o + 1) * width;
+            self.store.restore_numbers(group, lane, &numbers[place]);
         }
     }
 
     /// A byte for each vector and offset with a bit for each bond, broken or not.
-    pub fn filled(&self) -> Vec<u8> {
+    pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
-        let mut filled = vec![0; self.intact.len()];
+        let mut filled = vec![0; self.store.intact.len()];
         for (bits, vector) in filled.chunks_mut(count).zip(&self.vectors) {
             self.family(vector, bits);
         }
@@ -318,8 +321,7 @@ impl BondLattice {
 
     /// Memory that the lattice takes beside its grid, bytes.
     pub fn bytes(&self) -> usize {
-        let bits = self.intact.len();
-        bits + self.breakable.as_ref().map_or(0, Vec::len)
+        self.store.bytes()
             + size_of_val(&self.vectors[..])
             + size_of_val(&self.shifts[..])
     }

@@ -1,8 +1,8 @@
 //! The list family: for each point the indices of its neighbours, in groups of eight, and one bit a
 //! bond that says whether it is intact. Serves any cloud of points.
 
-use crate::material::Lanes;
-use crate::material::lanes::WIDTH;
+use super::store::{Groups, Store};
+use crate::lanes::{Lanes, WIDTH};
 
 /// The bonds from points of one block to points of one block.
 #[derive(Debug, Clone, Default)]
@@ -18,10 +18,8 @@ pub struct BondList {
     /// Local indices of the neighbours, row by row sorted by global id; the last group of a row is
     /// filled up with the row's own point.
     pub(super) neighbours: Vec<[u32; WIDTH]>,
-    /// One bit a bond, clear where it is broken or only fills up a group.
-    pub(super) intact: Vec<u8>,
-    /// One bit a bond, clear where it can never break; all can break if there is none.
-    pub(super) breakable: Option<Vec<u8>>,
+    /// What is kept of the bonds; bits are clear where a bond only fills up a group.
+    pub(super) store: Store,
     /// What volumes are multiplied by in the sums of the own and of the far end, 0 where a bond only
     /// fills up a group; 1 if there are none, the own end's if the far end has none.
     pub(super) weights: [Option<Vec<Lanes>>; 2],
@@ -35,10 +33,8 @@ pub struct Row<'a> {
     pub point: usize,
     /// Local indices of the neighbours.
     pub neighbours: &'a [[u32; WIDTH]],
-    /// Which of them are still bonded.
-    pub intact: &'a mut [u8],
-    /// Which bonds can break.
-    pub breakable: Option<&'a [u8]>,
+    /// What is kept of the bonds.
+    pub groups: Groups<'a>,
     /// What volumes are multiplied by in the sums of the own and of the far end; 1 if there are
     /// none, the own end's if the far end has none.
     pub weights: [Option<&'a [Lanes]>; 2],
@@ -49,8 +45,7 @@ pub struct Rows<'a> {
     points: &'a [u32],
     starts: &'a [usize],
     neighbours: &'a [[u32; WIDTH]],
-    intact: &'a mut [u8],
-    breakable: Option<&'a [u8]>,
+    groups: Groups<'a>,
     weights: [Option<&'a [Lanes]>; 2],
 }
 
@@ -102,12 +97,11 @@ impl BondList {
             points: &self.points[range.clone()],
             starts: &self.starts[range.start..=range.end],
             neighbours: &self.neighbours[groups.clone()],
-            breakable: self.breakable.as_ref().map(|bits| &bits[groups.clone()]),
             weights: self
                 .weights
                 .each_ref()
                 .map(|weights| weights.as_ref().map(|weights| &weights[groups.clone()])),
-            intact: &mut self.intact[groups],
+            groups: self.store.groups(groups),
         }
     }
 
@@ -141,7 +135,7 @@ impl BondList {
                 }
             }
         }
-        self.breakable = Some(breakable);
+        self.store.breakable = Some(breakable);
     }
 
     /// Breaks the bonds for which `cut` (of the two local indices) holds.
@@ -151,7 +145,7 @@ impl BondList {
             for group in self.starts[row]..self.starts[row + 1] {
                 for (k, there) in self.neighbours[group].iter().enumerate() {
                     if *there != own && cut(own as usize, *there as usize) {
-                        self.intact[group] &= !(1 << k);
+                        self.store.intact[group] &= !(1 << k);
                     }
                 }
             }
@@ -163,7 +157,7 @@ impl BondList {
         for row in 0..self.points.len() {
             for group in self.starts[row]..self.starts[row + 1] {
                 for (k, there) in self.neighbours[group].iter().enumerate() {
-                    if self.intact[group] >> k & 1 == 1 {
+                    if self.store.intact[group] >> k & 1 == 1 {
                         found(self.points[row] as usize, *there as usize);
                     }
                 }
@@ -171,21 +165,40 @@ impl BondList {
         }
     }
 
-    /// Each row's point with the bits of its bonds, which are the same on any number of ranks.
-    pub fn intact_rows(&self) -> impl Iterator<Item = (usize, &[u8])> {
-        let row = |row: usize| &self.intact[self.starts[row]..self.starts[row + 1]];
-        (0..self.points.len()).map(move |k| (self.points[k] as usize, row(k)))
+    /// Calls `found` with the number of each row, its point and the bytes of a checkpoint that its
+    /// bonds take, which are the same on any number of ranks.
+    pub fn for_each_row(&self, mut found: impl FnMut(usize, usize, usize)) {
+        let bytes = 1 + WIDTH * self.store.number_bytes();
+        for (row, point) in self.points.iter().enumerate() {
+            let groups = self.starts[row + 1] - self.starts[row];
+            found(row, *point as usize, groups * bytes);
+        }
     }
 
-    /// As [`Self::intact_rows`], to put back what was stored.
-    pub fn intact_rows_mut(&mut self) -> impl Iterator<Item = (usize, &mut [u8])> {
-        let mut rest = &mut self.intact[..];
-        let lengths = self.starts.windows(2).map(|pair| pair[1] - pair[0]);
-        self.points.iter().zip(lengths).map(move |(point, length)| {
-            let (row, more) = std::mem::take(&mut rest).split_at_mut(length);
-            rest = more;
-            (*point as usize, row)
-        })
+    /// Copies what is kept of a row's bonds to bytes: for each group the bits, then the numbers.
+    pub fn save_row(&self, row: usize, bytes: &mut [u8]) {
+        let width = self.store.number_bytes();
+        let groups = self.starts[row]..self.starts[row + 1];
+        for (group, bytes) in groups.zip(bytes.chunks_exact_mut(1 + WIDTH * width)) {
+            bytes[0] = self.store.intact[group];
+            for lane in 0..WIDTH {
+                let place = 1 + lane * width..1 + (lane + 1) * width;
+                self.store.save_numbers(group, lane, &mut bytes[place]);
+            }
+        }
+    }
+
+    /// Puts back what [`Self::save_row`] gave.
+    pub fn restore_row(&mut self, row: usize, bytes: &[u8]) {
+        let width = self.store.number_bytes();
+        let groups = self.starts[row]..self.starts[row + 1];
+        for (group, bytes) in groups.zip(bytes.chunks_exact(1 + WIDTH * width)) {
+            self.store.intact[group] = bytes[0];
+            for lane in 0..WIDTH {
+                let place = 1 + lane * width..1 + (lane + 1) * width;
+                self.store.restore_numbers(group, lane, &bytes[place]);
+            }
+        }
     }
 
     /// Memory that the list takes, bytes.
@@ -193,7 +206,8 @@ impl BondList {
         let groups = self.neighbours.len();
         4 * self.points.len()
             + 8 * self.starts.len()
-            + groups * (4 * WIDTH + 1 + usize::from(self.breakable.is_some()))
+            + groups * 4 * WIDTH
+            + self.store.bytes()
             + groups * 8 * WIDTH * self.weights.iter().flatten().count()
     }
 }
@@ -219,30 +233,21 @@ impl<'a> Rows<'a> {
         let (points_a, points_b) = self.points.split_at(row);
         let group = self.starts[row] - self.starts[0];
         let (neighbours_a, neighbours_b) = self.neighbours.split_at(group);
-        let (intact_a, intact_b) = self.intact.split_at_mut(group);
-        let (breakable_a, breakable_b) = match self.breakable {
-            Some(bits) => {
-                let (a, b) = bits.split_at(group);
-                (Some(a), Some(b))
-            }
-            None => (None, None),
-        };
+        let [groups_a, groups_b] = self.groups.split_at(group);
         let weights_a = self.weights.map(|all| all.map(|weights| &weights[..group]));
         let weights_b = self.weights.map(|all| all.map(|weights| &weights[group..]));
         let first = Self {
             points: points_a,
             starts: &self.starts[..=row],
             neighbours: neighbours_a,
-            intact: intact_a,
-            breakable: breakable_a,
+            groups: groups_a,
             weights: weights_a,
         };
         let second = Self {
             points: points_b,
             starts: &self.starts[row..],
             neighbours: neighbours_b,
-            intact: intact_b,
-            breakable: breakable_b,
+            groups: groups_b,
             weights: weights_b,
         };
         (first, second)
@@ -255,11 +260,10 @@ impl<'a> Rows<'a> {
         Row {
             point: self.points[row] as usize,
             neighbours: &self.neighbours[groups.clone()],
-            breakable: self.breakable.map(|bits| &bits[groups.clone()]),
             weights: self
                 .weights
                 .map(|all| all.map(|weights| &weights[groups.clone()])),
-            intact: &mut self.intact[groups],
+            groups: self.groups.range(groups),
         }
     }
 }
@@ -267,7 +271,7 @@ impl<'a> Rows<'a> {
 impl Row<'_> {
     /// A bit for each bond of a group, broken or not, clear where it only fills up the group.
     #[inline(always)]
-    pub fn filled(&self, group: usize) -> u8 {
+    pub fn whole(&self, group: usize) -> u8 {
         let mut bits = 0;
         for (k, there) in self.neighbours[group].iter().enumerate() {
             bits |= u8::from(*there as usize != self.point) << k;

@@ -11,6 +11,7 @@ mod lattice;
 mod list;
 mod offset;
 mod search;
+mod store;
 mod vectors;
 mod volume;
 
@@ -22,29 +23,30 @@ pub use list::{BondList, Row, Rows};
 pub use offset::Offset;
 pub use search::cutoff;
 use search::search;
+pub use store::{Groups, Store};
 pub use vectors::{Adjacent, Vectors};
 pub use volume::CellShare;
 
 /// The bonds from points of one block to points of one block.
 #[derive(Debug, Clone)]
-pub enum Family {
+pub enum BlockBonds {
     /// Of any cloud of points.
     List(BondList),
     /// Of points on a regular grid.
     Lattice(BondLattice),
 }
 
-/// Runs code for whichever storage a family has.
+/// Runs code for whichever storage bonds have.
 macro_rules! with {
-    ($family:expr, $bonds:ident => $body:expr) => {
-        match $family {
-            Family::List($bonds) => $body,
-            Family::Lattice($bonds) => $body,
+    ($all:expr, $bonds:ident => $body:expr) => {
+        match $all {
+            BlockBonds::List($bonds) => $body,
+            BlockBonds::Lattice($bonds) => $body,
         }
     };
 }
 
-impl Family {
+impl BlockBonds {
     /// The blocks of the points that sum over these bonds, and of their neighbours.
     pub fn blocks(&self) -> [usize; 2] {
         with!(self, bonds => [bonds.here, bonds.there])
@@ -75,13 +77,26 @@ impl Family {
         with!(self, bonds => bonds.for_each_intact(found));
     }
 
-    /// Calls `found` with each point that has bonds here and the number of bytes that say which are
-    /// intact. These bytes are the same on any number of ranks.
+    /// Gives every bond so many numbers, which are 0.
+    pub fn remember(&mut self, numbers: usize) {
+        with!(self, bonds => bonds.store.remember(numbers));
+    }
+
+    /// What is kept of the bonds.
+    pub fn store(&self) -> &Store {
+        with!(self, bonds => &bonds.store)
+    }
+
+    /// What is kept of the bonds.
+    pub fn store_mut(&mut self) -> &mut Store {
+        with!(self, bonds => &mut bonds.store)
+    }
+
+    /// Calls `found` with each point that has bonds here and the number of bytes of a checkpoint that
+    /// they take. These bytes are the same on any number of ranks.
     pub fn row_lengths(&self, mut found: impl FnMut(usize, usize)) {
         match self {
-            Self::List(list) => list
-                .intact_rows()
-                .for_each(|(point, row)| found(point, row.len())),
+            Self::List(list) => list.for_each_row(|_, point, length| found(point, length)),
             Self::Lattice(lattice) => {
                 let length = lattice.row_length();
                 lattice.for_each_point(|point, _, _| found(point, length));
@@ -92,12 +107,10 @@ impl Family {
     /// Copies each point's bytes to where `next` says, and moves `next` on.
     pub fn save(&self, next: &mut [usize], bytes: &mut [u8]) {
         match self {
-            Self::List(list) => {
-                for (point, row) in list.intact_rows() {
-                    bytes[next[point]..next[point] + row.len()].copy_from_slice(row);
-                    next[point] += row.len();
-                }
-            }
+            Self::List(list) => list.for_each_row(|row, point, length| {
+                list.save_row(row, &mut bytes[next[point]..next[point] + length]);
+                next[point] += length;
+            }),
             Self::Lattice(lattice) => {
                 let length = lattice.row_length();
                 lattice.for_each_point(|point, vector, lane| {
@@ -113,9 +126,11 @@ impl Family {
     pub fn restore(&mut self, next: &mut [usize], bytes: &[u8]) {
         match self {
             Self::List(list) => {
-                for (point, row) in list.intact_rows_mut() {
-                    row.copy_from_slice(&bytes[next[point]..next[point] + row.len()]);
-                    next[point] += row.len();
+                let mut rows = Vec::new();
+                list.for_each_row(|row, point, length| rows.push((row, point, length)));
+                for (row, point, length) in rows {
+                    list.restore_row(row, &bytes[next[point]..next[point] + length]);
+                    next[point] += length;
                 }
             }
             Self::Lattice(lattice) => {

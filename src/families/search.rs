@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::material::lanes::WIDTH;
+use crate::lanes::WIDTH;
 use crate::partition::Domain;
 use crate::points::Point;
 use crate::points::bins::Bins;
@@ -117,7 +117,7 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
         list.points.shrink_to_fit();
         list.starts.shrink_to_fit();
         list.neighbours.shrink_to_fit();
-        list.intact.shrink_to_fit();
+        list.store.intact.shrink_to_fit();
         let groups = list.neighbours.par_iter();
         let largest = groups.map(|group| group.iter().copied().fold(0, u32::max));
         let largest = largest.max().max(list.points.last().copied());
@@ -189,7 +189,7 @@ fn append(lists: &mut [BondList], domain: &Domain, blocks: usize, chunk: &Chunk)
         group = groups.end;
         list.points.push(*point);
         list.neighbours.extend(&chunk.neighbours[groups.clone()]);
-        list.intact.extend(&chunk.intact[groups]);
+        list.store.intact.extend(&chunk.intact[groups]);
         list.starts.push(list.neighbours.len());
     }
 }

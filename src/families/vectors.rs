@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use crate::material::lanes::WIDTH;
+use crate::lanes::WIDTH;
 
 use super::grid::{Grid, HOLE};
 use super::offset::Offset;
+use super::store::Groups;
 
 /// Up to eight adjacent points: the first one's place and local index; the others follow.
 #[derive(Debug, Clone, Copy)]
@@ -29,10 +30,8 @@ pub struct Adjacent<'a> {
     pub bits: Range<usize>,
     /// The offsets.
     pub offsets: &'a [Offset],
-    /// Which bonds are still there; a byte for each offset.
-    pub intact: &'a mut [u8],
-    /// Which bonds can break.
-    pub breakable: Option<&'a [u8]>,
+    /// What is kept of the bonds; a group for each offset.
+    pub groups: Groups<'a>,
     /// Whether any weight is not 1, and whether those of the ends differ.
     pub weighted: [bool; 2],
     shifts: &'a [i32],
@@ -44,8 +43,7 @@ pub struct Vectors<'a> {
     pub(super) vectors: &'a [Vector],
     /// Number of the first one.
     pub(super) first: usize,
-    pub(super) intact: &'a mut [u8],
-    pub(super) breakable: Option<&'a [u8]>,
+    pub(super) groups: Groups<'a>,
 }
 
 /// What all vectors of a lattice share.
@@ -112,21 +110,18 @@ impl<'a> Vectors<'a> {
     pub fn split_at(self, vector: usize) -> (Self, Self) {
         let bits = vector * self.lattice.offsets.len();
         let (vectors_a, vectors_b) = self.vectors.split_at(vector);
-        let (intact_a, intact_b) = self.intact.split_at_mut(bits);
-        let breakable = self.breakable.map(|all| all.split_at(bits));
+        let [groups_a, groups_b] = self.groups.split_at(bits);
         let first = Self {
             lattice: self.lattice,
             vectors: vectors_a,
             first: self.first,
-            intact: intact_a,
-            breakable: breakable.map(|(a, _)| a),
+            groups: groups_a,
         };
         let second = Self {
             lattice: self.lattice,
             vectors: vectors_b,
             first: self.first + vector,
-            intact: intact_b,
-            breakable: breakable.map(|(_, b)| b),
+            groups: groups_b,
         };
         (first, second)
     }
@@ -150,8 +145,7 @@ impl<'a> Vectors<'a> {
             members: vector.members,
             bits: all,
             offsets,
-            breakable: self.breakable.map(|all| &all[bits.clone()]),
-            intact: &mut self.intact[bits],
+            groups: self.groups.range(bits),
             weighted,
             shifts: &shifts[vector.line as usize * around..(vector.line as usize + 1) * around],
         }

@@ -5,7 +5,8 @@
 //! influence λ |ξ|³. Forces act along ξ, also after large motions, so a rotated body is not free of
 //! forces.
 
-use super::{Bond, End, Lanes, Law};
+use super::{Along, Bond, Law};
+use crate::lanes::Lanes;
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,36 +18,42 @@ pub struct LinearMicroelastic {
     pub corrected_to: Option<f64>,
 }
 
-impl Law for LinearMicroelastic {
-    const CONSTANT: bool = true;
+impl<const D: usize> Law<D> for LinearMicroelastic {
+    /// What the micromodulus is multiplied by.
+    type Point = [Lanes; 1];
+    type Memory = [Lanes; 0];
+    /// Σ |ξ| Ṽ, m⁴.
+    type WholeSum = [Lanes; 1];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+    const CONSTANTS: usize = 1;
     const LINEAR: bool = true;
 
     #[inline(always)]
-    fn constant_share(&self, length: Lanes) -> Lanes {
-        length
+    fn whole_share(&self, length: Lanes) -> [Lanes; 1] {
+        [length]
     }
 
-    /// What the micromodulus is multiplied by: 1, or the surface correction 4 W₁ / (c Σ |ξ| Ṽ).
-    #[inline(always)]
-    fn constant(&self, sum: f64) -> f64 {
-        match self.corrected_to {
-            Some(energy) if sum > 0.0 => 4.0 * energy / (self.micromodulus * sum),
+    /// 1, or the surface correction 4 W₁ / (c Σ |ξ| Ṽ).
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        numbers[0] = match self.corrected_to {
+            Some(energy) if sums[0] > 0.0 => 4.0 * energy / (self.micromodulus * sums[0]),
             _ => 1.0,
-        }
+        };
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond, end: &End) -> Lanes {
-        bond.stretch * end.constant * (0.5 * self.micromodulus)
+    fn force(&self, bond: &Bond<D>, [factor]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
+        Along(bond.stretch * *factor * (0.5 * self.micromodulus))
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond, end: &End) -> Lanes {
-        bond.stretch * bond.stretch * bond.length * end.constant * (0.25 * self.micromodulus)
+    fn bond_energy(&self, bond: &Bond<D>, [factor]: &[Lanes; 1], _: &[Lanes; 0]) -> Lanes {
+        bond.stretch * bond.stretch * bond.length * *factor * (0.25 * self.micromodulus)
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, end: &End) -> Lanes {
-        end.constant * (0.5 * self.micromodulus) / length
+    fn stiffness(&self, length: Lanes, [factor]: &[Lanes; 1]) -> Lanes {
+        *factor * (0.5 * self.micromodulus) / length
     }
 }

@@ -1,107 +1,127 @@
 //! Material laws, one a file. A law knows one bond, eight at a time, and nothing of decks, points,
-//! ranks or state.
+//! ranks or fields.
 //!
-//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007). All
-//! laws here have force states along the bond, so each end contributes a number. It depends on the
-//! bond and on at most two numbers of the end's whole family: a *constant*, found once, and a *state*,
-//! found anew before each sum of forces.
+//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007). The
+//! force state T_i of an end depends on the bond, on numbers of the end's whole family (such as a
+//! dilatation) and on numbers that the bond keeps from step to step (such as a plastic stretch). How
+//! many there are of each, and how they are found, the law declares.
 
 mod any;
-pub mod arithmetic;
+pub mod bond;
+mod elastic_plastic_pmb;
+mod force_state;
 mod influence;
-pub mod lanes;
 mod linear_microelastic;
 mod normalised;
 mod ordinary;
 mod pmb;
 
-pub use any::AnyLaw;
-pub use arithmetic::Arithmetic;
+pub use any::{AnyLaw, Counts, MOST, PairLaw};
+pub(crate) use any::{with_law, with_pair};
+pub use bond::Bond;
+pub use elastic_plastic_pmb::ElasticPlasticPmb;
+pub use force_state::{Along, ForceState};
 pub use influence::Influence;
-pub use lanes::Lanes;
 pub use linear_microelastic::LinearMicroelastic;
 pub use normalised::Normalised;
 pub use ordinary::Ordinary;
 pub use pmb::Pmb;
 
-/// Eight bonds.
-#[derive(Debug, Clone, Copy)]
-pub struct Bond {
-    /// |ξ|, m.
-    pub length: Lanes,
-    /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|².
-    pub stretch: Lanes,
-}
+use crate::lanes::{Lanes, Numbers};
 
-/// What an end of eight bonds knows of its family.
-#[derive(Debug, Clone, Copy)]
-pub struct End {
-    /// [`Law::constant`] of the point, 0 if the law has none.
-    pub constant: Lanes,
-    /// [`Law::state`] of the point, 0 if the law has none.
-    pub state: Lanes,
-}
-
-/// A law with force states along the bond.
+/// A material law: what bonds add to the numbers of a point, and the force state that follows.
 ///
-/// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees.
-pub trait Law: Copy + Send + Sync {
-    /// Whether bonds need the constants of their ends.
-    const CONSTANT: bool = false;
+/// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
+/// run over bonds in these steps:
+///
+/// 1. once, over the whole family: [`Self::whole_share`] → sums → [`Self::constants`];
+/// 2. before each sum of forces, over the intact bonds, [`Self::STAGES`] times:
+///    [`Self::share`] → sums → [`Self::point`]; then the numbers are sent to the ghosts;
+/// 3. [`Self::memory`] and [`Self::force`] of both ends.
+pub trait Law<const D: usize>: Copy + Send + Sync {
+    /// The numbers of a point that bonds read at both ends: first the constants, then those that are
+    /// found anew before each sum of forces.
+    type Point: Numbers;
 
-    /// Whether bonds need the states of their ends.
-    const STATE: bool = false;
+    /// The numbers that a bond keeps for each of its ends; 0 at the start.
+    type Memory: Numbers;
 
-    /// Whether forces act along ξ and are linear in η; else they act along Y.
+    /// What is summed over the whole family, once.
+    type WholeSum: Numbers;
+
+    /// What a stage sums over the intact bonds; stages that sum less leave the rest at 0.
+    type Sum: Numbers;
+
+    /// The force state's form.
+    type Force: ForceState<D>;
+
+    /// How many of the numbers of a point are constants.
+    const CONSTANTS: usize = 0;
+
+    /// How many sums over the bonds come before that of the forces.
+    const STAGES: usize = 0;
+
+    /// Numbers of a point that only its own law reads, after those of [`Self::Point`].
+    const OWN_NUMBERS: usize = 0;
+
+    /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.
     const LINEAR: bool = false;
+
+    /// Whether its loops are worth a version for each set of vector instructions.
+    const HOT: bool = true;
 
     /// Whether [`Self::toughness_scale`] is not 1.
     const SCALED: bool = false;
 
-    /// What a bond adds to the sum that gives a point's constant.
+    /// What a bond of the undeformed body adds to the sums over the whole family.
     #[inline(always)]
-    fn constant_share(&self, _length: Lanes) -> Lanes {
-        Lanes::splat(0.0)
+    fn whole_share(&self, _length: Lanes) -> Self::WholeSum {
+        Self::WholeSum::splat(0.0)
     }
 
-    /// The constant of a point from the sum over its whole family.
+    /// The constants of a point from the sums over its whole family.
+    fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
+
+    /// What an intact bond adds to the sums of stage `S`, which may use the numbers found by the
+    /// stages before.
     #[inline(always)]
-    fn constant(&self, _sum: f64) -> f64 {
-        0.0
+    fn share<const S: usize>(&self, _bond: &Bond<D>, _own: &Self::Point) -> Self::Sum {
+        Self::Sum::splat(0.0)
     }
 
-    /// What an intact bond adds to the sum that gives a point's state.
+    /// The numbers of a point from the sums of a stage: those of [`Self::Point`], then its own ones.
+    fn point(&self, _stage: usize, _sums: &[f64], _numbers: &mut [f64]) {}
+
+    /// What a bond keeps for an end when it has come to this deformation.
     #[inline(always)]
-    fn state_share(&self, _bond: &Bond) -> Lanes {
-        Lanes::splat(0.0)
+    fn memory(&self, _bond: &Bond<D>, _end: &Self::Point, before: &Self::Memory) -> Self::Memory {
+        *before
     }
 
-    /// The state of a point from the sum over its intact bonds and its constant.
-    #[inline(always)]
-    fn state(&self, _sum: f64, _constant: f64) -> f64 {
-        0.0
-    }
-
-    /// The force state T of one end, N/m⁶; positive pulls the ends together.
-    fn force(&self, bond: &Bond, end: &End) -> Lanes;
+    /// The force state T of one end, N/m⁶; along the bond, positive pulls the ends together.
+    fn force(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Self::Force;
 
     /// What a bond adds to the strain energy density of one end, J/m⁶.
-    fn bond_energy(&self, bond: &Bond, end: &End) -> Lanes;
+    fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Lanes;
 
-    /// The part of a point's strain energy density (J/m³) that belongs to no single bond, from the
-    /// sum of the state and the constant.
-    #[inline(always)]
-    fn point_energy(&self, _sum: f64, _constant: f64) -> f64 {
+    /// The part of a point's strain energy density (J/m³) that belongs to no single bond.
+    fn point_energy(&self, _numbers: &[f64]) -> f64 {
         0.0
+    }
+
+    /// What a bond, broken or not, has dissipated at one end without breaking, J/m⁶.
+    #[inline(always)]
+    fn dissipated(&self, _length: Lanes, _memory: &Self::Memory) -> Lanes {
+        Lanes::splat(0.0)
     }
 
     /// A spring constant (N/m⁷) that the bond's and point's energy at one end nowhere exceed:
     /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For bond-based laws |∂T/∂η|.
-    fn stiffness(&self, length: Lanes, end: &End) -> Lanes;
+    fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
 
     /// What the critical stretch of a bond is multiplied by; the same from both ends.
     #[inline(always)]
-    fn toughness_scale(&self, _here: &End, _other: &Self, _there: &End) -> Lanes {
+    fn toughness_scale(&self, _here: &Self::Point, _other: &Self, _there: &Self::Point) -> Lanes {
         Lanes::splat(1.0)
     }
 }

@@ -8,7 +8,8 @@
 //!
 //! With the influence 1/|ξ| it is Diehl & Schweitzer's eq. 15: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
 
-use super::{Bond, End, Lanes, Law};
+use super::{Along, Bond, Law};
+use crate::lanes::Lanes;
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,43 +21,47 @@ pub struct Normalised {
     pub reference: Option<f64>,
 }
 
-impl Law for Normalised {
-    const CONSTANT: bool = true;
+impl<const D: usize> Law<D> for Normalised {
+    /// 1 / Σ |ξ| Ṽ, 1/m⁴.
+    type Point = [Lanes; 1];
+    type Memory = [Lanes; 0];
+    /// Σ |ξ| Ṽ, m⁴.
+    type WholeSum = [Lanes; 1];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+    const CONSTANTS: usize = 1;
     const SCALED: bool = true;
 
     #[inline(always)]
-    fn constant_share(&self, length: Lanes) -> Lanes {
-        length
+    fn whole_share(&self, length: Lanes) -> [Lanes; 1] {
+        [length]
     }
 
-    /// 1 / Σ |ξ| Ṽ, 1/m⁴.
-    #[inline(always)]
-    fn constant(&self, sum: f64) -> f64 {
-        if sum > 0.0 { 1.0 / sum } else { 0.0 }
-    }
-
-    #[inline(always)]
-    fn force(&self, bond: &Bond, end: &End) -> Lanes {
-        bond.stretch * end.constant * (2.0 * self.energy)
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        numbers[0] = if sums[0] > 0.0 { 1.0 / sums[0] } else { 0.0 };
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond, end: &End) -> Lanes {
-        bond.stretch * bond.stretch * bond.length * end.constant * self.energy
+    fn force(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
+        Along(bond.stretch * *inverse * (2.0 * self.energy))
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, end: &End) -> Lanes {
-        end.constant * (2.0 * self.energy) / length
+    fn bond_energy(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1], _: &[Lanes; 0]) -> Lanes {
+        bond.stretch * bond.stretch * bond.length * *inverse * self.energy
     }
 
     #[inline(always)]
-    fn toughness_scale(&self, here: &End, other: &Self, there: &End) -> Lanes {
+    fn stiffness(&self, length: Lanes, [inverse]: &[Lanes; 1]) -> Lanes {
+        *inverse * (2.0 * self.energy) / length
+    }
+
+    #[inline(always)]
+    fn toughness_scale(&self, here: &[Lanes; 1], other: &Self, there: &[Lanes; 1]) -> Lanes {
         let (Some(reference), Some(other_reference)) = (self.reference, other.reference) else {
             return Lanes::splat(1.0);
         };
-        let micromodulus =
-            here.constant * (2.0 * self.energy) + there.constant * (2.0 * other.energy);
+        let micromodulus = here[0] * (2.0 * self.energy) + there[0] * (2.0 * other.energy);
         (Lanes::splat(0.5 * (reference + other_reference)) / micromodulus).sqrt()
     }
 }

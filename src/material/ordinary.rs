@@ -16,9 +16,10 @@
 //! W = ½ κθ² + ½ (A/m) Σ ω ε² Ṽ, of which t is the derivative with bonds broken as well: m is that of
 //! the whole family, θ sums over intact bonds.
 
-use super::{Bond, End, Lanes, Law};
+use super::{Along, Bond, Law};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
+use crate::lanes::Lanes;
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,12 +61,6 @@ impl Ordinary {
     pub fn extensional(&self) -> f64 {
         self.extensional
     }
-
-    /// θ from Σ ω|ξ|εṼ over the intact bonds and 1/m.
-    #[inline(always)]
-    fn dilatation(&self, sum: f64, constant: f64) -> f64 {
-        self.dimension * sum * constant
-    }
 }
 
 /// k′ (Pa): ½ k′ θ² is the energy density of an isotropic expansion θ in the setting's dimensions.
@@ -82,52 +77,60 @@ fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
     }
 }
 
-impl Law for Ordinary {
-    const CONSTANT: bool = true;
-    const STATE: bool = true;
+impl<const D: usize> Law<D> for Ordinary {
+    /// 1/m, 1/m⁵; d κ θ/m, N/m⁷.
+    type Point = [Lanes; 2];
+    type Memory = [Lanes; 0];
+    /// m = Σ ω|ξ|²Ṽ, m⁵.
+    type WholeSum = [Lanes; 1];
+    /// Σ ω|ξ|εṼ over the intact bonds, m⁵.
+    type Sum = [Lanes; 1];
+    type Force = Along;
+    const CONSTANTS: usize = 1;
+    const STAGES: usize = 1;
+    /// θ.
+    const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]
-    fn constant_share(&self, length: Lanes) -> Lanes {
-        length * length
+    fn whole_share(&self, length: Lanes) -> [Lanes; 1] {
+        [length * length]
     }
 
-    /// 1/m, 1/m⁵.
-    #[inline(always)]
-    fn constant(&self, sum: f64) -> f64 {
-        if sum > 0.0 { 1.0 / sum } else { 0.0 }
-    }
-
-    #[inline(always)]
-    fn state_share(&self, bond: &Bond) -> Lanes {
-        bond.length * bond.length * bond.stretch
-    }
-
-    /// d κ θ/m, N/m⁷.
-    #[inline(always)]
-    fn state(&self, sum: f64, constant: f64) -> f64 {
-        self.dimension * self.volumetric * self.dilatation(sum, constant) * constant
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        numbers[0] = if sums[0] > 0.0 { 1.0 / sums[0] } else { 0.0 };
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond, end: &End) -> Lanes {
-        bond.length * (end.state + bond.stretch * end.constant * self.extensional)
+    fn share<const S: usize>(&self, bond: &Bond<D>, _: &[Lanes; 2]) -> [Lanes; 1] {
+        [bond.length * bond.length * bond.stretch]
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond, end: &End) -> Lanes {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64]) {
+        let dilatation = self.dimension * sums[0] * numbers[0];
+        numbers[1] = self.dimension * self.volumetric * dilatation * numbers[0];
+        numbers[2] = dilatation;
+    }
+
+    #[inline(always)]
+    fn force(&self, bond: &Bond<D>, [inverse, push]: &[Lanes; 2], _: &[Lanes; 0]) -> Along {
+        Along(bond.length * (*push + bond.stretch * *inverse * self.extensional))
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, [inverse, _]: &[Lanes; 2], _: &[Lanes; 0]) -> Lanes {
         let extension = bond.length * bond.stretch;
-        extension * extension * end.constant * (0.5 * self.extensional)
+        extension * extension * *inverse * (0.5 * self.extensional)
     }
 
-    #[inline(always)]
-    fn point_energy(&self, sum: f64, constant: f64) -> f64 {
-        0.5 * self.volumetric * self.dilatation(sum, constant).powi(2)
+    fn point_energy(&self, numbers: &[f64]) -> f64 {
+        0.5 * self.volumetric * numbers[2].powi(2)
     }
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, end: &End) -> Lanes {
+    fn stiffness(&self, _: Lanes, [inverse, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;
-        end.constant * (self.extensional + square * self.volumetric.max(0.0))
+        *inverse * (self.extensional + square * self.volumetric.max(0.0))
     }
 }

@@ -6,8 +6,9 @@
 
 use std::f64::consts::PI;
 
-use super::{Bond, End, Lanes, Law};
+use super::{Along, Bond, Law};
 use crate::dimension::Dimension;
+use crate::lanes::Lanes;
 
 /// The law with its only constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,19 +47,25 @@ impl Pmb {
     }
 }
 
-impl Law for Pmb {
+impl<const D: usize> Law<D> for Pmb {
+    type Point = [Lanes; 0];
+    type Memory = [Lanes; 0];
+    type WholeSum = [Lanes; 0];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+
     #[inline(always)]
-    fn force(&self, bond: &Bond, _: &End) -> Lanes {
-        bond.stretch * (0.5 * self.micromodulus)
+    fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 0]) -> Along {
+        Along(bond.stretch * (0.5 * self.micromodulus))
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond, _: &End) -> Lanes {
+    fn bond_energy(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 0]) -> Lanes {
         bond.stretch * bond.stretch * bond.length * (0.25 * self.micromodulus)
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, _: &End) -> Lanes {
+    fn stiffness(&self, length: Lanes, _: &[Lanes; 0]) -> Lanes {
         Lanes::splat(0.5 * self.micromodulus) / length
     }
 }

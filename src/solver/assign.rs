@@ -1,16 +1,18 @@
 //! From the plan to the law, the failure rule and the weights of every family.
 
-use crate::damage::CriticalStretch;
+use crate::damage::{CriticalStretch, Criterion};
 use crate::deck::plan::{
     Body, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Toughness, VolumeCorrection,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::families::{CellShare, Family};
-use crate::material::{AnyLaw, Influence, LinearMicroelastic, Normalised, Ordinary, Pmb};
+use crate::families::{BlockBonds, CellShare};
+use crate::material::{
+    AnyLaw, ElasticPlasticPmb, Influence, LinearMicroelastic, Normalised, Ordinary, PairLaw, Pmb,
+};
 use crate::points::distance_squared;
 
-use super::laws::{BlockLaws, Bonds, FamilyFailure, FamilyLaw};
+use super::bonds::{BlockLaws, Interaction};
 use super::model::Model;
 
 /// The elastic constants and the horizon (m) that an end of bonds has.
@@ -186,51 +188,46 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<CriticalStre
     })
 }
 
-/// Gives each family its law, failure rule and weights. A bond between blocks breaks at the smaller of
-/// the two thresholds, of which a block without damage has none.
+/// Gives the bonds between two blocks their laws, criterion and weights. A bond between blocks breaks
+/// at the smaller of the two thresholds, of which a block without damage has none.
 pub fn assign<const D: usize>(
     plan: &Plan,
     model: &Model<D>,
     blocks: &[BlockLaws],
-    families: Vec<Family>,
-) -> Vec<Bonds> {
+    all: Vec<BlockBonds>,
+) -> Vec<Interaction> {
     let per_point = blocks
         .iter()
         .any(|block| block.damage.is_some_and(|law| law.alpha > 0.0));
-    let with_states = blocks.iter().any(|block| block.law.has_state());
-    let give = |mut family: Family| {
-        let ends = family.blocks();
+    let give = |mut bonds: BlockBonds| {
+        let ends = bonds.blocks();
         let critical = ends.map(|block| blocks[block].damage.map(|law| law.critical));
-        let failure = match critical.into_iter().flatten().reduce(f64::min) {
-            None => FamilyFailure::Never,
+        let criterion = match critical.into_iter().flatten().reduce(f64::min) {
+            None => Criterion::Never,
             Some(_) if per_point => {
-                FamilyFailure::PerPoint(critical.map(|critical| critical.unwrap_or(0.0)))
+                Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0)))
             }
-            Some(smallest) => FamilyFailure::Uniform(smallest),
+            Some(smallest) => Criterion::Stretch(smallest),
         };
         let [here, there] = ends.map(|block| &plan.bodies[block]);
         let [own, far] = [(here, there), (there, here)]
             .map(|(body, other)| (body, other, constants(plan, body, other)));
-        weigh(plan, model, &mut family, [own, far]);
-        Bonds {
-            family,
-            law: FamilyLaw::new(
-                law(plan, own.0, own.2),
-                law(plan, far.0, far.2),
-                with_states,
-            ),
-            failure,
+        weigh(plan, model, &mut bonds, [own, far]);
+        Interaction {
+            bonds,
+            laws: PairLaw::new(law(plan, own.0, own.2), law(plan, far.0, far.2)),
+            criterion,
         }
     };
-    families.into_iter().map(give).collect()
+    all.into_iter().map(give).collect()
 }
 
-/// Sets the weights of a family, unless they are all 1. An end is its body, the other body and the
+/// Sets the weights of the bonds between two blocks, unless they are all 1. An end is its body, the other body and the
 /// constants there.
 fn weigh<const D: usize>(
     plan: &Plan,
     model: &Model<D>,
-    family: &mut Family,
+    bonds: &mut BlockBonds,
     ends: [(&Body, &Body, Constants); 2],
 ) {
     let [own, far] = &ends;
@@ -242,8 +239,8 @@ fn weigh<const D: usize>(
     if plain {
         return;
     }
-    // The far end of a family within a block has the same weights.
-    let [here, there] = family.blocks();
+    // The far end of bonds within a block has the same weights.
+    let [here, there] = bonds.blocks();
     let count = if here == there { 1 } else { 2 };
     for (end, (body, other, constants)) in ends.iter().enumerate().take(count) {
         let horizon = constants.horizon;
@@ -252,9 +249,9 @@ fn weigh<const D: usize>(
             let length = distance_squared([0.0; 3], offset).sqrt();
             share.at(offset) * influence(body, horizon, length)
         };
-        match family {
-            Family::Lattice(lattice) => lattice.weigh(end, weight),
-            Family::List(list) => list.weigh(end, |here, there| {
+        match bonds {
+            BlockBonds::Lattice(lattice) => lattice.weigh(end, weight),
+            BlockBonds::List(list) => list.weigh(end, |here, there| {
                 let [a, b] = [here, there].map(|point| model.position(point));
                 weight(std::array::from_fn(|k| b[k] - a[k]))
             }),

@@ -1,32 +1,12 @@
-//! The solver: state, bond loops, time integration, conditions and what is observed.
+//! The solver: bonds and their forces, motion, conditions, and what is observed.
 
 pub mod assign;
-mod cloud;
+pub mod bonds;
 pub mod conditions;
-pub mod damping;
-mod failure;
-pub mod forces;
-mod foremost;
-mod front;
-mod geometry;
 mod grids;
-pub mod instructions;
-mod kernels;
-pub mod laws;
-mod measures;
 pub mod model;
-pub mod observe;
-mod passes;
-mod places;
-mod saved;
-pub mod schedule;
+pub mod motion;
+pub mod observers;
 pub mod simulation;
-pub mod stable_step;
-pub mod state;
-mod sweep;
-mod tip;
-mod verlet;
 
-pub use kernels::{Response, Stored};
-pub use saved::Saved;
 pub use simulation::Simulation;

@@ -53,6 +53,21 @@ impl<const D: usize> Model<D> {
         }
     }
 
+    /// Without points.
+    #[cfg(test)]
+    pub fn empty() -> Self {
+        Self {
+            reference: std::array::from_fn(|_| Vec::new()),
+            volume: Vec::new(),
+            block: Vec::new(),
+            ids: Vec::new(),
+            density: Vec::new(),
+            damping: Vec::new(),
+            interior: 0,
+            total: 0,
+        }
+    }
+
     /// Number of owned points.
     pub fn owned(&self) -> usize {
         self.block.len()

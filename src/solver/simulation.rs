@@ -9,14 +9,14 @@ use crate::partition::distribute;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs};
+use super::bonds::{Acting, Evolution, ForceTimes, Forces};
 use super::conditions::{Conditions, apply_initials, members};
-use super::damping::Damping;
-use super::forces::{ForceTimes, Forces};
 use super::grids::grids;
 use super::model::Model;
-use super::stable_step::stable_step;
-use super::state::State;
-use super::verlet;
+use super::motion::clock::steps_to;
+use super::motion::fields::Needs;
+use super::motion::stable_step::stable_step;
+use super::motion::{Clock, Fields, verlet};
 
 /// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
 /// cell off their grid.
@@ -30,24 +30,18 @@ pub struct Simulation<'a, const D: usize> {
     pub comm: &'a dyn Communicator,
     /// The points.
     pub model: Model<D>,
-    /// Their motion.
-    pub state: State<D>,
+    /// What is known of the points.
+    pub fields: Fields<D>,
     /// Their bonds.
     pub forces: Forces<D>,
     /// Loads and supports.
     pub conditions: Conditions<D>,
-    /// What viscous damping takes.
-    pub damping: Damping,
     /// Volume of each owned point's whole family, broken bonds included, m³.
     pub family_volume: Vec<f64>,
     /// The stable step, s.
     pub stable_step: f64,
-    /// The time step, s.
-    pub step: f64,
-    /// Number of the last step.
-    pub last: u64,
-    /// Number of steps made.
-    pub number: u64,
+    /// Time and step.
+    pub clock: Clock,
     /// Where the time went.
     pub times: Times,
     bad: Option<BadPoint>,
@@ -68,6 +62,7 @@ pub struct Times {
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
+    time: f64,
     id: u64,
     index: usize,
 }
@@ -89,45 +84,47 @@ impl<'a, const D: usize> Simulation<'a, D> {
         families::arrange(&mut domain, &frames);
         let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
         let found = families::find(&domain, &frames, bodies, &cutoffs, dimension);
-        let (families, grids) = agree(comm, found)?;
+        let (bonds, grids) = agree(comm, found)?;
         let model = Model::new(plan, &domain);
         let bodies = plan.bodies.iter();
         let blocks: Vec<_> = bodies.map(|body| block_laws(plan, body)).collect();
         let halo = std::mem::take(&mut domain.halo);
         // The points are known to the model from here on.
         drop(domain);
-        let bonds = assign(plan, &model, &blocks, families);
-        let mut forces = Forces::new(comm, &model, bonds, grids, halo, blocks)?;
+        let interactions = assign(plan, &model, &blocks, bonds);
+        let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
         let stable = stable_step(comm, &model, &forces.stiffness(&model));
-        let mut state = State::new(&model);
-        let (step, last) = choose_step(plan, stable)?;
+        let clock = choose_step(plan, stable)?;
         let family_volume = forces.family_volume(&model);
         pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 
-        apply_initials(plan, comm, &model, &mut state)?;
         let conditions = Conditions::new(plan, comm, &model)?;
+        let needs = Needs {
+            loads: conditions.have_loads(),
+            supports: conditions.have_supports(),
+            damping: model.damping.iter().any(|rate| *rate > 0.0),
+        };
+        let mut fields = Fields::new(&model, needs);
+        apply_initials(plan, comm, &model, &mut fields)?;
         let mut simulation = Self {
-            damping: Damping::new(&model),
             plan,
             comm,
             model,
-            state,
+            fields,
             forces,
             conditions,
             family_volume,
             stable_step: stable,
-            step,
-            last,
-            number: 0,
+            clock,
             times: Times::default(),
             bad: None,
         };
-        simulation.conditions.place(&mut simulation.state, 0.0, 0.0);
-        simulation.act(None);
-        simulation
-            .damping
-            .after_moving(&simulation.model, &simulation.state, 0.0);
+        simulation.conditions.place(&mut simulation.fields, 0.0, 0.0);
+        simulation.conditions.load(&mut simulation.fields, 0.0, true);
+        simulation.evaluate(Evolution::Step);
+        simulation.guide();
+        simulation.fields.add_damped_energy(&simulation.model, 0.0);
         simulation.bad = simulation.first_bad();
         simulation.times = Times {
             set_up: start.elapsed(),
@@ -136,65 +133,76 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Time reached, s.
-    pub fn time(&self) -> f64 {
-        self.number as f64 * self.step
-    }
-
     /// Makes one step.
     pub fn advance(&mut self) {
         let start = Instant::now();
-        self.conditions.before_moving(&self.state);
-        verlet::kick_and_drift(&self.model, &mut self.state, self.step);
-        self.number += 1;
-        let time = self.time();
-        self.conditions.place(&mut self.state, time, self.step);
+        let step = self.clock.step();
+        self.conditions.before_moving(&self.fields);
+        verlet::kick_and_drift(&self.model, &mut self.fields, step);
+        self.clock.advance();
+        let time = self.clock.time();
+        self.conditions.place(&mut self.fields, time, step);
         self.times.motion += start.elapsed();
-        self.act(Some(self.step));
+        self.evaluate(Evolution::Step);
         let start = Instant::now();
-        self.conditions.after_moving(&self.model, &self.state);
-        self.damping
-            .after_moving(&self.model, &self.state, self.step);
-        self.times.motion += start.elapsed();
-    }
-
-    /// Forces, loads and reactions at the present place, and the half kick that ends a step.
-    fn act(&mut self, kick: Option<f64>) {
-        self.forces.evaluate(
-            self.comm,
-            &self.model,
-            &mut self.state.displacement,
-            &mut self.state.responses,
-            &mut self.times.forces,
-        );
-        let start = Instant::now();
-        let time = self.time();
-        self.conditions.add_loads(time, &mut self.state.responses);
-        let mut finite = match kick {
-            Some(step) => verlet::kick(&self.model, &mut self.state, step),
-            None => true,
-        };
-        let (model, state) = (&self.model, &mut self.state);
-        self.damping.add(model, state);
-        finite &= self.conditions.guide(model, state, time, self.step);
+        let (model, fields) = (&self.model, &mut self.fields);
+        self.conditions.load(fields, time, false);
+        let finite = verlet::kick(model, fields, step);
+        let finite = self.guide() && finite;
         if !finite && self.bad.is_none() {
             self.bad = self.first_bad();
         }
+        let (model, fields) = (&self.model, &mut self.fields);
+        self.conditions.add_work(model, fields);
+        fields.add_damped_energy(model, step);
         self.times.motion += start.elapsed();
+    }
+
+    /// Internal forces at the present place; bonds break and remember, or nothing changes but forces.
+    /// Collective.
+    pub fn evaluate(&mut self, evolution: Evolution) {
+        let fields = &mut self.fields;
+        let acting = Acting {
+            displacement: &mut fields.displacement,
+            force: &mut fields.internal_force,
+            freed: &mut fields.freed_energy,
+        };
+        let times = &mut self.times.forces;
+        self.forces
+            .evaluate(self.comm, &self.model, acting, evolution, times);
+    }
+
+    /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
+    fn guide(&mut self) -> bool {
+        let (time, step) = (self.clock.time(), self.clock.step());
+        self.conditions.guide(&self.model, &mut self.fields, time, step)
+    }
+
+    /// Finds from the state, after it has been put back, what is not part of it. Collective.
+    pub(super) fn find_anew(&mut self) {
+        let time = self.clock.time();
+        self.conditions.load(&mut self.fields, time, true);
+        self.fields.add_damped_energy(&self.model, 0.0);
+        self.evaluate(Evolution::None);
     }
 
     /// The point with the smallest id among those with a motion or force that is not finite.
     fn first_bad(&self) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
-                let motion = self.state.velocity.iter().chain(&self.state.displacement);
-                let force = self.state.responses[*k].force;
-                let mut values = motion.map(|field| field[*k]).chain(force);
-                values.any(|value| !value.is_finite())
+                let Fields {
+                    displacement,
+                    velocity,
+                    internal_force,
+                    ..
+                } = &self.fields;
+                let mut columns = displacement.iter().chain(velocity).chain(internal_force);
+                columns.any(|column| !column[*k].is_finite())
             })
             .min_by_key(|k| self.model.ids[*k])
             .map(|index| BadPoint {
-                step: self.number,
+                step: self.clock.number(),
+                time: self.clock.time(),
                 id: self.model.ids[index],
                 index,
             })
@@ -225,11 +233,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
                     "step {} (t = {:.6e} s): the motion of point {} of body `{}` is not finite; \
                      reference position {:?} m. {hint} (time step {:.3e} s, stable {:.3e} s)",
                     bad.step,
-                    bad.step as f64 * self.step,
+                    bad.time,
                     bad.id,
                     self.plan.bodies[block].name,
                     &self.model.position(bad.index)[..D],
-                    self.step,
+                    self.clock.step(),
                     self.stable_step,
                 )))
             }
@@ -238,10 +246,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// The time step and the number of the last one. An automatic step divides the run evenly.
-fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
-    let (step, last) = match plan.time.step {
-        StepRule::Fixed(step) => (step, steps_to(plan.time.end, step)),
+/// The clock of a run. An automatic step divides the run evenly.
+fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
+    let end = plan.time.end;
+    let (step, steps) = match plan.time.step {
+        StepRule::Fixed(step) => (step, steps_to(end, step)),
         StepRule::Automatic(_) if stable.is_infinite() => {
             return Err(Error::input(
                 "no point has a neighbour, so there is no stable step; is the horizon in m and \
@@ -249,26 +258,16 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
             ));
         }
         StepRule::Automatic(safety) => {
-            let last = (plan.time.end / (safety * stable)).ceil();
-            (plan.time.end / last, last)
+            let steps = (end / (safety * stable)).ceil();
+            (end / steps, steps)
         }
     };
-    if last > 1e15 {
+    if steps > 1e15 {
         return Err(Error::input(format!(
-            "[time] end: {} s take {last:.1e} steps of {step:.1e} s",
-            plan.time.end
+            "[time] end: {end} s take {steps:.1e} steps of {step:.1e} s"
         )));
     }
-    Ok((step, last.max(1.0) as u64))
-}
-
-/// The number of steps (s) that reach an end time (s), up to rounding.
-pub(super) fn steps_to(end: f64, step: f64) -> f64 {
-    let steps = end / step;
-    match (steps - steps.round()).abs() < 1e-9 * steps {
-        true => steps.round(),
-        false => steps.ceil(),
-    }
+    Ok(Clock::new(step, end))
 }
 
 /// Breaks the bonds that cross a pre-crack. Both ends ask with the lower id first.

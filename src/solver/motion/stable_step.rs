@@ -9,20 +9,19 @@ use nalgebra::Matrix3;
 
 use crate::comm::{self, Communicator};
 
-use super::model::Model;
+use crate::solver::model::Model;
 
 /// The stable step (s) over all ranks; infinite where no point has a bond. `stiffness` holds D of
-/// each owned point (N/m⁴).
+/// each owned point (N/m⁴) as columns xx, yy, zz, xy, yz, xz.
 pub fn stable_step<const D: usize>(
     comm: &dyn Communicator,
     model: &Model<D>,
-    stiffness: &[[f64; 6]],
+    stiffness: &[Vec<f64>; 6],
 ) -> f64 {
-    let own = stiffness
-        .iter()
-        .enumerate()
-        .map(|(point, entries)| {
-            (2.0 * model.density_of(point) / largest_eigenvalue(entries)).sqrt()
+    let own = (0..model.owned())
+        .map(|point| {
+            let entries = stiffness.each_ref().map(|column| column[point]);
+            (2.0 * model.density_of(point) / largest_eigenvalue(&entries)).sqrt()
         })
         .fold(f64::INFINITY, f64::min);
     let mut step = [own];

@@ -1,7 +1,15 @@
 //! Eight numbers that are worked on together: the same quantity of eight bonds.
 //!
 //! Plain arrays and IEEE operations without contraction: whatever instructions the compiler picks,
-//! the bits are the same. Operations of which this does not hold are in [`super::arithmetic`].
+//! the bits are the same. Operations of which this does not hold are in [`arithmetic`].
+
+pub mod arithmetic;
+pub mod instructions;
+pub mod numbers;
+
+pub use arithmetic::Arithmetic;
+pub use instructions::Instructions;
+pub use numbers::Numbers;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
@@ -50,6 +58,18 @@ impl Lanes {
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    /// The larger of each pair of lanes; of a NaN and a number, the number in `other`.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    /// Without sign.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        self.map(f64::abs)
     }
 
     /// The lanes whose bit is set; `otherwise` in the others.

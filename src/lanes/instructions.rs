@@ -1,7 +1,7 @@
 //! Which vector instructions the loops over bonds use: the best that all ranks have, found at run
 //! time.
 //!
-//! Between two kinds results differ in the last bits, see [`crate::material::arithmetic`]; between
+//! Between two kinds results differ in the last bits, see [`super::arithmetic`]; between
 //! ranks they never do.
 
 use crate::comm::{self, Communicator, agree};
@@ -101,8 +101,8 @@ impl Instructions {
 fn estimates_of_roots() -> f64 {
     #[cfg(target_arch = "x86_64")]
     {
-        use crate::material::Lanes;
-        use crate::material::arithmetic::estimate_of_inverse_sqrt;
+        use crate::lanes::Lanes;
+        use crate::lanes::arithmetic::estimate_of_inverse_sqrt;
         let mut hash = 0_u64;
         for k in 0..2048 {
             let a = Lanes(std::array::from_fn(|lane| {

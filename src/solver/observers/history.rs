@@ -1,18 +1,16 @@
-//! What is seen of a run: fields for the result; sums, probes, fronts and crack tips for the history.
+//! The history of a run: energies and other sums, probes, fronts and crack tips.
 
 use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{self, Communicator};
-use crate::deck::plan::Field;
 use crate::error::Result;
 use crate::points::distance_squared;
+use crate::solver::Simulation;
+use crate::solver::conditions::{members, not_empty};
 
-use super::Simulation;
-use super::conditions::{members, not_empty};
 use super::front::Front;
-use super::kernels::Stored;
-use super::measures::Expansion;
+use super::snapshot::Snapshot;
 use super::tip::Tip;
 
 /// Points summed by one task.
@@ -20,101 +18,6 @@ const CHUNK: usize = 4096;
 
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// What the bonds hold at one moment; found once, used by fields and history.
-pub struct Snapshot {
-    stored: Vec<Stored>,
-}
-
-impl Snapshot {
-    /// Looks at a run now.
-    pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        let displacement = &simulation.state.displacement;
-        Self {
-            stored: simulation.forces.stored(&simulation.model, displacement),
-        }
-    }
-
-    /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
-    /// al. 2014, eq. 7). A point without family has 0.
-    fn damage(&self, family_volume: &[f64], point: usize) -> f64 {
-        match family_volume[point] {
-            0.0 => 0.0,
-            whole => 1.0 - self.stored[point].volume / whole,
-        }
-    }
-
-    /// A field over the owned points, row-major with [`Field::components`] entries a point; of the
-    /// moment of the snapshot.
-    pub fn field<const D: usize>(
-        &self,
-        simulation: &mut Simulation<'_, D>,
-        field: Field,
-    ) -> Vec<f64> {
-        let (model, state) = (&simulation.model, &simulation.state);
-        let displacement = &state.displacement;
-        let count = model.owned();
-        match field {
-            Field::Displacement => rows(count, |d, k| state.displacement[d][k], D),
-            Field::Velocity => rows(count, |d, k| state.velocity[d][k], D),
-            Field::Acceleration => {
-                let acceleration =
-                    |d: usize, k: usize| state.responses[k].force[d] / model.density_of(k);
-                rows(count, acceleration, D)
-            }
-            Field::ForceDensity => {
-                let damping = |d: usize, k: usize| {
-                    model.damping_of(k) * model.density_of(k) * state.velocity[d][k]
-                };
-                let internal = |d: usize, k: usize| state.responses[k].force[d] + damping(d, k);
-                let mut values = rows(count, internal, D);
-                for (point, component, reaction) in simulation.conditions.reactions() {
-                    values[3 * point + component] -= reaction;
-                }
-                for (point, load) in simulation.conditions.loads() {
-                    (0..D).for_each(|d| values[3 * point + d] -= load[d]);
-                }
-                values
-            }
-            Field::Damage => (0..count)
-                .map(|point| self.damage(&simulation.family_volume, point))
-                .collect(),
-            Field::StrainEnergyDensity => self.stored.iter().map(|stored| stored.energy).collect(),
-            Field::Neighbours => {
-                let neighbours = |stored: &Stored| f64::from(stored.neighbours);
-                self.stored.iter().map(neighbours).collect()
-            }
-            Field::Dilatation => {
-                let expansion = simulation.forces.expansion(model, displacement);
-                let dilatation = |sums: &Expansion| match sums.weighted_volume {
-                    0.0 => 0.0,
-                    volume => D as f64 * sums.growth / volume,
-                };
-                expansion.iter().map(dilatation).collect()
-            }
-            Field::WeightedVolume => {
-                let expansion = simulation.forces.expansion(model, displacement);
-                expansion.iter().map(|sums| sums.weighted_volume).collect()
-            }
-            Field::Stress => {
-                let stress = simulation.forces.stress(model, displacement);
-                stress.into_iter().flatten().collect()
-            }
-            Field::Rank => vec![simulation.comm.rank() as f64; count],
-        }
-    }
-}
-
-/// Vectors padded to three components.
-fn rows(count: usize, value: impl Fn(usize, usize) -> f64, dimension: usize) -> Vec<f64> {
-    let mut values = vec![0.0; 3 * count];
-    for k in 0..count {
-        for d in 0..dimension {
-            values[3 * k + d] = value(d, k);
-        }
-    }
-    values
-}
 
 /// A point that is followed.
 struct Probe {
@@ -144,7 +47,7 @@ pub struct Energies {
     pub fracture: f64,
     /// Work done by loads and supports.
     pub work: f64,
-    /// Taken by viscous damping.
+    /// Taken by viscous damping and by bonds that yield.
     pub dissipated: f64,
     /// Kinetic + strain + fracture + dissipated − work, less its value at the start: 0 for an exact integrator.
     pub error: f64,
@@ -257,26 +160,24 @@ impl HistoryObserver {
         snapshot: &Snapshot,
     ) -> HistoryRow {
         let comm = simulation.comm;
+        let (model, fields) = (&simulation.model, &simulation.fields);
         let mut sums = point_sums(simulation, snapshot);
-        sums.push(simulation.conditions.work());
-        let mut dissipated = ExactSum::default();
-        for energy in &simulation.damping.dissipated {
-            dissipated.add(*energy);
+        sums.push(sum(fields.external_work.as_deref().unwrap_or_default()));
+        let mut dissipated = sum(fields.damped_energy.as_deref().unwrap_or_default());
+        for (density, volume) in snapshot.stored.dissipated.iter().zip(&model.volume) {
+            dissipated.add(density * volume);
         }
         sums.push(dissipated);
         for members in &self.reactions {
-            sums.extend(simulation.conditions.reaction(&simulation.model, members));
+            sums.extend(simulation.conditions.reaction(model, fields, members));
         }
         let sums = reduce(comm, &mut sums);
         let (own, rest) = sums.split_at(3 + D);
         let (work, dissipated, reactions) = (rest[0], rest[1], &rest[2..]);
 
         let cracked = Cracked::new(simulation, snapshot);
-        let intact: u64 = snapshot
-            .stored
-            .iter()
-            .map(|s| u64::from(s.neighbours))
-            .sum();
+        let neighbours = snapshot.stored.neighbours.iter();
+        let intact: u64 = neighbours.map(|count| *count as u64).sum();
         let mut counts = [intact, cracked.points];
         comm.sum(&mut counts);
         let [intact, cracked_points] = counts;
@@ -294,8 +195,8 @@ impl HistoryObserver {
         };
         let broken = (first_intact - intact) / 2;
         let mut values = vec![
-            simulation.time(),
-            simulation.number as f64,
+            simulation.clock.time(),
+            simulation.clock.number() as f64,
             energies.kinetic,
             energies.strain,
             energies.fracture,
@@ -326,7 +227,7 @@ impl HistoryObserver {
 
     /// Displacement and velocity of the probes, from the ranks that own their points to all.
     fn probe_values<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<f64> {
-        let state = &simulation.state;
+        let fields = &simulation.fields;
         let mut bits: Vec<u64> = self
             .probes
             .iter()
@@ -334,8 +235,8 @@ impl HistoryObserver {
                 let at = |field: &[Vec<f64>; D], d: usize| {
                     probe.point.map_or(0, |point| field[d][point].to_bits())
                 };
-                let displacement = (0..D).map(move |d| at(&state.displacement, d));
-                displacement.chain((0..D).map(move |d| at(&state.velocity, d)))
+                let displacement = (0..D).map(move |d| at(&fields.displacement, d));
+                displacement.chain((0..D).map(move |d| at(&fields.velocity, d)))
             })
             .collect();
         // One rank has the bits, the others add nothing.
@@ -344,23 +245,29 @@ impl HistoryObserver {
     }
 }
 
+fn sum(values: &[f64]) -> ExactSum {
+    let mut sum = ExactSum::default();
+    values.iter().for_each(|value| sum.add(*value));
+    sum
+}
+
 /// Kinetic, strain and fracture energy (J), then momentum by component (kg m/s).
 fn point_sums<const D: usize>(
     simulation: &Simulation<'_, D>,
     snapshot: &Snapshot,
 ) -> Vec<ExactSum> {
-    let (model, state) = (&simulation.model, &simulation.state);
+    let (model, fields) = (&simulation.model, &simulation.fields);
     let add = |sums: &mut [ExactSum], point: usize| {
         let mass = model.density_of(point) * model.volume[point];
         let mut square = 0.0;
         for (d, sum) in sums[3..].iter_mut().enumerate() {
-            let velocity = state.velocity[d][point];
+            let velocity = fields.velocity[d][point];
             square += velocity * velocity;
             sum.add(mass * velocity);
         }
         sums[0].add(0.5 * mass * square);
-        sums[1].add(snapshot.stored[point].energy * model.volume[point]);
-        sums[2].add(state.responses[point].set_free);
+        sums[1].add(snapshot.stored.energy[point] * model.volume[point]);
+        sums[2].add(fields.freed_energy[point]);
     };
     (0..model.owned().div_ceil(CHUNK))
         .into_par_iter()

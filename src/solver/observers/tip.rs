@@ -3,9 +3,9 @@
 use crate::deck::plan;
 use crate::error::Result;
 
-use super::Simulation;
-use super::conditions::{members, not_empty};
-use super::foremost::{Course, Reached};
+use crate::solver::Simulation;
+use crate::solver::conditions::{members, not_empty};
+use super::reach::{Course, Reached};
 
 /// A crack tip that is followed.
 pub struct Tip {
@@ -54,7 +54,7 @@ impl Tip {
             position: [f64::NAN; 3],
         });
         let mut row = position[..D].to_vec();
-        row.extend([along, self.growth.speed(simulation.time(), along)]);
+        row.extend([along, self.growth.speed(simulation.clock.time(), along)]);
         row
     }
 

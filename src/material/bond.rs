@@ -1,16 +1,20 @@
-//! Eight bonds as the kernels see them: what is read of both ends, and the geometry between them.
+//! Eight bonds as laws see them: the geometry between their ends.
 
-use crate::material::{Arithmetic, Bond, End, Lanes};
+use crate::lanes::{Arithmetic, Lanes};
 
-/// The influence and the share of the volume that a bond has in the sums of its two ends.
+/// Eight bonds.
 #[derive(Debug, Clone, Copy)]
-pub enum Weights {
-    /// 1.
-    One,
-    /// The same at both ends.
-    Same(Lanes),
-    /// Those of the own and of the far end.
-    Each([Lanes; 2]),
+pub struct Bond<const D: usize> {
+    /// ξ by component, m.
+    pub reference: [Lanes; D],
+    /// |ξ|, m.
+    pub length: Lanes,
+    /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|².
+    pub stretch: Lanes,
+    /// Y by component, m; for linear laws ξ.
+    pub along: [Lanes; D],
+    /// Its inverse length, 1/m.
+    pub inverse_length: Lanes,
 }
 
 /// ξ of eight bonds.
@@ -28,85 +32,15 @@ pub struct Reference<const D: usize> {
     pub inverse_square: Lanes,
 }
 
-/// Eight bonds.
-pub struct Loaded<const D: usize> {
-    /// What laws see.
-    pub bond: Bond,
-    /// ξ by component, m.
-    pub reference: [Lanes; D],
-    /// What the force is along by component, m: Y, or ξ for linear laws.
-    pub along: [Lanes; D],
-    /// Its inverse length, 1/m.
-    pub inverse_length: Lanes,
-    /// Volumes of the own ends, m³.
-    pub own_volume: Lanes,
-    /// Volumes of the far ends, m³.
-    pub volume: Lanes,
-    /// What volumes are multiplied by.
-    pub weights: Weights,
-    /// What the own and the far ends know of their families.
-    pub ends: [End; 2],
-    /// Stretches at which the bonds of the own and the far ends break.
-    pub thresholds: [Lanes; 2],
-    /// A bit for each bond that is intact.
-    pub intact: u8,
-    /// A bit for each bond, broken or not; only for kernels that want it.
-    pub filled: u8,
-    /// A bit for each bond that can break.
-    pub breakable: u8,
-}
-
-impl Weights {
-    /// That of the own end.
-    #[inline(always)]
-    pub fn own(self) -> Lanes {
-        match self {
-            Self::One => Lanes::splat(1.0),
-            Self::Same(own) | Self::Each([own, _]) => own,
-        }
-    }
-
-    /// That of the far end.
-    #[inline(always)]
-    pub fn far(self) -> Lanes {
-        match self {
-            Self::One => Lanes::splat(1.0),
-            Self::Same(far) | Self::Each([_, far]) => far,
-        }
-    }
-}
-
-impl<const D: usize> Loaded<D> {
-    /// A bit for each intact bond that counts in the own end's sums.
-    #[inline(always)]
-    pub fn family(&self) -> u8 {
-        match self.weights {
-            Weights::One => self.intact,
-            weights => self.intact & weights.own().above(0.0),
-        }
-    }
-}
-
-/// What bonds look like whose ends move by η (m) against one another.
-#[derive(Debug, Clone, Copy)]
-pub struct Deformed<const D: usize> {
-    /// What laws see.
-    pub bond: Bond,
-    /// See [`Loaded::along`].
-    pub along: [Lanes; D],
-    /// See [`Loaded::inverse_length`].
-    pub inverse_length: Lanes,
-}
-
 /// With γ = η·(2ξ + η), |Y|² = |ξ|² + γ and the stretch is s = γ/(|ξ|² (2 + s)), which loses no digits
 /// when |Y| is close to |ξ| and is the same to the bit from both ends. `linear` takes what is linear
-/// in η instead.
+/// in η instead. η is the displacement of the far end relative to the own one, m.
 #[inline(always)]
 pub fn deform<A: Arithmetic, const D: usize>(
     reference: &Reference<D>,
     eta: [Lanes; D],
     linear: bool,
-) -> Deformed<D> {
+) -> Bond<D> {
     let Reference {
         along: xi,
         square,
@@ -119,11 +53,10 @@ pub fn deform<A: Arithmetic, const D: usize>(
         for d in 1..D {
             growth = A::multiply_add(eta[d], xi[d], growth);
         }
-        return Deformed {
-            bond: Bond {
-                length,
-                stretch: growth * inverse_square,
-            },
+        return Bond {
+            reference: xi,
+            length,
+            stretch: growth * inverse_square,
             along: xi,
             inverse_length: inverse,
         };
@@ -137,11 +70,10 @@ pub fn deform<A: Arithmetic, const D: usize>(
     let inverse_length = A::inverse_sqrt(deformed);
     // 1 + |Y|/|ξ| = 2 + s.
     let sum = A::multiply_add(deformed * inverse_length, inverse, Lanes::splat(1.0));
-    Deformed {
-        bond: Bond {
-            length,
-            stretch: growth * inverse_square / sum,
-        },
+    Bond {
+        reference: xi,
+        length,
+        stretch: growth * inverse_square / sum,
         along,
         inverse_length,
     }
@@ -150,7 +82,7 @@ pub fn deform<A: Arithmetic, const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::arithmetic::{Fused, Plain};
+    use crate::lanes::arithmetic::{Fused, Plain};
 
     fn reference(xi: [f64; 2]) -> Reference<2> {
         let square = xi[0] * xi[0] + xi[1] * xi[1];
@@ -165,7 +97,7 @@ mod tests {
 
     fn stretch<A: Arithmetic>(xi: [f64; 2], eta: [f64; 2]) -> f64 {
         let deformed = deform::<A, 2>(&reference(xi), eta.map(Lanes::splat), false);
-        deformed.bond.stretch.0[0]
+        deformed.stretch.0[0]
     }
 
     #[test]

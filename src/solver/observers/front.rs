@@ -3,9 +3,9 @@
 use crate::deck::plan;
 use crate::error::Result;
 
-use super::Simulation;
-use super::foremost::Course;
-use super::observe::Snapshot;
+use crate::solver::Simulation;
+use super::reach::Course;
+use super::snapshot::Snapshot;
 
 /// A front that is followed.
 pub struct Front {

@@ -5,7 +5,7 @@ use crate::comm::{self, Communicator, total};
 use crate::deck::plan::Line;
 use crate::points::distance_squared;
 
-use super::Simulation;
+use crate::solver::Simulation;
 
 /// Points count as equally far, and as within a distance, up to this share of the horizon.
 const TOLERANCE: f64 = 1e-9;

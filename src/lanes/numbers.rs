@@ -1,0 +1,190 @@
+//! A fixed number of [`Lanes`], and the columns of plain numbers that they are read from and added to.
+
+use super::{Lanes, WIDTH};
+
+/// Several quantities of eight bonds or points: `[Lanes; N]`, or a pair of such.
+pub trait Numbers: Copy + Send + Sync {
+    /// How many.
+    const COUNT: usize;
+
+    /// One column of numbers for each, to read.
+    type Columns<'a>: Copy + Send + Sync;
+
+    /// One column of numbers for each, to add to.
+    type ColumnsMut<'a>: Send;
+
+    /// From a function of the number of each quantity.
+    fn each(value: impl FnMut(usize) -> Lanes) -> Self;
+
+    /// One of the quantities.
+    fn get(&self, quantity: usize) -> Lanes;
+
+    /// One of the quantities, to change it.
+    fn get_mut(&mut self, quantity: usize) -> &mut Lanes;
+
+    /// The first columns of several.
+    ///
+    /// # Panics
+    /// When there are fewer.
+    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_>;
+
+    /// The first columns of several, to add to.
+    ///
+    /// # Panics
+    /// When there are fewer.
+    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_>;
+
+    /// One of the columns.
+    fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64];
+
+    /// The columns before an entry, and those from it on.
+    fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2];
+
+    /// One of the columns.
+    fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64];
+
+    /// The same value everywhere.
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self::each(|_| Lanes::splat(value))
+    }
+}
+
+impl<const N: usize> Numbers for [Lanes; N] {
+    const COUNT: usize = N;
+    type Columns<'a> = [&'a [f64]; N];
+    type ColumnsMut<'a> = [&'a mut [f64]; N];
+
+    #[inline(always)]
+    fn each(value: impl FnMut(usize) -> Lanes) -> Self {
+        std::array::from_fn(value)
+    }
+
+    #[inline(always)]
+    fn get(&self, quantity: usize) -> Lanes {
+        self[quantity]
+    }
+
+    #[inline(always)]
+    fn get_mut(&mut self, quantity: usize) -> &mut Lanes {
+        &mut self[quantity]
+    }
+
+    fn columns(all: &[Vec<f64>]) -> [&[f64]; N] {
+        std::array::from_fn(|k| &all[k][..])
+    }
+
+    fn columns_mut(all: &mut [Vec<f64>]) -> [&mut [f64]; N] {
+        let mut all = all.iter_mut();
+        std::array::from_fn(|_| &mut all.next().expect("a column for each quantity")[..])
+    }
+
+    #[inline(always)]
+    fn column<'a>(columns: &[&'a [f64]; N], quantity: usize) -> &'a [f64] {
+        columns[quantity]
+    }
+
+    fn split_at(columns: [&mut [f64]; N], middle: usize) -> [[&mut [f64]; N]; 2] {
+        let mut firsts = columns;
+        let seconds = std::array::from_fn(|k| {
+            let (first, second) = std::mem::take(&mut firsts[k]).split_at_mut(middle);
+            firsts[k] = first;
+            second
+        });
+        [firsts, seconds]
+    }
+
+    #[inline(always)]
+    fn column_mut<'a>(columns: &'a mut [&mut [f64]; N], quantity: usize) -> &'a mut [f64] {
+        columns[quantity]
+    }
+}
+
+impl<A: Numbers, B: Numbers> Numbers for (A, B) {
+    const COUNT: usize = A::COUNT + B::COUNT;
+    type Columns<'a> = (A::Columns<'a>, B::Columns<'a>);
+    type ColumnsMut<'a> = (A::ColumnsMut<'a>, B::ColumnsMut<'a>);
+
+    #[inline(always)]
+    fn each(mut value: impl FnMut(usize) -> Lanes) -> Self {
+        let first = A::each(&mut value);
+        (first, B::each(|k| value(A::COUNT + k)))
+    }
+
+    #[inline(always)]
+    fn get(&self, quantity: usize) -> Lanes {
+        if quantity < A::COUNT {
+            self.0.get(quantity)
+        } else {
+            self.1.get(quantity - A::COUNT)
+        }
+    }
+
+    #[inline(always)]
+    fn get_mut(&mut self, quantity: usize) -> &mut Lanes {
+        if quantity < A::COUNT {
+            self.0.get_mut(quantity)
+        } else {
+            self.1.get_mut(quantity - A::COUNT)
+        }
+    }
+
+    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_> {
+        (A::columns(all), B::columns(&all[A::COUNT..]))
+    }
+
+    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_> {
+        let (first, second) = all.split_at_mut(A::COUNT);
+        (A::columns_mut(first), B::columns_mut(second))
+    }
+
+    #[inline(always)]
+    fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64] {
+        if quantity < A::COUNT {
+            A::column(&columns.0, quantity)
+        } else {
+            B::column(&columns.1, quantity - A::COUNT)
+        }
+    }
+
+    fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2] {
+        let [a, c] = A::split_at(columns.0, middle);
+        let [b, d] = B::split_at(columns.1, middle);
+        [(a, b), (c, d)]
+    }
+
+    #[inline(always)]
+    fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64] {
+        if quantity < A::COUNT {
+            A::column_mut(&mut columns.0, quantity)
+        } else {
+            B::column_mut(&mut columns.1, quantity - A::COUNT)
+        }
+    }
+}
+
+/// Eight numbers of a column.
+///
+/// # Safety
+/// The column must have eight entries from `first` on.
+#[inline(always)]
+pub unsafe fn eight(column: &[f64], first: usize) -> Lanes {
+    debug_assert!(first + WIDTH <= column.len());
+    // SAFETY: passed on to the caller.
+    Lanes(unsafe { column.as_ptr().add(first).cast::<[f64; WIDTH]>().read() })
+}
+
+/// The numbers of a column at eight indices.
+///
+/// # Safety
+/// The column must be longer than every index.
+#[inline(always)]
+pub unsafe fn gather(column: &[f64], indices: &[u32; WIDTH]) -> Lanes {
+    let mut lanes = Lanes::splat(0.0);
+    for (lane, index) in lanes.0.iter_mut().zip(indices) {
+        debug_assert!((*index as usize) < column.len());
+        // SAFETY: passed on to the caller.
+        *lane = unsafe { *column.get_unchecked(*index as usize) };
+    }
+    lanes
+}

@@ -1,0 +1,57 @@
+//! Elastic–perfectly plastic microelastic material: f = c (s − s_p) e, where the plastic stretch s_p
+//! of a bond follows so that |s − s_p| never exceeds the yield stretch s_y.
+//!
+//! Below the yield stretch this is the prototype microelastic material (Silling & Askari 2005), to
+//! which unloading returns on a line of the same slope. The bond's elastic energy is c (s − s_p)² |ξ|/2;
+//! to let s_p grow by Δs_p takes c s_y |Δs_p| |ξ|, which is dissipated.
+
+use super::{Along, Bond, Law, Pmb};
+use crate::lanes::Lanes;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElasticPlasticPmb {
+    /// The elastic part.
+    pub elastic: Pmb,
+    /// s_y.
+    pub yield_stretch: f64,
+}
+
+impl<const D: usize> Law<D> for ElasticPlasticPmb {
+    type Point = [Lanes; 0];
+    /// s_p, and the sum of all its changes, counted positive.
+    type Memory = [Lanes; 2];
+    type WholeSum = [Lanes; 0];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+
+    #[inline(always)]
+    fn memory(&self, bond: &Bond<D>, _: &[Lanes; 0], before: &[Lanes; 2]) -> [Lanes; 2] {
+        let [plastic, path] = *before;
+        let limit = Lanes::splat(self.yield_stretch);
+        // s_p stays where s − s_y ≤ s_p ≤ s + s_y, else it takes the nearer of the two.
+        let now = plastic.max(bond.stretch - limit).min(bond.stretch + limit);
+        [now, path + (now - plastic).abs()]
+    }
+
+    #[inline(always)]
+    fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], [plastic, _]: &[Lanes; 2]) -> Along {
+        Along((bond.stretch - *plastic) * (0.5 * self.elastic.micromodulus))
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, _: &[Lanes; 0], [plastic, _]: &[Lanes; 2]) -> Lanes {
+        let elastic = bond.stretch - *plastic;
+        elastic * elastic * bond.length * (0.25 * self.elastic.micromodulus)
+    }
+
+    #[inline(always)]
+    fn dissipated(&self, length: Lanes, [_, path]: &[Lanes; 2]) -> Lanes {
+        *path * length * (0.5 * self.elastic.micromodulus * self.yield_stretch)
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, length: Lanes, end: &[Lanes; 0]) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, length, end)
+    }
+}

@@ -1,0 +1,194 @@
+//! What kernels read of the local points of a grid, in the order of their places: eight adjacent
+//! points at once.
+
+use std::sync::Arc;
+
+use crate::families::{Adjacent, Grid, Offset, Which};
+use crate::lanes::numbers::eight;
+use crate::lanes::{Arithmetic, Lanes, Numbers};
+use crate::material::bond::{Reference, deform};
+
+use super::kernel::{Group, Kernel, Weights};
+use super::list_points::load_memory;
+
+/// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
+/// but are finite.
+pub struct GridValues<const D: usize> {
+    grid: Arc<Grid>,
+    displacement: [Vec<f64>; D],
+    /// Those numbers that bonds read.
+    numbers: Vec<Vec<f64>>,
+    thresholds: Vec<f64>,
+}
+
+impl<const D: usize> GridValues<D> {
+    /// For a grid at rest, whose bonds read so many numbers of each point.
+    pub fn new(grid: Arc<Grid>, numbers: usize, with_thresholds: bool) -> Self {
+        let count = grid.places();
+        Self {
+            displacement: std::array::from_fn(|_| vec![0.0; count]),
+            numbers: vec![vec![0.0; count]; numbers],
+            thresholds: vec![0.0; if with_thresholds { count } else { 0 }],
+            grid,
+        }
+    }
+
+    /// Takes the displacements of some of the local points.
+    pub fn update_displacement(&mut self, which: Which, displacement: &[Vec<f64>; D]) {
+        for (places, values) in self.displacement.iter_mut().zip(displacement) {
+            self.grid.update(which, values, places);
+        }
+    }
+
+    /// Takes the numbers of some of the local points, from the first wanted one on.
+    pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Vec<f64>]) {
+        for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
+            self.grid.update(which, values, places);
+        }
+    }
+
+    /// Takes the thresholds of some of the local points.
+    pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
+        self.grid.update(which, values, &mut self.thresholds);
+    }
+
+    /// Memory, that of the grid included, bytes.
+    pub fn bytes(&self) -> usize {
+        let columns = self.displacement.iter().chain(&self.numbers);
+        let count: usize = columns.map(Vec::len).sum();
+        size_of::<f64>() * (count + self.thresholds.len()) + self.grid.bytes()
+    }
+}
+
+/// The points of a grid as a kernel reads them.
+pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
+    displacement: [&'a [f64]; D],
+    numbers: <K::Point as Numbers>::Columns<'a>,
+    thresholds: &'a [f64],
+    with_thresholds: bool,
+    /// Of the own and the far ends, m³.
+    volumes: [Lanes; 2],
+}
+
+impl<K: Kernel<D>, const D: usize> Clone for GridPoints<'_, K, D> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<K: Kernel<D>, const D: usize> Copy for GridPoints<'_, K, D> {}
+
+/// What is read of the own ends of bonds.
+#[derive(Clone, Copy)]
+pub struct Here<P, const D: usize> {
+    displacement: [Lanes; D],
+    numbers: P,
+    threshold: Lanes,
+}
+
+impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
+    /// For a kernel on a grid with points of these volumes (m³) at the own and the far ends.
+    ///
+    /// # Panics
+    /// When an array that the kernel reads does not cover the grid.
+    pub fn new(kernel: &K, values: &'a GridValues<D>, volumes: [f64; 2]) -> Self {
+        let with_thresholds = kernel.reads_thresholds();
+        let numbers = K::Point::columns(&values.numbers);
+        let covers = |column: &[f64]| column.len() >= values.grid.places();
+        assert!(
+            values.displacement.iter().all(|column| covers(column))
+                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k)))
+                && (!with_thresholds || covers(&values.thresholds)),
+            "an array is too short for the grid"
+        );
+        Self {
+            displacement: values.displacement.each_ref().map(Vec::as_slice),
+            numbers,
+            thresholds: &values.thresholds,
+            with_thresholds,
+            volumes: volumes.map(Lanes::splat),
+        }
+    }
+
+    /// # Safety
+    /// The place must be one of the grid, with seven more after it.
+    #[inline(always)]
+    unsafe fn numbers(&self, place: usize) -> K::Point {
+        // SAFETY: `new` has checked the length.
+        K::Point::each(|k| unsafe { eight(K::Point::column(&self.numbers, k), place) })
+    }
+
+    /// # Safety
+    /// As for [`Self::numbers`].
+    #[inline(always)]
+    unsafe fn thresholds(&self, place: usize) -> Lanes {
+        if self.with_thresholds {
+            // SAFETY: `new` has checked the length.
+            unsafe { eight(self.thresholds, place) }
+        } else {
+            Lanes::splat(0.0)
+        }
+    }
+
+    /// The own ends of the bonds of eight points from a place on.
+    ///
+    /// # Safety
+    /// The place must be that of a vector of the grid.
+    #[inline(always)]
+    pub unsafe fn here(&self, place: usize) -> Here<K::Point, D> {
+        // SAFETY: `new` has checked the lengths.
+        unsafe {
+            Here {
+                displacement: std::array::from_fn(|d| eight(self.displacement[d], place)),
+                numbers: self.numbers(place),
+                threshold: self.thresholds(place),
+            }
+        }
+    }
+
+    /// The bonds of a vector at one offset.
+    ///
+    /// # Safety
+    /// The vector must be one of the grid, the offset one of its.
+    #[inline(always)]
+    pub unsafe fn load<A: Arithmetic>(
+        &self,
+        here: &Here<K::Point, D>,
+        vector: &mut Adjacent<'_>,
+        o: usize,
+    ) -> Group<K, D> {
+        let offset: &Offset = &vector.offsets[o];
+        let far = vector.far(offset);
+        // SAFETY: `far` is a place of the grid with seven more after it.
+        let (displacement, numbers, threshold) = unsafe {
+            let component = |d| eight(self.displacement[d], far);
+            let displacement: [Lanes; D] = std::array::from_fn(component);
+            (displacement, self.numbers(far), self.thresholds(far))
+        };
+        let eta = std::array::from_fn(|d| displacement[d] - here.displacement[d]);
+        let reference = Reference {
+            along: std::array::from_fn(|d| Lanes::splat(offset.reference[d])),
+            square: Lanes::splat(offset.square),
+            length: Lanes::splat(offset.length),
+            inverse: Lanes::splat(offset.inverse),
+            inverse_square: Lanes::splat(offset.inverse_square),
+        };
+        let memory = vector.groups.numbers(o);
+        Group {
+            bond: deform::<A, D>(&reference, eta, K::LINEAR),
+            own_volume: self.volumes[0],
+            volume: self.volumes[1],
+            weights: match vector.weighted {
+                [false, _] => Weights::One,
+                [true, false] => Weights::Same(Lanes::splat(offset.weights[0])),
+                [true, true] => Weights::Each(offset.weights.map(Lanes::splat)),
+            },
+            points: [here.numbers, numbers],
+            thresholds: [here.threshold, threshold],
+            memory: load_memory::<K::Memory>(memory),
+            intact: vector.groups.intact[o],
+            whole: 0,
+            breakable: vector.groups.breakable.map_or(u8::MAX, |bits| bits[o]),
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! What is summed over the bonds of points: forces, numbers of points, energies.
+//!
+//! A kernel sees eight bonds at a time and adds to eight sums. It is written once for any dimension,
+//! law and storage: the bonds may be those of one point or those of eight.
+
+use crate::lanes::{Arithmetic, Lanes, Numbers};
+use crate::material::Bond;
+
+/// The influence and the share of the volume that a bond has in the sums of its two ends.
+#[derive(Debug, Clone, Copy)]
+pub enum Weights {
+    /// 1.
+    One,
+    /// The same at both ends.
+    Same(Lanes),
+    /// Those of the own and of the far end.
+    Each([Lanes; 2]),
+}
+
+impl Weights {
+    /// That of the own end.
+    #[inline(always)]
+    pub fn own(self) -> Lanes {
+        match self {
+            Self::One => Lanes::splat(1.0),
+            Self::Same(own) | Self::Each([own, _]) => own,
+        }
+    }
+
+    /// That of the far end.
+    #[inline(always)]
+    pub fn far(self) -> Lanes {
+        match self {
+            Self::One => Lanes::splat(1.0),
+            Self::Same(far) | Self::Each([_, far]) => far,
+        }
+    }
+}
+
+/// Eight bonds: what is read of both ends, and what is kept of the bonds.
+pub struct Group<K: Kernel<D> + ?Sized, const D: usize> {
+    /// What laws see.
+    pub bond: Bond<D>,
+    /// Volumes of the own ends, m³.
+    pub own_volume: Lanes,
+    /// Volumes of the far ends, m³.
+    pub volume: Lanes,
+    /// What volumes are multiplied by.
+    pub weights: Weights,
+    /// The numbers of the own and of the far ends.
+    pub points: [K::Point; 2],
+    /// Stretches at which the bonds of the own and the far ends break, where the kernel reads them.
+    pub thresholds: [Lanes; 2],
+    /// What the bonds keep for their own and their far ends.
+    pub memory: [K::Memory; 2],
+    /// A bit for each bond that is intact.
+    pub intact: u8,
+    /// A bit for each bond, broken or not; only for kernels that want it.
+    pub whole: u8,
+    /// A bit for each bond that can break.
+    pub breakable: u8,
+}
+
+impl<K: Kernel<D>, const D: usize> Group<K, D> {
+    /// A bit for each intact bond that counts in the own end's sums.
+    #[inline(always)]
+    pub fn family(&self) -> u8 {
+        match self.weights {
+            Weights::One => self.intact,
+            weights => self.intact & weights.own().above(0.0),
+        }
+    }
+
+    /// A share in the sums of the own end, by volume.
+    #[inline(always)]
+    pub fn own_share(&self, share: Lanes) -> Lanes {
+        let share = share * self.volume;
+        match self.weights {
+            Weights::One => share,
+            weights => share * weights.own(),
+        }
+    }
+}
+
+/// How the lanes of a sum become a number of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Combine {
+    /// They are added.
+    Add,
+    /// The smallest counts.
+    Smallest,
+}
+
+/// Something that is summed over the bonds of points.
+pub trait Kernel<const D: usize>: Copy + Sync {
+    /// Eight sums of each quantity; each is added to a column of numbers of the points.
+    type Sums: Numbers;
+
+    /// The numbers of the ends that it reads.
+    type Point: Numbers;
+
+    /// The numbers of the bonds that it reads.
+    type Memory: Numbers;
+
+    /// How its sums become numbers.
+    const COMBINE: Combine = Combine::Add;
+
+    /// Whether it is worth a version for each set of vector instructions.
+    const HOT: bool = false;
+
+    /// Whether it wants to know of broken bonds.
+    const WHOLE: bool = false;
+
+    /// Whether it takes what is linear in η.
+    const LINEAR: bool;
+
+    /// Whether it reads the thresholds of the ends.
+    #[inline(always)]
+    fn reads_thresholds(&self) -> bool {
+        false
+    }
+
+    /// Whether it changes what bonds keep.
+    #[inline(always)]
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// The sums over no bond.
+    #[inline(always)]
+    fn start(&self) -> Self::Sums {
+        Self::Sums::splat(0.0)
+    }
+
+    /// Adds eight bonds; may break them and change what they keep.
+    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut Self::Sums);
+}

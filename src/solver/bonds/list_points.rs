@@ -1,0 +1,227 @@
+//! What kernels read of the local points where bonds are listed: all geometry of a point in one cache
+//! line.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::families::Row;
+use crate::lanes::numbers::gather;
+use crate::lanes::{Arithmetic, Lanes, Numbers, WIDTH};
+use crate::material::bond::{Reference, deform};
+use crate::solver::model::Model;
+
+use super::kernel::{Group, Kernel, Weights};
+
+/// Points handled by one task.
+const CHUNK: usize = 4096;
+
+/// Reference position (m), displacement (m) and volume (m³) of a point, three components each.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Node([f64; 8]);
+
+/// First entry of a node's displacement.
+const DISPLACEMENT: usize = 3;
+
+/// Entry of a node's volume.
+const VOLUME: usize = 6;
+
+/// The nodes of the local points, at rest.
+pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
+    let node = |point: usize| {
+        let [x, y, z] = model.position(point);
+        Node([x, y, z, 0.0, 0.0, 0.0, model.volume[point], 0.0])
+    };
+    (0..model.volume.len()).map(node).collect()
+}
+
+/// Brings the displacements of a range of points up to date.
+pub fn update<const D: usize>(
+    nodes: &mut [Node],
+    points: Range<usize>,
+    displacement: &[Vec<f64>; D],
+) {
+    let first = points.start;
+    nodes[points]
+        .par_chunks_mut(CHUNK)
+        .enumerate()
+        .for_each(|(chunk, nodes)| {
+            for (k, node) in nodes.iter_mut().enumerate() {
+                for d in 0..D {
+                    node.0[DISPLACEMENT + d] = displacement[d][first + chunk * CHUNK + k];
+                }
+            }
+        });
+}
+
+/// The local points, ghosts included, as a kernel reads them.
+pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
+    nodes: &'a [Node],
+    numbers: <K::Point as Numbers>::Columns<'a>,
+    thresholds: &'a [f64],
+    with_thresholds: bool,
+}
+
+impl<K: Kernel<D>, const D: usize> Clone for ListPoints<'_, K, D> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<K: Kernel<D>, const D: usize> Copy for ListPoints<'_, K, D> {}
+
+/// What is read of the own end of bonds.
+#[derive(Clone, Copy)]
+pub struct Here<P, const D: usize> {
+    reference: [Lanes; D],
+    displacement: [Lanes; D],
+    volume: Lanes,
+    numbers: P,
+    threshold: Lanes,
+}
+
+impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
+    /// For a kernel that reads the points of a list below a local index.
+    ///
+    /// # Panics
+    /// When an array that the kernel reads does not reach so far.
+    pub fn new(
+        kernel: &K,
+        reach: usize,
+        nodes: &'a [Node],
+        numbers: &'a [Vec<f64>],
+        thresholds: &'a [f64],
+    ) -> Self {
+        let with_thresholds = kernel.reads_thresholds();
+        let numbers = K::Point::columns(numbers);
+        let covers = |column: &[f64]| column.len() >= reach;
+        assert!(
+            nodes.len() >= reach
+                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k)))
+                && (!with_thresholds || covers(thresholds)),
+            "an array is too short for the bonds"
+        );
+        Self {
+            nodes,
+            numbers,
+            thresholds,
+            with_thresholds,
+        }
+    }
+
+    /// # Safety
+    /// The indices must be below the reach.
+    #[inline(always)]
+    unsafe fn numbers(&self, indices: &[u32; 8]) -> K::Point {
+        // SAFETY: `new` has checked the length.
+        K::Point::each(|k| unsafe { gather(K::Point::column(&self.numbers, k), indices) })
+    }
+
+    /// # Safety
+    /// The indices must be below the reach.
+    #[inline(always)]
+    unsafe fn thresholds(&self, indices: &[u32; 8]) -> Lanes {
+        if self.with_thresholds {
+            // SAFETY: `new` has checked the length.
+            unsafe { gather(self.thresholds, indices) }
+        } else {
+            Lanes::splat(0.0)
+        }
+    }
+
+    /// The own end of a point's bonds.
+    ///
+    /// # Safety
+    /// The point must be below the reach.
+    #[inline(always)]
+    pub unsafe fn here(&self, point: usize) -> Here<K::Point, D> {
+        debug_assert!(point < self.nodes.len());
+        let own = [point as u32; 8];
+        // SAFETY: `new` has checked the lengths.
+        let (node, numbers, threshold) = unsafe {
+            (
+                &self.nodes.get_unchecked(point).0,
+                self.numbers(&own),
+                self.thresholds(&own),
+            )
+        };
+        Here {
+            reference: std::array::from_fn(|d| Lanes::splat(node[d])),
+            displacement: std::array::from_fn(|d| Lanes::splat(node[DISPLACEMENT + d])),
+            volume: Lanes::splat(node[VOLUME]),
+            numbers,
+            threshold,
+        }
+    }
+
+    /// The bonds of a group.
+    ///
+    /// # Safety
+    /// The row must be one of a list with this reach.
+    #[inline(always)]
+    pub unsafe fn load<A: Arithmetic>(
+        &self,
+        here: &Here<K::Point, D>,
+        row: &mut Row<'_>,
+        group: usize,
+    ) -> Group<K, D> {
+        let neighbours = &row.neighbours[group];
+        debug_assert!(neighbours.iter().all(|n| (*n as usize) < self.nodes.len()));
+        // SAFETY: `new` has checked the length.
+        let node = |k: usize| unsafe { &self.nodes.get_unchecked(neighbours[k] as usize).0 };
+        let columns = A::transpose(std::array::from_fn(node));
+        let along: [Lanes; D] = std::array::from_fn(|d| columns[d] - here.reference[d]);
+        let eta = std::array::from_fn(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
+        let mut square = along[0] * along[0];
+        for xi in &along[1..] {
+            square = A::multiply_add(*xi, *xi, square);
+        }
+        let inverse = A::inverse_sqrt(square);
+        let reference = Reference {
+            along,
+            square,
+            length: square * inverse,
+            inverse,
+            inverse_square: inverse * inverse,
+        };
+        // SAFETY: as above.
+        let (numbers, threshold) = unsafe { (self.numbers(neighbours), self.thresholds(neighbours)) };
+        let memory = row.groups.numbers(group);
+        Group {
+            bond: deform::<A, D>(&reference, eta, K::LINEAR),
+            own_volume: here.volume,
+            volume: columns[VOLUME],
+            weights: match row.weights {
+                [None, _] => Weights::One,
+                [Some(weights), None] => Weights::Same(weights[group]),
+                [Some(own), Some(far)] => Weights::Each([own[group], far[group]]),
+            },
+            points: [here.numbers, numbers],
+            thresholds: [here.threshold, threshold],
+            memory: load_memory::<K::Memory>(memory),
+            whole: if K::WHOLE { row.whole(group) } else { 0 },
+            intact: row.groups.intact[group],
+            breakable: row.groups.breakable.map_or(u8::MAX, |bits| bits[group]),
+        }
+    }
+}
+
+/// What bonds keep for their own and their far ends.
+#[inline(always)]
+pub fn load_memory<M: Numbers>(all: &[Lanes]) -> [M; 2] {
+    [M::each(|k| all[k]), M::each(|k| all[M::COUNT + k])]
+}
+
+/// Puts back what bonds keep, where they are intact.
+#[inline(always)]
+pub fn store_memory<M: Numbers>(all: &mut [Lanes], memory: &[M; 2], intact: u8) {
+    for (k, kept) in all.iter_mut().enumerate() {
+        let value = memory[k / M::COUNT].get(k % M::COUNT);
+        for lane in 0..WIDTH {
+            if intact >> lane & 1 == 1 {
+                kept.0[lane] = value.0[lane];
+            }
+        }
+    }
+}

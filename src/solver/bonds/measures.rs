@@ -1,0 +1,146 @@
+//! What is summed over bonds at set-up and for output: volume, energy, stiffness, stress, dilatation.
+
+use crate::lanes::{Arithmetic, Lanes, Numbers};
+use crate::material::{ForceState, Law};
+
+use super::kernel::{Group, Kernel};
+
+/// Sums what the intact bonds of a point hold: strain energy density (J/m³) that belongs to single
+/// bonds, volume of the neighbours in the point's own family (m³), and the number of neighbours,
+/// those included that have the point in their family only; then what all bonds have dissipated
+/// without breaking (J/m³).
+#[derive(Clone, Copy)]
+pub struct Stored<L> {
+    /// Law of the own end.
+    pub law: L,
+}
+
+impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
+    type Sums = [Lanes; 4];
+    type Point = L::Point;
+    type Memory = L::Memory;
+    const HOT: bool = L::HOT;
+    const WHOLE: bool = L::Memory::COUNT > 0;
+    const LINEAR: bool = L::LINEAR;
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 4]) {
+        let (family, own) = (group.family(), &group.points[0]);
+        let memory = self.law.memory(&group.bond, own, &group.memory[0]);
+        let energy = self.law.bond_energy(&group.bond, own, &memory);
+        sums[0] += A::select(group.own_share(energy), family, 0.0);
+        sums[1] += A::select(group.volume, family, 0.0);
+        sums[2] += A::select(Lanes::splat(1.0), group.intact, 0.0);
+        if L::Memory::COUNT > 0 {
+            let dissipated = self.law.dissipated(group.bond.length, &group.memory[0]);
+            sums[3] += A::select(group.own_share(dissipated), group.whole, 0.0);
+        }
+    }
+}
+
+/// Sums the volume of the neighbours in each point's own family, m³.
+#[derive(Clone, Copy)]
+pub struct FamilyVolume;
+
+impl<const D: usize> Kernel<D> for FamilyVolume {
+    type Sums = [Lanes; 1];
+    type Point = [Lanes; 0];
+    type Memory = [Lanes; 0];
+    const LINEAR: bool = true;
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, [sum]: &mut [Lanes; 1]) {
+        *sum += A::select(group.volume, group.family(), 0.0);
+    }
+}
+
+/// Entries of a symmetric tensor in the order xx, yy, zz, xy, yz, xz.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
+/// Adds the entries of a symmetric tensor of the intact bonds.
+#[inline(always)]
+fn add_tensor<A: Arithmetic, const D: usize>(
+    sums: &mut [Lanes; 6],
+    intact: u8,
+    entry: impl Fn(usize, usize) -> Lanes,
+) {
+    for (sum, (a, b)) in sums.iter_mut().zip(PAIRS) {
+        if a < D && b < D {
+            *sum += A::select(entry(a, b), intact, 0.0);
+        }
+    }
+}
+
+/// Sums D = Σ V C n⊗n over the intact bonds, undeformed (N/m⁴), as xx, yy, zz, xy, yz, xz; C adds up
+/// [`Law::stiffness`] of both ends.
+#[derive(Clone, Copy)]
+pub struct Stiffness<L> {
+    /// Laws of the own and of the far end.
+    pub laws: [L; 2],
+}
+
+impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
+    type Sums = [Lanes; 6];
+    type Point = L::Point;
+    type Memory = [Lanes; 0];
+    const LINEAR: bool = L::LINEAR;
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 6]) {
+        let length = group.bond.length;
+        let own = self.laws[0].stiffness(length, &group.points[0]) * group.weights.own();
+        let far = self.laws[1].stiffness(length, &group.points[1]) * group.weights.far();
+        let weight = (own + far) * group.volume / (length * length);
+        let xi = &group.bond.reference;
+        add_tensor::<A, D>(sums, group.intact, |a, b| weight * xi[a] * xi[b]);
+    }
+}
+
+/// Sums the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
+///
+/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as
+/// Σ T⊗ξ Ṽ; times Fᵀ it is this, the Kirchhoff stress, symmetric and turning with the body. Linear
+/// laws have ξ in place of Y.
+#[derive(Clone, Copy)]
+pub struct Stress<L> {
+    /// Law of the own end.
+    pub law: L,
+}
+
+impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
+    type Sums = [Lanes; 6];
+    type Point = L::Point;
+    type Memory = L::Memory;
+    const LINEAR: bool = L::LINEAR;
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 6]) {
+        let own = &group.points[0];
+        let memory = self.law.memory(&group.bond, own, &group.memory[0]);
+        let force = self.law.force(&group.bond, own, &memory);
+        let force = force.times(group.weights.own()).times(group.volume);
+        add_tensor::<A, D>(sums, group.intact, |a, b| force.dyad(&group.bond, a, b));
+    }
+}
+
+/// Sums what gives the dilatation θ = (d/m) Σ ω|ξ|εṼ: the weighted volume m = Σ ω|ξ|²Ṽ of the whole
+/// family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵), with ε linear in η if so wanted.
+#[derive(Clone, Copy)]
+pub struct Dilatation<const LINEAR: bool>;
+
+impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
+    type Sums = [Lanes; 2];
+    type Point = [Lanes; 0];
+    type Memory = [Lanes; 0];
+    const WHOLE: bool = true;
+    const LINEAR: bool = LINEAR;
+
+    #[inline(always)]
+    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 2]) {
+        let length = group.bond.length;
+        let weight = length * length * group.volume * group.weights.own();
+        let growth = weight * group.bond.stretch;
+        sums[0] += A::select(weight, group.whole, 0.0);
+        sums[1] += A::select(growth, group.intact, 0.0);
+    }
+}

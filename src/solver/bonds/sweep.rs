@@ -1,0 +1,321 @@
+//! Running a kernel over the bonds of two blocks, on all threads.
+//!
+//! A task owns some of the bonds and the results of their points, so there is no lock and no atomic;
+//! each point's sum is the same sequence of operations whatever the tasks are.
+
+use std::ops::Range;
+
+use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
+use crate::lanes::{Arithmetic, Instructions, Lanes, Numbers, WIDTH, arithmetic};
+
+use super::grid_points::{GridPoints, GridValues};
+use super::kernel::{Combine, Kernel};
+use super::list_points::{ListPoints, Node, store_memory};
+
+/// Bonds by groups of eight below which a task is not split further.
+const LEAF: usize = 2048;
+
+/// What kernels read of the points.
+#[derive(Clone, Copy)]
+pub struct Source<'a, const D: usize> {
+    /// Geometry for lists; empty where there is no list.
+    pub nodes: &'a [Node],
+    /// Numbers of the points by column, for lists.
+    pub numbers: &'a [Vec<f64>],
+    /// Thresholds of the points, for lists; empty if no criterion reads them.
+    pub thresholds: &'a [f64],
+    /// For lattices, by grid.
+    pub grids: &'a [GridValues<D>],
+    /// What to run on.
+    pub instructions: Instructions,
+}
+
+/// The columns of numbers of the points that a kernel adds to.
+type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as Numbers>::ColumnsMut<'a>;
+
+/// Part of the bonds of two blocks.
+trait Part: Sized + Send {
+    /// Number of rows or vectors.
+    fn len(&self) -> usize;
+
+    /// Local index of the first point of one of them.
+    fn point(&self, k: usize) -> usize;
+
+    /// Those before one of them, and the rest.
+    fn split_at(self, k: usize) -> (Self, Self);
+}
+
+/// A kernel with what it reads, for one kind of storage.
+trait Runner<P: Part>: Sync {
+    type Sums: Numbers;
+
+    /// Goes through a part; `base` is the local index of the first entry of the results.
+    fn run<A: Arithmetic>(
+        &self,
+        part: P,
+        base: usize,
+        results: <Self::Sums as Numbers>::ColumnsMut<'_>,
+    );
+
+    /// Whether it is worth a version for each set of vector instructions.
+    const HOT: bool;
+}
+
+/// Runs the kernel over the bonds of the owned points in a range of local indices. The results are
+/// columns over all owned points.
+///
+/// # Panics
+/// When an array that the kernel reads is too short for the bonds.
+pub fn sweep<K: Kernel<D>, const D: usize>(
+    bonds: &mut BlockBonds,
+    points: Range<usize>,
+    results: Results<'_, K, D>,
+    kernel: &K,
+    source: Source<'_, D>,
+) {
+    let instructions = source.instructions;
+    let several = rayon::current_num_threads() > 1;
+    let leaf = |groups: usize| {
+        if several {
+            (LEAF / groups.max(1)).max(1)
+        } else {
+            usize::MAX
+        }
+    };
+    match bonds {
+        BlockBonds::List(list) => {
+            let Source {
+                nodes,
+                numbers,
+                thresholds,
+                ..
+            } = source;
+            let rows = list.rows_below(points.start)..list.rows_below(points.end);
+            let leaf = leaf(list.groups_a_row());
+            let points = ListPoints::new(kernel, list.reach(), nodes, numbers, thresholds);
+            let runner = OverRows { kernel, points };
+            split(list.rows(rows), 0, results, &runner, leaf, instructions);
+        }
+        BlockBonds::Lattice(lattice) => {
+            let vectors = lattice.vectors_below(points.start)..lattice.vectors_below(points.end);
+            let whole = if K::WHOLE {
+                lattice.whole()
+            } else {
+                Vec::new()
+            };
+            let volumes = [lattice.own_volume, lattice.volume];
+            let points = GridPoints::new(kernel, &source.grids[lattice.index], volumes);
+            let runner = OverVectors {
+                kernel,
+                points,
+                whole,
+            };
+            let leaf = leaf(lattice.offsets());
+            let part = lattice.vectors(vectors);
+            split(part, 0, results, &runner, leaf, instructions);
+        }
+    }
+}
+
+/// Halves a part until a task is small.
+fn split<P: Part, R: Runner<P>>(
+    part: P,
+    base: usize,
+    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    runner: &R,
+    leaf: usize,
+    instructions: Instructions,
+) {
+    if part.len() <= leaf {
+        return run(part, base, results, runner, instructions);
+    }
+    let half = part.len() / 2;
+    let border = part.point(half);
+    let (part_a, part_b) = part.split_at(half);
+    let [results_a, results_b] = R::Sums::split_at(results, border - base);
+    rayon::join(
+        || split(part_a, base, results_a, runner, leaf, instructions),
+        || split(part_b, border, results_b, runner, leaf, instructions),
+    );
+}
+
+fn run<P: Part, R: Runner<P>>(
+    part: P,
+    base: usize,
+    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    runner: &R,
+    instructions: Instructions,
+) {
+    #[cfg(target_arch = "x86_64")]
+    if R::HOT {
+        match instructions {
+            // SAFETY: the machine has the instructions.
+            Instructions::Avx512 => return unsafe { run_avx512(part, base, results, runner) },
+            // SAFETY: as above.
+            Instructions::Avx2 => return unsafe { run_avx2(part, base, results, runner) },
+            Instructions::Baseline => {}
+        }
+    }
+    let _ = instructions;
+    runner.run::<arithmetic::Plain>(part, base, results);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,bmi2,fma")]
+fn run_avx512<P: Part, R: Runner<P>>(
+    part: P,
+    base: usize,
+    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    runner: &R,
+) {
+    runner.run::<arithmetic::Wide>(part, base, results);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi2,fma")]
+fn run_avx2<P: Part, R: Runner<P>>(
+    part: P,
+    base: usize,
+    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    runner: &R,
+) {
+    runner.run::<arithmetic::Fused>(part, base, results);
+}
+
+impl Part for Rows<'_> {
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    fn point(&self, k: usize) -> usize {
+        self.point(k)
+    }
+
+    fn split_at(self, k: usize) -> (Self, Self) {
+        self.split_at(k)
+    }
+}
+
+impl Part for Vectors<'_> {
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    fn point(&self, k: usize) -> usize {
+        self.point(k)
+    }
+
+    fn split_at(self, k: usize) -> (Self, Self) {
+        self.split_at(k)
+    }
+}
+
+#[inline(always)]
+fn combine(combine: Combine, result: &mut f64, value: f64) {
+    match combine {
+        Combine::Add => *result += value,
+        Combine::Smallest => *result = result.min(value),
+    }
+}
+
+struct OverRows<'a, K: Kernel<D>, const D: usize> {
+    kernel: &'a K,
+    points: ListPoints<'a, K, D>,
+}
+
+impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
+    type Sums = K::Sums;
+    const HOT: bool = K::HOT;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(
+        &self,
+        mut rows: Rows<'b>,
+        base: usize,
+        mut results: <K::Sums as Numbers>::ColumnsMut<'_>,
+    ) {
+        let (kernel, points) = (*self.kernel, self.points);
+        for k in 0..rows.len() {
+            let mut row: Row<'_> = rows.row(k);
+            let mut sums = kernel.start();
+            // SAFETY: the rows are those of the list whose reach `points` was made for.
+            let here = unsafe { points.here(row.point) };
+            for group in 0..row.neighbours.len() {
+                // SAFETY: as above.
+                let mut bonds = unsafe { points.load::<A>(&here, &mut row, group) };
+                let before = bonds.intact;
+                kernel.add::<A>(&mut bonds, &mut sums);
+                if bonds.intact != before {
+                    row.groups.intact[group] = bonds.intact;
+                }
+                if K::Memory::COUNT > 0 && kernel.remembers() {
+                    store_memory(row.groups.numbers(group), &bonds.memory, bonds.intact);
+                }
+            }
+            for quantity in 0..K::Sums::COUNT {
+                let lanes = sums.get(quantity);
+                let value = match K::COMBINE {
+                    Combine::Add => lanes.sum(),
+                    Combine::Smallest => lanes.smallest(),
+                };
+                let column = K::Sums::column_mut(&mut results, quantity);
+                combine(K::COMBINE, &mut column[row.point - base], value);
+            }
+        }
+    }
+}
+
+struct OverVectors<'a, K: Kernel<D>, const D: usize> {
+    kernel: &'a K,
+    points: GridPoints<'a, K, D>,
+    /// For kernels that want them, the bits of all vectors' bonds, broken or not.
+    whole: Vec<u8>,
+}
+
+impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K, D> {
+    type Sums = K::Sums;
+    const HOT: bool = K::HOT;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(
+        &self,
+        mut vectors: Vectors<'b>,
+        base: usize,
+        mut results: <K::Sums as Numbers>::ColumnsMut<'_>,
+    ) {
+        // Copies, which the loop can keep in registers.
+        let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
+        for k in 0..vectors.len() {
+            let mut vector: Adjacent<'_> = vectors.vector(k);
+            let whole = whole.get(vector.bits.clone());
+            let mut sums = kernel.start();
+            // SAFETY: the vectors are those of the grid that `points` was made for.
+            let here = unsafe { points.here(vector.place) };
+            for o in 0..vector.offsets.len() {
+                // SAFETY: as above.
+                let mut bonds = unsafe { points.load::<A>(&here, &mut vector, o) };
+                if K::WHOLE {
+                    bonds.whole = whole.map_or(0, |bits| bits[o]);
+                }
+                let before = bonds.intact;
+                kernel.add::<A>(&mut bonds, &mut sums);
+                if bonds.intact != before {
+                    vector.groups.intact[o] = bonds.intact;
+                }
+                if K::Memory::COUNT > 0 && kernel.remembers() {
+                    store_memory(vector.groups.numbers(o), &bonds.memory, bonds.intact);
+                }
+            }
+            let first = vector.point - base;
+            for quantity in 0..K::Sums::COUNT {
+                let column = K::Sums::column_mut(&mut results, quantity);
+                let lanes: Lanes = sums.get(quantity);
+                for lane in 0..WIDTH {
+                    if vector.members >> lane & 1 == 1 {
+                        combine(K::COMBINE, &mut column[first + lane], lanes.0[lane]);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Initial displacements and velocities.
+
+use crate::comm::Communicator;
+use crate::deck::plan::Plan;
+use crate::error::Result;
+use crate::solver::model::Model;
+use crate::solver::motion::Fields;
+
+use super::{members, not_empty};
+
+/// Sets the initial displacements and velocities.
+///
+/// # Errors
+/// On an empty set; the same on all ranks.
+pub fn apply_initials<const D: usize>(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+    fields: &mut Fields<D>,
+) -> Result<()> {
+    for initial in &plan.initials {
+        let points = members(plan, model, initial.set);
+        let key = format!("[initial.{}] set", initial.name);
+        not_empty(
+            plan,
+            comm,
+            initial.set,
+            &points,
+            (&key, initial.span.clone()),
+        )?;
+        for point in points {
+            let position = model.position(point as usize);
+            for d in 0..D {
+                if let Some(values) = &initial.displacement {
+                    fields.displacement[d][point as usize] = values[d].evaluate(position, 0.0);
+                }
+                if let Some(values) = &initial.velocity {
+                    fields.velocity[d][point as usize] = values[d].evaluate(position, 0.0);
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,200 @@
+//! Loads, supports and initial values on this rank's points.
+
+mod initial;
+mod loads;
+mod supports;
+mod values;
+
+use crate::comm::sum::{ExactSum, reduce};
+use crate::comm::{Communicator, total};
+use crate::deck::expression::Expression;
+use crate::deck::plan::{Action, Plan};
+use crate::error::Result;
+use crate::points::set;
+
+use super::model::Model;
+use super::motion::Fields;
+pub use initial::apply_initials;
+use loads::Load;
+use supports::{Motion, Support};
+
+/// All loads and supports of this rank's points.
+pub struct Conditions<const D: usize> {
+    loads: Vec<Load<D>>,
+    supports: Vec<Support>,
+}
+
+/// Local indices of the owned points of a set, by index.
+pub fn members<const D: usize>(plan: &Plan, model: &Model<D>, set: usize) -> Vec<u32> {
+    let chosen = |point: usize| {
+        let block = usize::from(model.block[point]);
+        let (id, position) = (model.ids[point], model.position(point));
+        set::contains(&plan.sets[set], plan.horizon, id, position, block)
+    };
+    (0..model.owned())
+        .filter(|point| chosen(*point))
+        .map(|point| point as u32)
+        .collect()
+}
+
+/// An input error if a set that something acts on has no points on any rank.
+pub fn not_empty(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    set: usize,
+    members: &[u32],
+    place: (&str, std::ops::Range<usize>),
+) -> Result<()> {
+    if total(comm, members.len() as u64) > 0 {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: the set `{}` has no points",
+        place.0, plan.sets[set].name
+    );
+    Err(plan.source.error(place.1, message))
+}
+
+impl<const D: usize> Conditions<D> {
+    /// Finds the points of every condition. Where two supports prescribe the same component of a
+    /// point, the later one holds.
+    ///
+    /// # Errors
+    /// On an empty set; the same on all ranks.
+    pub fn new(plan: &Plan, comm: &dyn Communicator, model: &Model<D>) -> Result<Self> {
+        let mut loads = Vec::new();
+        let mut supports: Vec<Support> = Vec::new();
+        for condition in &plan.conditions {
+            let points = members(plan, model, condition.set);
+            let key = format!("[condition.{}] set", condition.name);
+            let place = (&key[..], condition.span.clone());
+            not_empty(plan, comm, condition.set, &points, place)?;
+            let mut prescribe = |motion, components: &[Option<Expression>]| {
+                for (component, value) in components.iter().enumerate() {
+                    let Some(value) = value else { continue };
+                    for earlier in supports.iter_mut().filter(|s| s.component == component) {
+                        earlier.release(&points);
+                    }
+                    let points = points.clone();
+                    supports.push(Support::new(model, component, motion, points, value));
+                }
+            };
+            match &condition.action {
+                Action::Displacement(values) => prescribe(Motion::Displacement, values),
+                Action::Velocity(values) => prescribe(Motion::Velocity, values),
+                Action::BodyForce(values, factors) => {
+                    let factors = std::array::from_fn(|d| factors[d]);
+                    loads.push(Load::new(model, points, values, factors));
+                }
+                Action::Force(values) => {
+                    let mut volume = [ExactSum::default()];
+                    for point in &points {
+                        volume[0].add(model.volume[*point as usize]);
+                    }
+                    let volume = reduce(comm, &mut volume)[0];
+                    loads.push(Load::new(model, points, values, [1.0 / volume; D]));
+                }
+            }
+        }
+        Ok(Self { loads, supports })
+    }
+
+    /// Whether there are loads; the same on all ranks.
+    pub fn have_loads(&self) -> bool {
+        !self.loads.is_empty()
+    }
+
+    /// Whether there are supports; the same on all ranks.
+    pub fn have_supports(&self) -> bool {
+        !self.supports.is_empty()
+    }
+
+    /// Before the points move: remembers forces and places, for the work of the coming step.
+    pub fn before_moving(&mut self, fields: &Fields<D>) {
+        for load in &mut self.loads {
+            load.before_moving(fields);
+        }
+        for support in &mut self.supports {
+            support.before_moving(fields);
+        }
+    }
+
+    /// After the points have moved to time `time` (s): puts supported ones in their place. `step` is
+    /// the step just made (s), 0 at the start.
+    pub fn place(&self, fields: &mut Fields<D>, time: f64, step: f64) {
+        for support in &self.supports {
+            support.place(&mut fields.displacement[support.component], time, step);
+        }
+    }
+
+    /// Finds the external forces at `time` (s); those that do not change are found only where `all` are
+    /// wanted.
+    pub fn load(&mut self, fields: &mut Fields<D>, time: f64, all: bool) {
+        let Some(external) = &mut fields.external_force else {
+            return;
+        };
+        if !all && !self.loads.iter().any(Load::changes) {
+            return;
+        }
+        for load in self.loads.iter_mut().filter(|load| all || load.changes()) {
+            load.update(time);
+        }
+        for load in &self.loads {
+            load.clear(external);
+        }
+        for load in &self.loads {
+            load.add(external);
+        }
+    }
+
+    /// Gives supported points their velocity at `time` (s), and finds the reactions. `step` is the time
+    /// step (s). Returns whether all of that is finite.
+    pub fn guide(&self, model: &Model<D>, fields: &mut Fields<D>, time: f64, step: f64) -> bool {
+        let supports = self.supports.iter();
+        supports.fold(true, |finite, support| {
+            support.guide(model, fields, time, step) && finite
+        })
+    }
+
+    /// After forces and reactions are known at the new place: adds up the work of the step, by the
+    /// trapezoid rule.
+    pub fn add_work(&self, model: &Model<D>, fields: &mut Fields<D>) {
+        let Some(work) = &mut fields.external_work else {
+            return;
+        };
+        for load in &self.loads {
+            load.add_work(model, &fields.displacement, work);
+        }
+        let Some(reaction) = &fields.reaction else {
+            return;
+        };
+        for support in &self.supports {
+            let component = support.component;
+            let displacement = &fields.displacement[component];
+            support.add_work(model, displacement, &reaction[component], work);
+        }
+    }
+
+    /// Sums the force of the supports on a set's points by component, N. `members` is sorted.
+    pub fn reaction(
+        &self,
+        model: &Model<D>,
+        fields: &Fields<D>,
+        members: &[u32],
+    ) -> [ExactSum; D] {
+        let mut sums = [const { ExactSum::ZERO }; D];
+        let Some(reaction) = &fields.reaction else {
+            return sums;
+        };
+        for support in &self.supports {
+            for point in support.points() {
+                if members.binary_search(point).is_ok() {
+                    let point = *point as usize;
+                    let force = reaction[support.component][point] * model.volume[point];
+                    sums[support.component].add(force);
+                }
+            }
+        }
+        sums
+    }
+}

@@ -1,0 +1,136 @@
+//! The clock of a run: time, step, and how many steps have been made.
+
+/// Time moves in steps, the size of which may change; between changes it is a multiple of the step, so
+/// that rounding does not add up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clock {
+    /// Time and number of the step since which the step has had its size.
+    since: (f64, u64),
+    /// Time before the last step, s.
+    before: f64,
+    step: f64,
+    number: u64,
+    end: f64,
+}
+
+impl Clock {
+    /// At time 0, with steps of `step` (s) until `end` (s).
+    pub fn new(step: f64, end: f64) -> Self {
+        Self {
+            since: (0.0, 0),
+            before: 0.0,
+            step,
+            number: 0,
+            end,
+        }
+    }
+
+    /// After so many steps of one size (s).
+    pub fn after(number: u64, step: f64, end: f64) -> Self {
+        let mut clock = Self::new(step, end);
+        clock.number = number;
+        clock.before = number.saturating_sub(1) as f64 * step;
+        clock
+    }
+
+    /// Time reached, s.
+    pub fn time(&self) -> f64 {
+        let (time, number) = self.since;
+        time + (self.number - number) as f64 * self.step
+    }
+
+    /// Time before the last step, s.
+    pub fn time_before(&self) -> f64 {
+        self.before
+    }
+
+    /// Size of the step, s.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Number of steps made.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// End of the run, s.
+    pub fn end(&self) -> f64 {
+        self.end
+    }
+
+    /// Moves on by a step.
+    pub fn advance(&mut self) {
+        self.before = self.time();
+        self.number += 1;
+    }
+
+    /// Gives the steps from here on another size (s).
+    pub fn set_step(&mut self, step: f64) {
+        self.since = (self.time(), self.number);
+        self.step = step;
+    }
+
+    /// Number of the step that reaches the end, if the step keeps its size.
+    pub fn last(&self) -> u64 {
+        let (time, number) = self.since;
+        number + steps_to(self.end - time, self.step) as u64
+    }
+
+    /// Whether the end has been reached.
+    pub fn is_over(&self) -> bool {
+        self.number >= self.last()
+    }
+}
+
+/// The number of steps (s) that take a time (s), up to rounding; at least one.
+pub fn steps_to(time: f64, step: f64) -> f64 {
+    let steps = time / step;
+    let whole = if (steps - steps.round()).abs() < 1e-9 * steps {
+        steps.round()
+    } else {
+        steps.ceil()
+    };
+    whole.max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_is_a_multiple_of_the_step() {
+        let mut clock = Clock::new(0.1, 1.0);
+        assert_eq!(clock.last(), 10);
+        for number in 1..=10 {
+            assert!(!clock.is_over());
+            clock.advance();
+            assert_eq!(clock.time(), number as f64 * 0.1);
+            assert_eq!(clock.time_before(), (number - 1) as f64 * 0.1);
+        }
+        assert!(clock.is_over());
+        assert_eq!(Clock::after(10, 0.1, 1.0), clock);
+    }
+
+    #[test]
+    fn the_step_may_change() {
+        let mut clock = Clock::new(0.25, 1.0);
+        clock.advance();
+        clock.advance();
+        clock.set_step(0.125);
+        assert_eq!((clock.time(), clock.last()), (0.5, 6));
+        clock.advance();
+        assert_eq!((clock.time(), clock.time_before()), (0.625, 0.5));
+        clock.set_step(0.375);
+        clock.advance();
+        assert_eq!(clock.time(), 1.0);
+        assert!(clock.is_over());
+    }
+
+    #[test]
+    fn steps_that_fit_but_for_rounding() {
+        assert_eq!(steps_to(1.0, 0.1), 10.0);
+        assert_eq!(steps_to(1.05, 0.1), 11.0);
+        assert_eq!(steps_to(1e-9, 0.1), 1.0);
+    }
+}

@@ -1,0 +1,274 @@
+//! The fields of the points, declared once: what they are, and what happens to them.
+//!
+//! Checkpoints, the undoing of a step and the result walk this list; a field that is added to it is
+//! saved, undone and offered as it says here. A field is a column of numbers for each component.
+
+use rayon::prelude::*;
+
+use crate::deck::plan::Field;
+use crate::solver::model::Model;
+
+/// What a field is, and what happens to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Description {
+    /// In the field's standard terms.
+    pub name: &'static str,
+    /// SI.
+    pub unit: &'static str,
+    /// Whether ghosts have it too, brought up to date from their owners.
+    pub exchanged: bool,
+    /// Whether it is the state of a run, which checkpoints hold and points take along to another
+    /// rank; else it is found anew from the state.
+    pub state: bool,
+    /// Whether a step that is undone changes it back.
+    pub undone: bool,
+    /// What a point that is born during a run gets.
+    pub birth: Birth,
+    /// The name under which decks ask for it.
+    pub output: Option<Field>,
+}
+
+/// What a new point gets from those around it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Birth {
+    /// The interpolated value.
+    Interpolated,
+    /// A share by volume, so that the sum over all points stays.
+    Shared,
+    /// What is found anew.
+    FoundAnew,
+}
+
+/// A scalar, `Vec<f64>`, or a vector, `[Vec<f64>; D]`.
+trait Columns {
+    fn columns(&self) -> &[Vec<f64>];
+    fn columns_mut(&mut self) -> &mut [Vec<f64>];
+}
+
+impl Columns for Vec<f64> {
+    fn columns(&self) -> &[Vec<f64>] {
+        std::slice::from_ref(self)
+    }
+
+    fn columns_mut(&mut self) -> &mut [Vec<f64>] {
+        std::slice::from_mut(self)
+    }
+}
+
+impl<const D: usize> Columns for [Vec<f64>; D] {
+    fn columns(&self) -> &[Vec<f64>] {
+        self
+    }
+
+    fn columns_mut(&mut self) -> &mut [Vec<f64>] {
+        self
+    }
+}
+
+/// A field that not every run has.
+impl<T: Columns> Columns for Option<T> {
+    fn columns(&self) -> &[Vec<f64>] {
+        self.as_ref().map_or(&[], T::columns)
+    }
+
+    fn columns_mut(&mut self) -> &mut [Vec<f64>] {
+        self.as_mut().map_or(&mut [], T::columns_mut)
+    }
+}
+
+macro_rules! fields {
+    ($($(#[$doc:meta])* $name:ident: $type:ty = $description:expr;)+) => {
+        /// The fields over the points. Those that a run does not need are not there, on all ranks alike.
+        pub struct Fields<const D: usize> {
+            $($(#[$doc])* pub $name: $type,)+
+        }
+
+        impl<const D: usize> Fields<D> {
+            /// Every field with its components.
+            pub fn each(&self) -> impl Iterator<Item = (Description, &[Vec<f64>])> {
+                [$(($description, self.$name.columns()),)+].into_iter()
+            }
+
+            /// Every field with its components.
+            pub fn each_mut(&mut self) -> impl Iterator<Item = (Description, &mut [Vec<f64>])> {
+                [$(($description, self.$name.columns_mut()),)+].into_iter()
+            }
+        }
+    };
+}
+
+/// A field of the state that is changed back with a step.
+const STATE: Description = Description {
+    name: "",
+    unit: "",
+    exchanged: false,
+    state: true,
+    undone: true,
+    birth: Birth::Interpolated,
+    output: None,
+};
+
+/// An energy that points have taken up so far.
+const ENERGY: Description = Description {
+    unit: "J",
+    birth: Birth::Shared,
+    ..STATE
+};
+
+/// A force density that follows from the state.
+const FORCE_DENSITY: Description = Description {
+    unit: "N/m^3",
+    state: false,
+    birth: Birth::FoundAnew,
+    ..STATE
+};
+
+fields! {
+    /// u, m; owned points, then ghosts.
+    displacement: [Vec<f64>; D] = Description {
+        name: "displacement",
+        unit: "m",
+        exchanged: true,
+        output: Some(Field::Displacement),
+        ..STATE
+    };
+    /// u̇ at full steps, m/s.
+    velocity: [Vec<f64>; D] = Description {
+        name: "velocity",
+        unit: "m/s",
+        output: Some(Field::Velocity),
+        ..STATE
+    };
+    /// What bonds exert, N/m³.
+    internal_force: [Vec<f64>; D] = Description {
+        name: "internal_force",
+        output: Some(Field::ForceDensity),
+        ..FORCE_DENSITY
+    };
+    /// What loads exert, N/m³; none without loads.
+    external_force: Option<[Vec<f64>; D]> = Description {
+        name: "external_force",
+        ..FORCE_DENSITY
+    };
+    /// What supports exert, N/m³; none without supports.
+    reaction: Option<[Vec<f64>; D]> = Description {
+        name: "reaction",
+        unit: "N/m^3",
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// Energy that a point's share of bonds has set free by breaking, J.
+    freed_energy: Vec<f64> = Description {
+        name: "freed_energy",
+        ..ENERGY
+    };
+    /// Work done by loads and supports, J; none without them.
+    external_work: Option<Vec<f64>> = Description {
+        name: "external_work",
+        ..ENERGY
+    };
+    /// Power that viscous damping takes, r ρ V u̇², W; none without it.
+    damping_power: Option<Vec<f64>> = Description {
+        name: "damping_power",
+        unit: "W",
+        state: false,
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// Energy taken by viscous damping, J; none without it.
+    damped_energy: Option<Vec<f64>> = Description {
+        name: "damped_energy",
+        ..ENERGY
+    };
+}
+
+/// Which fields a run needs beside those that every run has; the same on all ranks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Whether there are loads.
+    pub loads: bool,
+    /// Whether there are supports.
+    pub supports: bool,
+    /// Whether there is viscous damping.
+    pub damping: bool,
+}
+
+impl<const D: usize> Fields<D> {
+    /// Everything at rest in its reference place.
+    pub fn new(model: &Model<D>, needs: Needs) -> Self {
+        let (owned, local) = (model.owned(), model.volume.len());
+        let vector = |count: usize| std::array::from_fn(|_| vec![0.0; count]);
+        let scalar = || vec![0.0; owned];
+        Self {
+            displacement: vector(local),
+            velocity: vector(owned),
+            internal_force: vector(owned),
+            external_force: needs.loads.then(|| vector(owned)),
+            reaction: needs.supports.then(|| vector(owned)),
+            freed_energy: scalar(),
+            external_work: (needs.loads || needs.supports).then(scalar),
+            damping_power: needs.damping.then(scalar),
+            damped_energy: needs.damping.then(scalar),
+        }
+    }
+
+    /// The force density of internal and external forces and of viscous damping on an owned point,
+    /// N/m³: all but the reaction.
+    #[inline]
+    pub fn acting(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
+        let mut force = self.internal_force[d][point];
+        if let Some(load) = &self.external_force {
+            force += load[d][point];
+        }
+        let damping = model.damping_of(point);
+        if damping > 0.0 {
+            force -= damping * model.density_of(point) * self.velocity[d][point];
+        }
+        force
+    }
+
+    /// Finds the power of damping at the present velocities, and adds the energy that it takes in a step
+    /// (s), by the trapezoid rule.
+    pub fn add_damped_energy(&mut self, model: &Model<D>, step: f64) {
+        let velocity = &self.velocity;
+        let (Some(power), Some(energy)) = (&mut self.damping_power, &mut self.damped_energy) else {
+            return;
+        };
+        power
+            .par_iter_mut()
+            .zip(energy)
+            .enumerate()
+            .for_each(|(point, (power, energy))| {
+                let before = *power;
+                let square: f64 = (0..D).map(|d| velocity[d][point].powi(2)).sum();
+                let mass = model.density_of(point) * model.volume[point];
+                *power = model.damping_of(point) * mass * square;
+                *energy += 0.5 * step * (before + *power);
+            });
+    }
+
+    /// The columns of a field, if decks may ask for it and it is one of the points'.
+    pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
+        self.each()
+            .find_map(|(description, columns)| (description.output == Some(field)).then_some(columns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_that_decks_may_ask_for_have_their_units() {
+        let model = Model::<2>::empty();
+        let fields = Fields::new(&model, Needs::default());
+        let mut offered = 0;
+        for (description, _) in fields.each() {
+            if let Some(output) = description.output {
+                assert_eq!(description.unit, output.unit(), "{}", description.name);
+                offered += 1;
+            }
+        }
+        assert_eq!(offered, 3);
+    }
+}

@@ -1,0 +1,13 @@
+//! Motion: the fields of the points, the clock, time integration.
+
+pub mod clock;
+pub mod fields;
+pub mod saved;
+pub mod stable_step;
+pub mod undo;
+pub mod verlet;
+
+pub use clock::Clock;
+pub use fields::Fields;
+pub use saved::Saved;
+pub use undo::Kept;

@@ -1,0 +1,93 @@
+//! The state of a run in the order of global ids: what a checkpoint holds.
+//!
+//! It is the fields that are declared as state, and what is kept of the bonds.
+
+use crate::comm::{IdOrder, agree};
+use crate::error::{Error, Result};
+use crate::solver::Simulation;
+
+use super::Clock;
+
+/// The state of the points of this rank's block of ids.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Saved {
+    /// Numbers a point: the components of all fields that are state.
+    pub width: usize,
+    /// Row-major, `width` a point.
+    pub values: Vec<f64>,
+    /// Bytes a point of what is kept of its bonds.
+    pub lengths: Vec<u32>,
+    /// What is kept of the bonds of the points, one after the other.
+    pub bonds: Vec<u8>,
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// The columns of the state.
+    fn state(&self) -> impl Iterator<Item = &Vec<f64>> {
+        let fields = self.fields.each().filter(|(field, _)| field.state);
+        fields.flat_map(|(_, columns)| columns)
+    }
+
+    /// Numbers that are saved a point; the same on all ranks.
+    pub fn saved_width(&self) -> usize {
+        self.state().count()
+    }
+
+    /// The present state, dealt out by id. Collective.
+    pub fn save(&self, order: &IdOrder) -> Saved {
+        let owned = self.model.owned();
+        let columns: Vec<&Vec<f64>> = self.state().collect();
+        let width = columns.len();
+        let mut values = vec![0.0; owned * width];
+        for (k, column) in columns.into_iter().enumerate() {
+            for (value, number) in values[k..].iter_mut().step_by(width).zip(column) {
+                *value = *number;
+            }
+        }
+        let lengths = self.forces.saved_lengths(owned);
+        let bonds = self.forces.saved(&lengths);
+        let block_lengths = order.collect(self.comm, &lengths, 1);
+        Saved {
+            width,
+            values: order.collect(self.comm, &values, width),
+            bonds: order.collect_ragged(self.comm, &bonds, &lengths, &block_lengths),
+            lengths: block_lengths,
+        }
+    }
+
+    /// Goes back to a saved state, after step `number` of steps of `step` (s). Collective.
+    ///
+    /// # Errors
+    /// When the state is that of other points or bonds; the same on all ranks.
+    pub fn restore(
+        &mut self,
+        order: &IdOrder,
+        saved: &Saved,
+        number: u64,
+        step: f64,
+    ) -> Result<()> {
+        let (owned, width) = (self.model.owned(), self.saved_width());
+        let lengths = self.forces.saved_lengths(owned);
+        let expected = order.collect(self.comm, &lengths, 1);
+        let fits = saved.width == width && saved.lengths == expected;
+        let fits = if fits {
+            Ok(())
+        } else {
+            Err(Error::run("the checkpoint is that of other bonds"))
+        };
+        agree(self.comm, fits)?;
+        let values = order.spread(self.comm, &saved.values, width);
+        let bonds = order.spread_ragged(self.comm, &saved.bonds, &lengths, &saved.lengths);
+        self.forces.restore(&lengths, &bonds);
+        let fields = self.fields.each_mut().filter(|(field, _)| field.state);
+        let columns = fields.flat_map(|(_, columns)| columns);
+        for (k, column) in columns.enumerate() {
+            for (number, value) in column.iter_mut().zip(values[k..].iter().step_by(width)) {
+                *number = *value;
+            }
+        }
+        self.clock = Clock::after(number, step, self.plan.time.end);
+        self.find_anew();
+        Ok(())
+    }
+}

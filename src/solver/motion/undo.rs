@@ -1,0 +1,44 @@
+//! Undoing a step: the fields that say so, bonds and clock as they were before it.
+
+use crate::solver::Simulation;
+use crate::solver::bonds::KeptBonds;
+
+use super::Clock;
+
+/// What a run was at the end of a step. Takes memory only where a run asks for it.
+#[derive(Debug, Default)]
+pub struct Kept {
+    clock: Option<Clock>,
+    fields: Vec<Vec<f64>>,
+    bonds: KeptBonds,
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Takes note of the present state. Memory that was taken for an earlier one is used again.
+    pub fn keep(&self, kept: &mut Kept) {
+        kept.clock = Some(self.clock);
+        let columns = self.fields.each().filter(|(field, _)| field.undone);
+        let columns = columns.flat_map(|(_, columns)| columns);
+        let mut places = std::mem::take(&mut kept.fields).into_iter();
+        kept.fields = columns
+            .map(|column| {
+                let mut place = places.next().unwrap_or_default();
+                place.clone_from(column);
+                place
+            })
+            .collect();
+        self.forces.keep(&mut kept.bonds);
+    }
+
+    /// Goes back to the state that was noted last; to make the same steps again gives the same bits.
+    pub fn undo(&mut self, kept: &Kept) {
+        let Some(clock) = kept.clock else { return };
+        self.clock = clock;
+        let columns = self.fields.each_mut().filter(|(field, _)| field.undone);
+        let columns = columns.flat_map(|(_, columns)| columns);
+        for (column, kept) in columns.zip(&kept.fields) {
+            column.copy_from_slice(kept);
+        }
+        self.forces.undo(&kept.bonds);
+    }
+}

@@ -1,0 +1,12 @@
+//! What is seen of a run: fields for the result; sums, probes, fronts and crack tips for the history.
+
+mod front;
+pub mod history;
+mod reach;
+pub mod schedule;
+pub mod snapshot;
+mod tip;
+
+pub use history::{Energies, HistoryObserver, HistoryRow};
+pub use schedule::Schedule;
+pub use snapshot::Snapshot;
