@@ -12,4 +12,7 @@ pub mod output;
 pub mod partition;
 pub mod picture;
 pub mod points;
+pub mod run;
 pub mod solver;
+
+pub use run::run;

@@ -15,6 +15,7 @@ mod fracture_energy;
 mod fronts;
 mod interfaces;
 mod invariants;
+mod library;
 mod readers;
 mod restart;
 mod stable_step;

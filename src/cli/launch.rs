@@ -6,14 +6,13 @@ use std::process::ExitCode;
 use fissure::comm::Communicator;
 use fissure::comm::mpi::World;
 use fissure::error::{Error, Result};
-use fissure::output;
+use fissure::run::start_mpi;
 
 use super::{finish, tell};
 
 /// Starts MPI, runs `body` on all ranks, and ends MPI. Its errors must be the same on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
-    output::initialise();
-    let world = match World::start() {
+    let world = match start_mpi() {
         Ok(world) => world,
         Err(error) => return finish(Err(error), true),
     };

@@ -4,7 +4,6 @@ mod bench;
 mod bench_report;
 mod check;
 mod explain;
-mod files;
 mod format;
 mod init;
 mod launch;
@@ -12,11 +11,9 @@ mod machine_limits;
 mod memory;
 mod plot;
 mod progress;
-mod recorder;
-mod restart;
 mod run;
 mod summary;
-mod watch;
+mod wall_time;
 
 /// Prints a line. A reader that has closed the output must not end a run.
 macro_rules! say {
@@ -126,7 +123,7 @@ struct RunArguments {
     restart: bool,
 
     /// Write a checkpoint and stop in time before this limit [default: the end of the Slurm job].
-    #[arg(long, value_name = "HH:MM[:SS]", value_parser = watch::wall_time)]
+    #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
     /// Give a parameter of the deck another value; may be repeated.

@@ -4,14 +4,14 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Text};
 use super::number::{Number, Vector};
-use super::outputs::interval;
+use super::outputs::{ROWS, interval};
 use super::plan::{self, Field};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::{find_set, find_sets};
 use crate::error::Result;
 
 /// Damage above which a point counts as cracked if the deck does not say.
-const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
+pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
 /// Validates what is written to the history; `end` (s) is the end of the run, `horizon` (m) that of the
 /// grid.
@@ -55,7 +55,7 @@ pub fn history(
             "[history]",
             &history.every,
             &history.every_steps,
-            end / 500.0,
+            end / ROWS,
         )?,
         reactions: find_sets(scope, &history.reactions, sets, "[history] reactions")?,
         damage_threshold,

@@ -1,6 +1,7 @@
 //! Decks: the TOML file that describes a run, from its text to a validated [`Plan`].
 
 mod bodies;
+mod build;
 mod conditions;
 mod difference;
 mod explain;

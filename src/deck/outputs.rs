@@ -65,7 +65,7 @@ pub fn output(scope: &Scope, deck: &Deck, end: f64) -> Result<plan::Output> {
             "[output]",
             &output.every,
             &output.every_steps,
-            end / 50.0,
+            end / OUTPUTS,
         )?,
         fields,
     })
@@ -79,8 +79,14 @@ pub const DEFAULT_FIELDS: [plan::Field; 4] = [
     plan::Field::StrainEnergyDensity,
 ];
 
+/// Outputs of a run whose deck does not say how many.
+pub const OUTPUTS: f64 = 50.0;
+
+/// Rows of the history of a run whose deck does not say how many.
+pub const ROWS: f64 = 500.0;
+
 /// Wall-clock time between checkpoints if the deck does not say, s.
-const DEFAULT_CHECKPOINT: f64 = 600.0;
+pub const DEFAULT_CHECKPOINT: f64 = 600.0;
 
 /// Validates when checkpoints are written.
 ///

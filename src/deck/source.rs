@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// A deck's file name and text.
-#[derive(Debug, Clone)]
+/// A deck's file name and text; both are empty for a plan that was made without a deck.
+#[derive(Debug, Clone, Default)]
 pub struct Source {
     /// Where it was read from.
     pub path: PathBuf,
@@ -30,8 +30,11 @@ impl Source {
     }
 
     /// An error that names file, line and column and shows the line with a caret below the bytes
-    /// of `span`.
+    /// of `span`; without a deck, the message alone.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
+        if self.text.is_empty() {
+            return Error::input(message.as_ref());
+        }
         let start = span.start.min(self.text.len());
         let start = (0..=start)
             .rev()

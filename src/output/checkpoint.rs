@@ -126,7 +126,7 @@ impl Checkpoints {
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,
-        warn: &dyn Fn(String),
+        warn: &mut dyn FnMut(String),
     ) -> Result<(Self, PathBuf)> {
         // Rank 0's view counts: a file system may show the others something older.
         let mut packed = Vec::new();

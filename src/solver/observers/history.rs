@@ -54,6 +54,7 @@ pub struct Energies {
 }
 
 /// One row of the history.
+#[derive(Debug, Clone)]
 pub struct HistoryRow {
     /// Values in the order of the columns; the same on all ranks.
     pub values: Vec<f64>,

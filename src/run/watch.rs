@@ -1,25 +1,12 @@
 //! When a run must write a checkpoint or stop: signals, the clock, the deck.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use fissure::comm::Communicator;
-use fissure::deck::plan::CheckpointRule;
-use fissure::error::{Error, Result};
-use fissure::solver::schedule::Schedule;
-use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
+use crate::comm::Communicator;
+use crate::deck::plan::CheckpointRule;
+use crate::solver::schedule::Schedule;
 
-/// Exit code of a run that stopped before its end and can be continued with --restart (that of
-/// sysexits.h for "try again").
-pub const STOPPED: u8 = 75;
-
-/// Exit code after a second signal.
-const ENDED_AT_ONCE: i32 = 130;
-
-/// The same signal may come twice, from the launcher and from the batch system; only one that comes this
-/// much later is a second one.
-const ONE_SIGNAL: Duration = Duration::from_secs(1);
+use super::signals::Signals;
 
 /// The ranks look at signals and clocks together, at most this many steps and about this long apart.
 const MOST_STEPS: u64 = 10;
@@ -48,52 +35,9 @@ pub enum Reason {
     WallTime,
 }
 
-/// The signals of this process.
-pub struct Signals {
-    stop: Arc<AtomicBool>,
-    request: Arc<AtomicBool>,
-}
-
-impl Signals {
-    /// Starts to listen, in a thread of its own.
-    ///
-    /// # Errors
-    /// When the system refuses.
-    pub fn listen() -> Result<Self> {
-        let signals = Self {
-            stop: Arc::default(),
-            request: Arc::default(),
-        };
-        let (stop, request) = (Arc::clone(&signals.stop), Arc::clone(&signals.request));
-        let refused = |error| Error::run(format!("cannot listen to signals: {error}"));
-        let mut queue = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGUSR1, SIGUSR2])
-            .map_err(refused)?;
-        std::thread::Builder::new()
-            .name("signals".to_owned())
-            .spawn(move || {
-                let mut first: Option<Instant> = None;
-                for signal in queue.forever() {
-                    match (signal, first) {
-                        (SIGUSR2, _) => request.store(true, Ordering::Relaxed),
-                        (_, None) => {
-                            stop.store(true, Ordering::Relaxed);
-                            first = Some(Instant::now());
-                        }
-                        (_, Some(first)) if first.elapsed() > ONE_SIGNAL => {
-                            signal_hook::low_level::exit(ENDED_AT_ONCE);
-                        }
-                        _ => {}
-                    }
-                }
-            })
-            .map_err(refused)?;
-        Ok(signals)
-    }
-}
-
 /// The signals and clocks that decide what a rank wants.
 pub struct Watch<'a> {
-    signals: &'a Signals,
+    signals: Option<&'a Signals>,
     rule: CheckpointRule,
     schedule: Option<Schedule>,
     limit: Option<(Instant, f64)>,
@@ -107,7 +51,7 @@ impl<'a> Watch<'a> {
     /// For a run of `steps`: length (s), number made, number of the last. `limit` is a wall-clock time
     /// and when it began; without it that of the Slurm job counts.
     pub fn new(
-        signals: &'a Signals,
+        signals: Option<&'a Signals>,
         rule: CheckpointRule,
         limit: Option<(Instant, Duration)>,
         (step, number, last): (f64, u64, u64),
@@ -157,9 +101,9 @@ impl<'a> Watch<'a> {
         });
         let flag = |set: bool| f64::from(u8::from(set));
         let mut votes = [
-            flag(self.signals.stop.load(Ordering::Relaxed)),
+            flag(self.signals.is_some_and(Signals::stop)),
             flag(late),
-            flag(due || self.signals.request.swap(false, Ordering::Relaxed)),
+            flag(due || self.signals.is_some_and(Signals::take_request)),
             per_step,
         ];
         comm.max(&mut votes);
@@ -188,47 +132,4 @@ fn left_to_slurm() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
     Some(Duration::from_secs(end).saturating_sub(now))
-}
-
-/// Reads `HH:MM`, `HH:MM:SS` or, with days, `D-HH:MM:SS`.
-///
-/// # Errors
-/// With what would be right.
-pub fn wall_time(text: &str) -> std::result::Result<Duration, String> {
-    let wrong = || format!("`{text}` must be HH:MM, HH:MM:SS or D-HH:MM:SS");
-    let (days, clock) = match text.split_once('-') {
-        Some((days, clock)) => (days.parse::<u64>().map_err(|_| wrong())?, clock),
-        None => (0, text),
-    };
-    let parts: Vec<u64> = clock
-        .split(':')
-        .map(|part| part.parse().map_err(|_| wrong()))
-        .collect::<std::result::Result<_, _>>()?;
-    let [hours, minutes, seconds] = match parts[..] {
-        [hours, minutes] => [hours, minutes, 0],
-        [hours, minutes, seconds] => [hours, minutes, seconds],
-        _ => return Err(wrong()),
-    };
-    if minutes > 59 || seconds > 59 || days > 10_000 || hours > 1_000_000 {
-        return Err(wrong());
-    }
-    Ok(Duration::from_secs(
-        ((days * 24 + hours) * 60 + minutes) * 60 + seconds,
-    ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn wall_times_as_slurm_writes_them() {
-        let seconds = |text| wall_time(text).map(|time| time.as_secs());
-        assert_eq!(seconds("23:50"), Ok(85_800));
-        assert_eq!(seconds("0:00:07"), Ok(7));
-        assert_eq!(seconds("2-00:00:01"), Ok(172_801));
-        for wrong in ["90", "1:60", "1:2:3:4", "x:10", "-1:10"] {
-            assert!(seconds(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -2,20 +2,21 @@
 
 use std::time::{Duration, Instant};
 
-use fissure::comm::{Communicator, IdOrder, agree};
-use fissure::deck::Plan;
-use fissure::deck::plan::Field;
-use fissure::error::{ErrorKind, Result};
-use fissure::output::checkpoint::Header;
-use fissure::output::{
+use crate::comm::{Communicator, IdOrder, agree};
+use crate::deck::Plan;
+use crate::deck::plan::Field;
+use crate::error::{ErrorKind, Result};
+use crate::output::checkpoint::Header;
+use crate::output::{
     Contents, Creation, FieldData, FieldDescription, HistoryContents, Piece, ResultFile,
     ResultReader,
 };
-use fissure::solver::Simulation;
-use fissure::solver::observe::{Energies, HistoryObserver, HistoryRow, Snapshot};
-use fissure::solver::schedule::Schedule;
+use crate::solver::Simulation;
+use crate::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
+use crate::solver::schedule::Schedule;
 
 use super::files::Files;
+use super::observer::{Observer, Row};
 
 /// History rows that are held back before they are written.
 const ROWS_HELD: usize = 256;
@@ -28,10 +29,8 @@ pub struct Recorder<'a> {
     pub observer: HistoryObserver,
     /// The way from points to the rows of files.
     pub order: IdOrder,
-    /// Energies in the last row of the history.
-    pub energies: Energies,
-    /// Broken bonds in the last row of the history.
-    pub broken: u64,
+    /// The last row of the history.
+    pub last_row: Option<HistoryRow>,
     /// Time spent here.
     pub spent: Duration,
     fields: Vec<Field>,
@@ -56,7 +55,7 @@ struct Layout<'a> {
     blocks: Vec<u32>,
     volumes: Vec<f64>,
     moving: Vec<FieldDescription>,
-    metadata: &'a [(&'static str, String)],
+    metadata: &'a [(&'a str, String)],
     piece: Piece,
     steps: u64,
 }
@@ -70,7 +69,7 @@ impl<'a> Recorder<'a> {
         simulation: &Simulation<'a, D>,
         files: &Files,
         start: Start,
-        metadata: &[(&'static str, String)],
+        metadata: &[(&str, String)],
     ) -> Result<Self> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
@@ -116,8 +115,7 @@ impl<'a> Recorder<'a> {
             file,
             observer,
             order,
-            energies: Energies::default(),
-            broken: 0,
+            last_row: None,
             spent: Duration::ZERO,
             fields: plan.output.fields.clone(),
             outputs,
@@ -131,14 +129,28 @@ impl<'a> Recorder<'a> {
         self.outputs.is_due(number) || self.rows.is_due(number)
     }
 
-    /// Writes what is due after the present step. Collective.
+    /// Writes what is due after the present step, and shows `observer` the row of the history.
+    /// Collective.
     ///
     /// # Errors
     /// When the disc is full.
-    pub fn record<const D: usize>(&mut self, simulation: &mut Simulation<'_, D>) -> Result<()> {
+    pub fn record<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        observer: &mut dyn Observer,
+    ) -> Result<()> {
         let number = simulation.number;
         let (output, row) = (self.outputs.is_due(number), self.rows.is_due(number));
-        self.write(simulation, output, row)
+        self.write(simulation, output, row)?;
+        if let (Some(values), true) = (&self.last_row, row) {
+            let columns = self.observer.columns();
+            let row = Row {
+                columns,
+                row: values,
+            };
+            observer.row(simulation, &row);
+        }
+        Ok(())
     }
 
     /// Writes an output, a history row or both. Collective.
@@ -157,13 +169,9 @@ impl<'a> Recorder<'a> {
         let start = Instant::now();
         let snapshot = Snapshot::new(simulation);
         if row {
-            let HistoryRow {
-                values,
-                energies,
-                broken,
-            } = self.observer.row(simulation, &snapshot);
-            self.held.push(values);
-            (self.energies, self.broken) = (energies, broken);
+            let row = self.observer.row(simulation, &snapshot);
+            self.held.push(row.values.clone());
+            self.last_row = Some(row);
         }
         if output || self.held.len() >= ROWS_HELD {
             self.write_rows()?;
@@ -270,7 +278,7 @@ impl<'a> Layout<'a> {
         simulation: &Simulation<'_, D>,
         order: &IdOrder,
         steps: u64,
-        metadata: &'a [(&'static str, String)],
+        metadata: &'a [(&'a str, String)],
     ) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let owned = model.owned();

@@ -1,18 +1,17 @@
-//! The files of a run's output folder.
+//! The files of a run's folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use fissure::error::{Error, Result};
-use fissure::output::checkpoint::Checkpoints;
-
-use super::file_error;
+use crate::error::{Error, Result};
+use crate::output::checkpoint::Checkpoints;
 
 /// How long a run waits for another one that writes to its folder.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Where a run writes to.
+#[derive(Debug, Clone)]
 pub struct Files {
     /// The folder.
     pub folder: PathBuf,
@@ -111,4 +110,8 @@ impl Files {
         }
         Ok(aside(&self.result))
     }
+}
+
+fn file_error(path: &Path, doing: &str, error: &std::io::Error) -> Error {
+    Error::run(format!("cannot {doing} {}: {error}", path.display()))
 }

@@ -1,0 +1,98 @@
+//! A glass plate with a notch, torn apart, built in Rust without a deck; prints its energies every 50
+//! steps:
+//!
+//! ```sh
+//! cargo run --release --example plan_in_rust
+//! ```
+
+use std::process::ExitCode;
+
+use fissure::comm::Communicator;
+use fissure::deck::expression::Expression;
+use fissure::deck::plan::{
+    Action, Crack, CriticalStretch, Interval, Law, Material, Plan, Selector, Shape, Toughness,
+};
+use fissure::dimension::Dimension;
+use fissure::elastic::Isotropic;
+use fissure::error::Result;
+use fissure::run::{Existing, Observer, Options, Row, View};
+
+/// Edge of a cell, m.
+const SPACING: f64 = 1e-3;
+
+fn main() -> ExitCode {
+    match tear(100e-6) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn tear(end: f64) -> Result<()> {
+    let world = fissure::run::start_mpi()?;
+    let mut options = Options::new("out/plan_in_rust");
+    options.existing = Existing::Replace;
+    let mut printer = Printer {
+        speaks: world.rank() == 0,
+    };
+    fissure::run(&plate(end)?, &world, options, &mut printer)?;
+    Ok(())
+}
+
+/// A plate of 60 mm × 30 mm whose ends go apart, soon at 2 m/s, up to the end (s).
+pub fn plate(end: f64) -> Result<Plan> {
+    let dimension = Dimension::PlaneStress { thickness: 1e-3 };
+    let mut plan = Plan::new(dimension, 3.0 * SPACING, end);
+    plan.title = "A plate built in Rust".to_owned();
+    let glass = Material::new(
+        Law::Pmb { corrected: false },
+        2440.0,
+        Isotropic {
+            youngs_modulus: 72e9,
+            poisson_ratio: dimension.bond_based_poisson_ratio(),
+        },
+    );
+    let plate = Shape::Box {
+        lower: [0.0; 3],
+        upper: [0.06, 0.03, 0.0],
+    };
+    let brittle = CriticalStretch::new(Toughness::FractureEnergy(135.0));
+    plan.add_body("plate", glass, Some(brittle), plate, SPACING);
+    plan.cracks.push(Crack::Segment {
+        from: [0.0, 0.015, 0.0],
+        to: [0.02, 0.015, 0.0],
+    });
+    for (name, place, velocity) in [
+        ("top", "y > 0.027", "ramp(t, 0, 1e-5)"),
+        ("bottom", "y < 0.003", "-ramp(t, 0, 1e-5)"),
+    ] {
+        let set = plan.add_set(name, Selector::Where(Expression::of(place)?));
+        let pull = vec![None, Some(Expression::of(velocity)?)];
+        plan.add_condition(name, set, Action::Velocity(pull));
+    }
+    plan.history.every = Interval::Steps(50);
+    Ok(plan)
+}
+
+/// Prints the energies in each row of the history.
+struct Printer {
+    speaks: bool,
+}
+
+impl Observer for Printer {
+    fn row(&mut self, now: &dyn View, row: &Row) {
+        if self.speaks {
+            let energies = row.energies();
+            println!(
+                "step {:5}  t = {:.3e} s  kinetic {:.3e} J  strain {:.3e} J  fracture {:.3e} J",
+                now.number(),
+                now.time(),
+                energies.kinetic,
+                energies.strain,
+                energies.fracture,
+            );
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Runs a deck, alone or under mpirun, and prints the energies at the end:
+//!
+//! ```sh
+//! cargo run --release --example run_deck inputs/crack_branching.toml out/example
+//! ```
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use fissure::comm::{Communicator, agree};
+use fissure::deck;
+use fissure::error::{Error, Result};
+use fissure::run::{Existing, Options, Outcome, Unobserved};
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().collect();
+    let [_, deck, folder] = &arguments[..] else {
+        eprintln!("run_deck DECK FOLDER");
+        return ExitCode::from(2);
+    };
+    let world = match fissure::run::start_mpi() {
+        Ok(world) => world,
+        Err(error) => return failed(&error),
+    };
+    match run_deck(Path::new(deck), Path::new(folder), &world) {
+        Ok(outcome) if world.rank() == 0 => print_energies(&outcome),
+        Err(error) if world.rank() == 0 => return failed(&error),
+        Err(error) => return ExitCode::from(error.exit_code()),
+        Ok(_) => {}
+    }
+    ExitCode::SUCCESS
+}
+
+/// Runs a deck and writes the result into a folder, in the place of an earlier one.
+pub fn run_deck(deck: &Path, folder: &Path, comm: &dyn Communicator) -> Result<Outcome> {
+    let deck = agree(comm, deck::read(deck, &[]))?;
+    let plan = agree(comm, deck.plan())?;
+    let mut options = Options::new(folder);
+    options.existing = Existing::Replace;
+    options.deck = Some(agree(comm, deck.explain())?);
+    fissure::run(&plan, comm, options, &mut Unobserved)
+}
+
+fn print_energies(outcome: &Outcome) {
+    println!("{} steps, {:.4e} s", outcome.number, outcome.time);
+    if let Some(row) = &outcome.last_row {
+        println!("kinetic   {:.4e} J", row.energies.kinetic);
+        println!("strain    {:.4e} J", row.energies.strain);
+        println!("fracture  {:.4e} J", row.energies.fracture);
+    }
+    println!("{}", outcome.files.result.display());
+}
+
+fn failed(error: &Error) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::from(error.exit_code())
+}

@@ -1,0 +1,167 @@
+//! Plans made in Rust, without a deck.
+
+use super::expression::Expression;
+use super::history::DEFAULT_DAMAGE_THRESHOLD;
+use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
+use super::plan::{
+    Action, Body, CheckpointRule, Condition, CriticalStretch, FamilyRule, History, Initial,
+    Interface, InterfaceRule, Interval, Law, Material, Output, Plan, PointSource, Quadrature,
+    Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
+};
+use super::source::Source;
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
+
+/// Share of the stable step that is taken if nothing else is said.
+const DEFAULT_SAFETY: f64 = 0.8;
+
+impl Plan {
+    /// A plan without bodies, with a horizon (m) and an end (s), and everything else as in a deck that
+    /// does not say more.
+    pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
+        Self {
+            source: Source::default(),
+            title: String::new(),
+            dimension,
+            horizon,
+            volume_correction: VolumeCorrection::None,
+            quadrature: Quadrature::Midpoint,
+            family: FamilyRule::Auto,
+            interface: Interface {
+                rule: InterfaceRule::Own,
+                pairs: Vec::new(),
+            },
+            bodies: Vec::new(),
+            sets: vec![Set {
+                name: "all".to_owned(),
+                span: 0..0,
+                selector: Selector::All,
+            }],
+            cracks: Vec::new(),
+            initials: Vec::new(),
+            conditions: Vec::new(),
+            time: Time {
+                end,
+                step: StepRule::Automatic(DEFAULT_SAFETY),
+            },
+            output: Output {
+                every: Interval::Seconds(end / OUTPUTS),
+                fields: DEFAULT_FIELDS.to_vec(),
+            },
+            history: History {
+                every: Interval::Seconds(end / ROWS),
+                reactions: Vec::new(),
+                damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
+                probes: Vec::new(),
+                fronts: Vec::new(),
+                tips: Vec::new(),
+            },
+            checkpoint: CheckpointRule::default(),
+        }
+    }
+
+    /// Adds a body that fills a shape with cubic cells, or square ones, of this edge (m), and a set of
+    /// its points with its name; returns the index of the set.
+    pub fn add_body(
+        &mut self,
+        name: &str,
+        material: Material,
+        damage: Option<CriticalStretch>,
+        shape: Shape,
+        spacing: f64,
+    ) -> usize {
+        let selector = Selector::Body(self.bodies.len());
+        let edges = std::array::from_fn(|d| {
+            if d < self.dimension.count() {
+                spacing
+            } else {
+                1.0
+            }
+        });
+        self.bodies.push(Body {
+            name: name.to_owned(),
+            span: 0..0,
+            material_name: name.to_owned(),
+            material,
+            damage,
+            horizon: self.horizon,
+            points: PointSource::Lattice {
+                shape,
+                spacing: edges,
+                origin: [0.0; 3],
+            },
+        });
+        self.add_set(name, selector)
+    }
+
+    /// Adds a set; returns its index. The set of all points has the index 0.
+    pub fn add_set(&mut self, name: &str, selector: Selector) -> usize {
+        self.sets.push(Set {
+            name: name.to_owned(),
+            span: 0..0,
+            selector,
+        });
+        self.sets.len() - 1
+    }
+
+    /// Adds a load on or a support of a set, given by its index.
+    pub fn add_condition(&mut self, name: &str, set: usize, action: Action) {
+        self.conditions.push(Condition {
+            name: name.to_owned(),
+            set,
+            span: 0..0,
+            action,
+        });
+    }
+
+    /// Adds an initial velocity (m/s) of a set, given by its index: an expression a component.
+    pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
+        self.initials.push(Initial {
+            name: name.to_owned(),
+            set,
+            span: 0..0,
+            displacement: None,
+            velocity: Some(velocity),
+        });
+    }
+}
+
+impl Material {
+    /// A material without damping; the density is in kg/m³.
+    pub fn new(law: Law, density: f64, elastic: Isotropic) -> Self {
+        Self {
+            law,
+            density,
+            elastic,
+            damping: 0.0,
+        }
+    }
+}
+
+impl CriticalStretch {
+    /// Damage of all bonds by the same critical stretch.
+    pub fn new(toughness: Toughness) -> Self {
+        Self {
+            toughness,
+            alpha: 0.0,
+            no_failure: Vec::new(),
+        }
+    }
+}
+
+impl Default for CheckpointRule {
+    fn default() -> Self {
+        Self::WallClock(DEFAULT_CHECKPOINT)
+    }
+}
+
+impl Expression {
+    /// An expression of position and time, without parameters.
+    ///
+    /// # Errors
+    /// When the text is none.
+    pub fn of(text: &str) -> crate::error::Result<Self> {
+        let parsed = Self::parse(text, &|_| None, &[], &super::resolve::ALL_VARIABLES);
+        parsed.map_err(|error| crate::error::Error::input(format!("`{text}`: {error}")))
+    }
+}

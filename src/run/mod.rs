@@ -1,0 +1,316 @@
+//! A run: from a plan to a result, with history, checkpoints and restart. What `fissure run` does, for
+//! Rust.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use fissure::comm::threads;
+//! use fissure::run::{Options, Unobserved};
+//!
+//! # fn main() -> fissure::error::Result<()> {
+//! let deck = fissure::deck::read(Path::new("plate.toml"), &[])?;
+//! let mut options = Options::new("out/plate");
+//! options.deck = Some(deck.explain()?);
+//! fissure::run(&deck.plan()?, &threads::alone(), options, &mut Unobserved)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! `examples/` holds whole programs: one that runs a deck under MPI, and one that has no deck but builds
+//! its plan.
+
+mod checkpoints;
+mod files;
+mod observer;
+mod options;
+mod physics;
+mod recorder;
+mod restart;
+mod signals;
+mod summary;
+mod watch;
+
+pub use files::Files;
+pub use observer::{Message, Observer, Row, Unobserved, View};
+pub use options::{Existing, Options};
+pub use signals::Signals;
+pub use summary::{Phases, Summary};
+pub use watch::Reason;
+
+use std::path::PathBuf;
+
+use crate::comm::mpi::World;
+use crate::comm::{Communicator, agree};
+use crate::deck::Plan;
+use crate::error::{Error, Result};
+use crate::output::{self, Creation};
+use crate::solver::Simulation;
+use crate::solver::observe::HistoryRow;
+
+use checkpoints::CheckpointWriter;
+use recorder::{Recorder, Start, can_continue};
+use restart::{Restart, restart};
+use watch::Watch;
+
+/// How a run ended, and what it did; the same on all ranks.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Why it stopped before its end, if it did; a checkpoint has been written then.
+    pub stopped: Option<Reason>,
+    /// Number of steps made since the time 0.
+    pub number: u64,
+    /// Number of the last step.
+    pub last: u64,
+    /// Time reached, s.
+    pub time: f64,
+    /// The last row of the history, if this run has written any.
+    pub last_row: Option<HistoryRow>,
+    /// Where everything is.
+    pub files: Files,
+    /// Figures.
+    pub summary: Summary,
+    /// Why not all writes to the result were collective, in bits of HDF5; 0 if they were.
+    pub no_collective_cause: u32,
+}
+
+/// Starts MPI for runs on all ranks that `mpirun` started; on one rank without it.
+///
+/// # Errors
+/// When MPI was started before in this process or has no support for threads.
+pub fn start_mpi() -> Result<World> {
+    // HDF5 must be there before MPI.
+    output::initialise();
+    World::start()
+}
+
+/// Runs a plan to its end, or until it is stopped, and writes the result. Threads are those of Rayon's
+/// global pool. Collective; without MPI there must be one rank.
+///
+/// # Errors
+/// When the plan cannot be run, the folder holds what must not be replaced, the checkpoint to go on from
+/// is none of this plan, the disc is full, or the motion of a point is not finite; the same on all ranks.
+pub fn run(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    options: Options,
+    observer: &mut dyn Observer,
+) -> Result<Outcome> {
+    let files = Files::new(options.folder.clone());
+    // Taken before anything is looked at, and kept until the end.
+    let prepared = match comm.rank() {
+        0 => files.lock().and_then(|lock| {
+            if options.existing != Existing::Continue {
+                files.prepare(options.existing == Existing::Replace)?;
+            }
+            Ok(Some(lock))
+        }),
+        _ => Ok(None),
+    };
+    let _lock = agree(comm, prepared)?;
+    let mut job = Job {
+        plan,
+        comm,
+        files,
+        physics: physics::describe(plan, options.deck.as_deref()),
+        options,
+        observer,
+    };
+    match plan.dimension.count() {
+        1 => job.run::<1>(),
+        2 => job.run::<2>(),
+        _ => job.run::<3>(),
+    }
+}
+
+/// Why the time loop was left.
+enum Left {
+    Complete,
+    Stopped(Reason),
+    /// The motion of a point is not finite.
+    Failed(Error),
+}
+
+/// Everything that a run needs beside the points.
+struct Job<'a> {
+    plan: &'a Plan,
+    comm: &'a dyn Communicator,
+    files: Files,
+    physics: String,
+    options: Options,
+    observer: &'a mut dyn Observer,
+}
+
+impl<'a> Job<'a> {
+    fn run<const D: usize>(&mut self) -> Result<Outcome> {
+        self.observer.message(&Message::Started);
+        let mut simulation = Simulation::<D>::new(self.plan, self.comm)?;
+        simulation.check()?;
+        self.observer.message(&Message::SetUp {
+            step: simulation.step,
+            stable_step: simulation.stable_step,
+        });
+        let (mut checkpoints, mut recorder) = match self.options.existing {
+            Existing::Continue => self.continue_run(&mut simulation)?,
+            Existing::Refuse | Existing::Replace => self.begin_run(&mut simulation)?,
+        };
+        let first = simulation.number;
+        self.observer.begin(&simulation);
+        let left = self.make_steps(&mut simulation, &mut checkpoints, &mut recorder)?;
+        self.observer.end(matches!(left, Left::Complete));
+        let no_collective_cause = recorder.file.no_collective_cause();
+        recorder.file.close()?;
+        self.write_side_car()?;
+        let stopped = match left {
+            Left::Complete => None,
+            Left::Stopped(reason) => Some(reason),
+            Left::Failed(error) => return Err(error),
+        };
+        let whole = self.options.started.elapsed();
+        let spent = (recorder.spent, checkpoints.spent, whole);
+        let steps = simulation.number - first;
+        Ok(Outcome {
+            stopped,
+            number: simulation.number,
+            last: simulation.last,
+            time: simulation.time(),
+            last_row: recorder.last_row,
+            files: self.files.clone(),
+            summary: Summary::new(&simulation, steps, checkpoints.written, spent),
+            no_collective_cause,
+        })
+    }
+
+    /// The time loop.
+    fn make_steps<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'a, D>,
+        checkpoints: &mut CheckpointWriter,
+        recorder: &mut Recorder<'a>,
+    ) -> Result<Left> {
+        let signals = self.options.signals.clone();
+        let started = self.options.started;
+        let limit = self.options.wall_time.map(|limit| (started, limit));
+        let steps = (simulation.step, simulation.number, simulation.last);
+        let mut watch = Watch::new(signals.as_ref(), self.plan.checkpoint, limit, steps);
+        while simulation.number < simulation.last {
+            simulation.advance();
+            let complete = simulation.number == simulation.last;
+            let number = simulation.number;
+            let mut stop = None;
+            if complete || watch.is_due(number) || recorder.is_due(number) {
+                if let Err(error) = simulation.check() {
+                    // The reader of the result should see where it went wrong.
+                    recorder.write(simulation, true, true)?;
+                    return Ok(Left::Failed(error));
+                }
+                recorder.record(simulation, self.observer)?;
+                let decision = watch.look(self.comm, number);
+                if complete || decision.checkpoint || decision.stop.is_some() {
+                    watch.wrote_checkpoint(checkpoints.write(simulation, recorder)?);
+                }
+                stop = decision.stop;
+            }
+            self.observer.step(simulation);
+            if let (Some(reason), false) = (stop, complete) {
+                return Ok(Left::Stopped(reason));
+            }
+        }
+        Ok(Left::Complete)
+    }
+
+    fn begin_run<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'a, D>,
+    ) -> Result<(CheckpointWriter, Recorder<'a>)> {
+        let creation = match self.options.existing {
+            Existing::Replace => Creation::Truncate,
+            Existing::Refuse | Existing::Continue => Creation::Exclusive,
+        };
+        let checkpoints = CheckpointWriter::new(simulation, &self.files, self.physics.clone())?;
+        let metadata = self.metadata(simulation);
+        let mut recorder = Recorder::new(simulation, &self.files, Start::New(creation), &metadata)?;
+        recorder.record(simulation, self.observer)?;
+        Ok((checkpoints, recorder))
+    }
+
+    fn continue_run<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'a, D>,
+    ) -> Result<(CheckpointWriter, Recorder<'a>)> {
+        let Restart {
+            mut checkpoints,
+            header,
+        } = restart(simulation, &self.files, self.physics.clone(), self.observer)?;
+        self.observer.message(&Message::Continued {
+            number: simulation.number,
+            time: simulation.time(),
+            complete: simulation.number >= simulation.last,
+        });
+        let metadata = self.metadata(simulation);
+        if can_continue(simulation, &self.files, &header)? {
+            let start = Start::After(header.outputs, header.rows);
+            let mut recorder = Recorder::new(simulation, &self.files, start, &metadata)?;
+            recorder.observer.continue_from(header.start);
+            return Ok((checkpoints, recorder));
+        }
+        let aside = match self.comm.rank() {
+            0 => self.files.set_aside(simulation.number),
+            _ => Ok(PathBuf::new()),
+        };
+        let aside = self.text_of_rank_0(&agree(self.comm, aside)?.to_string_lossy());
+        self.observer.message(&Message::SetAside(aside.into()));
+        let start = Start::New(Creation::Exclusive);
+        let mut recorder = Recorder::new(simulation, &self.files, start, &metadata)?;
+        recorder.observer.continue_from(header.start);
+        recorder.write(simulation, true, true)?;
+        // The checkpoint counts the outputs of the file that was set aside.
+        checkpoints.write(simulation, &mut recorder)?;
+        Ok((checkpoints, recorder))
+    }
+
+    /// The description of the result for older versions of ParaView.
+    fn write_side_car(&self) -> Result<()> {
+        let written = match self.comm.rank() {
+            0 => output::xdmf::write_beside(&self.files.result).map(|_| ()),
+            _ => Ok(()),
+        };
+        agree(self.comm, written)
+    }
+
+    /// Rank 0's text on all ranks.
+    fn text_of_rank_0(&self, text: &str) -> String {
+        let mut bytes = text.as_bytes().to_vec();
+        self.comm.broadcast(0, &mut bytes);
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// Attributes of the result: how it was made.
+    fn metadata<const D: usize>(
+        &self,
+        simulation: &Simulation<'_, D>,
+    ) -> Vec<(&'static str, String)> {
+        // All ranks must write the same; what differs between them is told by rank 0.
+        let source = &self.plan.source;
+        let mut metadata = vec![
+            ("title", self.plan.title.clone()),
+            ("deck", source.text.clone()),
+            (
+                "deck_in_full",
+                self.options.deck.clone().unwrap_or_default(),
+            ),
+            ("deck_path", source.path.display().to_string()),
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("ranks", self.comm.size().to_string()),
+            (
+                "threads",
+                self.text_of_rank_0(&rayon::current_num_threads().to_string()),
+            ),
+            ("dimension", D.to_string()),
+            ("section", self.plan.dimension.section().to_string()),
+            ("time_step", simulation.step.to_string()),
+        ];
+        let more = self.options.attributes.iter();
+        metadata.extend(more.map(|(name, text)| (*name, self.text_of_rank_0(text))));
+        metadata
+    }
+}

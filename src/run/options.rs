@@ -1,0 +1,53 @@
+//! How a plan is run: what does not belong to the problem itself.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use super::signals::Signals;
+
+/// How a plan is run. Must be the same on all ranks, but for `signals`.
+pub struct Options {
+    /// Folder of the result, the history and the checkpoints; it is made if it is not there.
+    pub folder: PathBuf,
+    /// What happens to a run that is in the folder already.
+    pub existing: Existing,
+    /// Stop, with a checkpoint, before so much time has gone by since `started`. Without it, the end of
+    /// the Slurm job that this process is part of, if any, counts.
+    pub wall_time: Option<Duration>,
+    /// When the run began.
+    pub started: Instant,
+    /// Signals of this process that stop the run or ask for a checkpoint.
+    pub signals: Option<Signals>,
+    /// The plan's deck with every default filled in, see [`Deck::explain`](crate::deck::Deck::explain);
+    /// `None` for a plan that was built in Rust.
+    pub deck: Option<String>,
+    /// More attributes of the result: name and text, such as the command line. Rank 0's texts count.
+    pub attributes: Vec<(&'static str, String)>,
+}
+
+/// What happens to a run that is in the folder already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// It is an error that there is one.
+    Refuse,
+    /// It is replaced.
+    Replace,
+    /// It goes on from its newest checkpoint, which may have been written on other numbers of ranks
+    /// and threads; it is an error that there is none.
+    Continue,
+}
+
+impl Options {
+    /// A run that starts now in a folder that must not hold one.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self {
+            folder: folder.into(),
+            existing: Existing::Refuse,
+            wall_time: None,
+            started: Instant::now(),
+            signals: None,
+            deck: None,
+            attributes: Vec::new(),
+        }
+    }
+}

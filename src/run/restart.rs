@@ -1,0 +1,64 @@
+//! Going on from a checkpoint.
+
+use crate::comm::{Communicator, IdOrder, agree};
+use crate::error::{Error, Result};
+use crate::output::checkpoint::{Checkpoints, Header, read_header, read_saved};
+use crate::solver::Simulation;
+
+use super::checkpoints::{CheckpointWriter, fingerprint};
+use super::files::Files;
+use super::observer::{Message, Observer};
+use super::physics;
+use super::recorder::id_order;
+
+/// What a restart begins with.
+pub struct Restart {
+    /// What goes on with the same checkpoint files.
+    pub checkpoints: CheckpointWriter,
+    /// The checkpoint's header.
+    pub header: Header,
+}
+
+/// Takes a simulation back to the newest intact checkpoint. Collective.
+///
+/// # Errors
+/// When there is none, or it belongs to another deck or other points; the differences are listed.
+pub fn restart<const D: usize>(
+    simulation: &mut Simulation<'_, D>,
+    files: &Files,
+    physics: String,
+    observer: &mut dyn Observer,
+) -> Result<Restart> {
+    let comm: &dyn Communicator = simulation.comm;
+    let mut warn = |message| observer.message(&Message::Warning(message));
+    let (checkpoints, path) = Checkpoints::open(comm, &files.folder, &mut warn)?;
+    let header = read_header(comm, &path)?;
+    let lines = agree(comm, physics::differences(&header.deck, &physics))?;
+    if !lines.is_empty() {
+        return Err(Error::input(format!(
+            "the deck differs in its physics from that of {}, so the run cannot be continued:\n  {}",
+            path.display(),
+            lines.join("\n  ")
+        )));
+    }
+    let instructions = simulation.forces.instructions().name();
+    if header.instructions != instructions {
+        warn(format!(
+            "the run used {} instructions until now, and goes on with {instructions}: it will end \
+             with other last digits than without the stop; see FISSURE_INSTRUCTIONS",
+            header.instructions
+        ));
+    }
+    let fingerprint = fingerprint(simulation);
+    if header.points != simulation.model.total || header.fingerprint != fingerprint {
+        let message = "was written for other points; has a point file changed?";
+        return Err(Error::input(format!("{} {message}", path.display())));
+    }
+    let order: IdOrder = id_order(simulation);
+    let saved = read_saved(comm, &path, &order)?;
+    simulation.restore(&order, &saved, header.number, header.step)?;
+    Ok(Restart {
+        checkpoints: CheckpointWriter::after(checkpoints, physics, fingerprint),
+        header,
+    })
+}
