@@ -11,7 +11,7 @@ use fissure::comm::threads;
 use fissure::deck::{self, Plan, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::solver::Simulation;
-use fissure::solver::observe::HistoryObserver;
+use fissure::solver::observers::HistoryObserver;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -46,7 +46,11 @@ fn prepare(plan: &Plan) -> Result<(u64, f64, u64)> {
         let comm = threads::alone();
         let simulation = Simulation::<D>::new(plan, &comm)?;
         HistoryObserver::new(&simulation)?;
-        Ok((simulation.model.total, simulation.step, simulation.last))
+        Ok((
+            simulation.model.total,
+            simulation.clock.step(),
+            simulation.clock.last(),
+        ))
     }
     match plan.dimension.count() {
         1 => of::<1>(plan),

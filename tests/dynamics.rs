@@ -2,7 +2,7 @@
 
 use crate::support::simulate;
 use fissure::solver::Simulation;
-use fissure::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
+use fissure::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
 fn row<const D: usize>(
     observer: &mut HistoryObserver,
@@ -39,7 +39,7 @@ fn momentum_is_constant_to_rounding() {
     simulate::<3, _>(&flying_block(0.08), |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let start = row(&mut observer, &mut simulation);
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
         let end = row(&mut observer, &mut simulation);
@@ -74,7 +74,7 @@ fn energy_drift_falls_by_four_when_the_step_halves() {
                 let mut observer = HistoryObserver::new(&simulation).unwrap();
                 row(&mut observer, &mut simulation);
                 let mut largest = 0.0_f64;
-                while simulation.number < simulation.last {
+                while simulation.clock.number() < simulation.clock.last() {
                     simulation.advance();
                     largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
                 }
@@ -108,7 +108,7 @@ fn a_steady_load_keeps_the_total_energy() {
             let total = |simulation: &mut Simulation<3>| {
                 let mut observer = HistoryObserver::new(simulation).unwrap();
                 let energies = row(&mut observer, simulation).energies;
-                let (model, u) = (&simulation.model, &simulation.state.displacement);
+                let (model, u) = (&simulation.model, &simulation.fields.displacement);
                 let external: f64 = (0..model.owned())
                     .map(|k| {
                         let [x, y, _] = model.position(k);
@@ -121,7 +121,7 @@ fn a_steady_load_keeps_the_total_energy() {
             simulate::<3, _>(&text, |mut simulation| {
                 let start = total(&mut simulation);
                 let mut largest = 0.0_f64;
-                while simulation.number < simulation.last {
+                while simulation.clock.number() < simulation.clock.last() {
                     simulation.advance();
                     largest = largest.max((total(&mut simulation) - start).abs());
                 }
@@ -150,12 +150,12 @@ fn damping_takes_the_energy_that_the_motion_loses() {
     simulate::<3, _>(text, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let start = row(&mut observer, &mut simulation).energies;
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
         let end = row(&mut observer, &mut simulation).energies;
         let expected = 3.0 * (-1.0_f64).exp();
-        for velocity in &simulation.state.velocity[0] {
+        for velocity in &simulation.fields.velocity[0] {
             assert!((velocity / expected - 1.0).abs() < 1e-5, "{velocity}");
         }
         let lost = start.kinetic * (1.0 - (-2.0_f64).exp());
@@ -168,10 +168,10 @@ fn damping_takes_the_energy_that_the_motion_loses() {
 fn the_error_of_the_motion_falls_by_four_when_the_step_halves() {
     let end = |step: f64| {
         simulate::<3, _>(&flying_block(step), |mut simulation| {
-            while simulation.number < simulation.last {
+            while simulation.clock.number() < simulation.clock.last() {
                 simulation.advance();
             }
-            simulation.state.displacement[0].clone()
+            simulation.fields.displacement[0].clone()
         })
     };
     let reference = end(0.005);
@@ -199,19 +199,19 @@ fn a_pulse_moves_at_the_lattice_speed() {
         ";
     simulate::<1, _>(text, |mut simulation| {
         let centroid = |simulation: &Simulation<1>| {
-            let u = &simulation.state.displacement[0];
+            let u = &simulation.fields.displacement[0];
             let x = &simulation.model.reference[0];
             let right = || u.iter().zip(x).filter(|(_, x)| **x > 450.0);
             right().map(|(u, x)| u * x).sum::<f64>() / right().map(|(u, _)| u).sum::<f64>()
         };
-        while simulation.time() < 60.0 {
+        while simulation.clock.time() < 60.0 {
             simulation.advance();
         }
-        let (begin, start) = (simulation.time(), centroid(&simulation));
-        while simulation.number < simulation.last {
+        let (begin, start) = (simulation.clock.time(), centroid(&simulation));
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
-        let found = (centroid(&simulation) - start) / (simulation.time() - begin);
+        let found = (centroid(&simulation) - start) / (simulation.clock.time() - begin);
         assert!(
             (found / speed - 1.0).abs() < 0.005,
             "{found} instead of {speed}"
@@ -232,14 +232,14 @@ fn a_prescribed_velocity_moves_its_points_by_just_that() {
         time = { end = 3, step = 0.05 }
         ";
     simulate::<2, _>(text, |mut simulation| {
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
-        let time = simulation.time();
+        let time = simulation.clock.time();
         for point in 0..simulation.model.owned() {
             if simulation.model.position(point)[0] < 2.0 {
-                let u = simulation.state.displacement[0][point];
-                let v = simulation.state.velocity[0][point];
+                let u = simulation.fields.displacement[0][point];
+                let v = simulation.fields.velocity[0][point];
                 assert!(
                     (u - (0.3 + 0.2 * time + 0.05 * time * time)).abs() < 1e-12,
                     "{u}"
@@ -261,16 +261,16 @@ fn a_motion_that_ends_with_the_run_stays_finite() {
         time.end = 2
         ";
     simulate::<1, _>(text, |mut simulation| {
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
         simulation.check().unwrap();
-        assert!(simulation.state.velocity[0].iter().all(|v| v.is_finite()));
+        assert!(simulation.fields.velocity[0].iter().all(|v| v.is_finite()));
     });
     // A motion without a value within the run is told.
     let text = text.replace("t/2", "t");
     simulate::<1, _>(&text, |mut simulation| {
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
         assert!(simulation.check().is_err());
@@ -314,7 +314,7 @@ fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
                 let stiffest = stiffness.iter().map(trace).fold(0.0, f64::max);
                 let mut observer = HistoryObserver::new(&simulation).unwrap();
                 let start = row(&mut observer, &mut simulation).energies.kinetic;
-                while simulation.number < simulation.last {
+                while simulation.clock.number() < simulation.clock.last() {
                     simulation.advance();
                 }
                 let end = row(&mut observer, &mut simulation).energies;
@@ -328,7 +328,7 @@ fn the_stable_step_is_stable_and_larger_than_the_usual_one() {
             "{dimension}: energy grew to {growth}"
         );
         let beyond = simulate::<D, _>(&rattled(dimension, 1.3 * stable), |mut simulation| {
-            while simulation.number < simulation.last {
+            while simulation.clock.number() < simulation.clock.last() {
                 simulation.advance();
             }
             simulation.check().is_err()
@@ -376,7 +376,7 @@ fn supports_do_the_work_that_becomes_energy() {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
             row(&mut observer, &mut simulation);
             let mut largest = 0.0_f64;
-            while simulation.number < simulation.last {
+            while simulation.clock.number() < simulation.clock.last() {
                 simulation.advance();
                 largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
             }
@@ -392,7 +392,7 @@ fn supports_do_the_work_that_becomes_energy() {
             assert!(column("reaction_left_x") < 0.0);
             let model = &simulation.model;
             let pulled = (0..model.owned()).find(|k| model.position(*k)[0] > 39.0);
-            let u = simulation.state.displacement[0][pulled.unwrap()];
+            let u = simulation.fields.displacement[0][pulled.unwrap()];
             assert!((u - 0.02 * 39.5 / 40.0).abs() < 1e-15, "{u}");
             largest / end.energies.work
         })
@@ -418,7 +418,7 @@ fn loads_accelerate_as_newton_says() {
         simulate::<3, _>(&text, |mut simulation| {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
             row(&mut observer, &mut simulation);
-            while simulation.number < simulation.last {
+            while simulation.clock.number() < simulation.clock.last() {
                 simulation.advance();
             }
             let end = row(&mut observer, &mut simulation);
@@ -448,7 +448,7 @@ fn a_pressure_pushes_against_its_normal() {
         ";
     simulate::<2, _>(text, |simulation| {
         let volumes = &simulation.model.volume;
-        let responses = simulation.state.responses.iter().zip(volumes);
+        let responses = simulation.fields.responses.iter().zip(volumes);
         let total: f64 = responses
             .map(|(response, volume)| response.force[1] * volume)
             .sum();

@@ -2,7 +2,7 @@
 //! What its fronts do at finer spacings stands in docs/eoi_alon.md.
 
 use crate::support::simulate;
-use fissure::solver::observe::{HistoryObserver, Snapshot};
+use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 const DENSITY: f64 = 3690.0;
 
@@ -34,7 +34,7 @@ fn run(deck: &str) -> Vec<Row> {
         };
         let columns = ["time", "front_wave", "front_damage", "tip_farthest_length"].map(column);
         let mut rows = Vec::new();
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
             let snapshot = Snapshot::new(&mut simulation);
             let values = observer.row(&mut simulation, &snapshot).values;

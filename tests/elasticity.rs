@@ -4,7 +4,7 @@
 use crate::support::{displace, simulate};
 use fissure::deck::plan::Field;
 use fissure::solver::Simulation;
-use fissure::solver::observe::Snapshot;
+use fissure::solver::observers::Snapshot;
 
 /// A body of unit spacing, `half` points to each side of a central one at the origin.
 fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -> String {
@@ -386,7 +386,7 @@ fn phase_speed<const D: usize>(deck: &str, wave_number: f64, density: f64) -> f6
         displace(&mut simulation, |[x, y, z]| {
             [x + amplitude * (wave_number * x).cos(), y, z]
         });
-        let force = simulation.state.responses[centre(&simulation)].force[0];
+        let force = simulation.fields.responses[centre(&simulation)].force[0];
         (-force / (density * amplitude)).sqrt() / wave_number
     })
 }

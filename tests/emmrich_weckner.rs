@@ -6,7 +6,7 @@ use crate::support::simulate_input;
 use fissure::deck::plan::Field;
 use fissure::points::distance_squared;
 use fissure::solver::Simulation;
-use fissure::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
+use fissure::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
 /// Points with more damage than this are on a crack.
 const CRACKED: f64 = 0.34;
@@ -138,11 +138,11 @@ fn difference(step: &str) -> (f64, [f64; 2]) {
         let (mut worst, mut turn) = (0.0_f64, [0.0; 2]);
         for moment in 1..=250 {
             let time = 4e-6 * f64::from(moment);
-            while simulation.time() < time - 1e-9 {
+            while simulation.clock.time() < time - 1e-9 {
                 simulation.advance();
             }
             (0..4).for_each(|_| plate.advance(1e-6));
-            let displacement = &simulation.state.displacement;
+            let displacement = &simulation.fields.displacement;
             for (state, partner) in plate.state.iter().zip(&partners) {
                 for d in 0..2 {
                     worst = worst.max((displacement[d][*partner] - state[d]).abs());
@@ -177,7 +177,7 @@ fn the_plate_keeps_its_energy_and_symmetry() {
             let start = row(&mut observer, &mut simulation).energies.kinetic;
             assert!((start - 10e3).abs() < 1e-8, "{start} J");
             let mut largest = 0.0_f64;
-            while simulation.number < simulation.last {
+            while simulation.clock.number() < simulation.clock.last() {
                 simulation.advance();
                 largest = largest.max(row(&mut observer, &mut simulation).energies.error.abs());
             }
@@ -193,7 +193,7 @@ fn the_plate_keeps_its_energy_and_symmetry() {
 /// Displacements are mirror images about planes across some axes, at these places.
 fn symmetric<const D: usize>(simulation: &Simulation<D>, planes: &[(usize, f64)]) {
     let model = &simulation.model;
-    let displacement = &simulation.state.displacement;
+    let displacement = &simulation.fields.displacement;
     for (axis, centre) in planes.iter().copied() {
         let largest = displacement[axis]
             .iter()
@@ -242,19 +242,19 @@ fn the_slit_opens_and_runs() {
             ["upper", "lower"].map(|face| place(&format!("probe_{face}_face_displacement_y")));
         // Half the length of the crack and its opening, over time.
         let mut rows = Vec::new();
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
             let values = row(&mut observer, &mut simulation).values;
             let points = cracked(&mut simulation);
             let tip = points.iter().fold(0.0_f64, |tip, x| tip.max(x[0].abs()));
             let off = points.iter().fold(0.0_f64, |off, x| off.max(x[1].abs()));
             rows.push((
-                simulation.time(),
+                simulation.clock.time(),
                 tip,
                 off,
                 values[faces[0]] - values[faces[1]],
             ));
-            if simulation.time() < 0.04 / speed_of_sound {
+            if simulation.clock.time() < 0.04 / speed_of_sound {
                 assert_eq!(
                     values[8], 0.0,
                     "no bond breaks before the tension has arrived"
@@ -291,7 +291,7 @@ fn damage_grows_from_the_defect() {
         // Time, number of cracked points and how far from the defect's centre they reach: in its plane
         // and across.
         let mut rows = Vec::new();
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
             let points = cracked(&mut simulation);
             let radius = points.iter().map(|x| x[0].hypot(x[2])).fold(0.0, f64::max);
@@ -299,7 +299,7 @@ fn damage_grows_from_the_defect() {
                 .iter()
                 .map(|x| (x[1] - 0.03).abs())
                 .fold(0.0, f64::max);
-            rows.push((simulation.time(), points.len(), radius, height));
+            rows.push((simulation.clock.time(), points.len(), radius, height));
         }
         let (first, last) = (rows[0], rows[rows.len() - 1]);
         assert!(first.2 < 0.0075, "the defect: {first:?}");

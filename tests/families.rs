@@ -8,7 +8,7 @@ use crate::support::datasets::{datasets, difference};
 use crate::support::{plan, simulate_on};
 use fissure::deck::plan::Field;
 use fissure::solver::Simulation;
-use fissure::solver::observe::Snapshot;
+use fissure::solver::observers::Snapshot;
 
 /// Two bodies on one grid, with a hole, a crack, a zone without failure and supports; `LAW` and
 /// `GRID` stand for what differs.
@@ -90,7 +90,7 @@ fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
         Field::Neighbours,
     ];
     let pieces = simulate_on(ranks, deck, |mut simulation: Simulation<D>| {
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
         }
         simulation.check().unwrap();

@@ -2,7 +2,7 @@
 
 use crate::support::{displace, simulate, simulate_on};
 use fissure::solver::Simulation;
-use fissure::solver::observe::{HistoryObserver, Snapshot};
+use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// The last entries of the present row: those of the fronts and tips.
 fn last<const D: usize, const N: usize>(simulation: &mut Simulation<D>) -> [f64; N] {
@@ -132,8 +132,8 @@ fn the_tip_of_a_running_crack() {
             .collect();
         let column = |name: &str| names.iter().position(|known| known == name).unwrap();
         let mut rows = Vec::new();
-        while simulation.number < simulation.last {
-            if simulation.number % 5 == 0 {
+        while simulation.clock.number() < simulation.clock.last() {
+            if simulation.clock.number() % 5 == 0 {
                 let snapshot = Snapshot::new(&mut simulation);
                 rows.push(observer.row(&mut simulation, &snapshot).values);
             }

@@ -3,7 +3,7 @@
 
 use crate::support::{displace, largest_force, simulate, simulate_on};
 use fissure::solver::Simulation;
-use fissure::solver::observe::{HistoryObserver, Snapshot};
+use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// Every law, as the material `rubber`.
 const LAWS: [&str; 12] = [
@@ -164,13 +164,13 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
     });
     let model = &simulation.model;
     let mut sums = [[0.0; 2]; 3];
-    for (point, response) in simulation.state.responses.iter().enumerate() {
+    for (point, response) in simulation.fields.responses.iter().enumerate() {
         let (mut arm, mut force) = (model.position(point), [0.0; 3]);
         for d in 0..D {
             arm[d] += if linear {
                 0.0
             } else {
-                simulation.state.displacement[d][point]
+                simulation.fields.displacement[d][point]
             };
             force[d] = response.force[d] * model.volume[point];
         }
@@ -192,7 +192,7 @@ fn forces_are_equal_and_opposite() {
         }
         for d in 0..D {
             let (mut net, mut gross) = (0.0, 0.0);
-            for (k, response) in simulation.state.responses.iter().enumerate() {
+            for (k, response) in simulation.fields.responses.iter().enumerate() {
                 net += response.force[d] * simulation.model.volume[k];
                 gross += response.force[d].abs() * simulation.model.volume[k];
             }
@@ -257,7 +257,7 @@ fn the_force_is_the_slope_of_the_energy() {
     fn energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
         let stored = simulation
             .forces
-            .stored(&simulation.model, &simulation.state.displacement);
+            .stored(&simulation.model, &simulation.fields.displacement);
         let volumes = &simulation.model.volume;
         stored
             .iter()
@@ -270,14 +270,14 @@ fn the_force_is_the_slope_of_the_energy() {
         for point in [0, 7, 31] {
             let volume = simulation.model.volume[point];
             for d in 0..D {
-                let force = simulation.state.responses[point].force[d] * volume;
-                let place = simulation.state.displacement[d][point];
+                let force = simulation.fields.responses[point].force[d] * volume;
+                let place = simulation.fields.displacement[d][point];
                 let step = 1e-4;
-                simulation.state.displacement[d][point] = place + step;
+                simulation.fields.displacement[d][point] = place + step;
                 let above = energy(&mut simulation);
-                simulation.state.displacement[d][point] = place - step;
+                simulation.fields.displacement[d][point] = place - step;
                 let below = energy(&mut simulation);
-                simulation.state.displacement[d][point] = place;
+                simulation.fields.displacement[d][point] = place;
                 let slope = -(above - below) / (2.0 * step);
                 let scale = force.abs().max(1e-3);
                 assert!((force - slope).abs() < 1e-5 * scale, "{force} {slope}");
@@ -305,7 +305,12 @@ fn the_mirror_image_has_the_mirrored_forces() {
             .fold(0.0_f64, |a, x| a.max(*x));
         let mirror = move |x: [f64; 3]| [upper + 0.5 - x[0], x[1], x[2]];
         displace(&mut simulation, wave);
-        let forces: Vec<_> = simulation.state.responses.iter().map(|r| r.force).collect();
+        let forces: Vec<_> = simulation
+            .fields
+            .responses
+            .iter()
+            .map(|r| r.force)
+            .collect();
         displace(&mut simulation, |x| mirror(wave(mirror(x))));
         let model = &simulation.model;
         let scale = largest_force(&simulation);
@@ -317,7 +322,7 @@ fn the_mirror_image_has_the_mirrored_forces() {
             for d in 0..D {
                 let sign = if d == 0 { -1.0 } else { 1.0 };
                 let mirrored = sign * forces[partner][d];
-                let found = simulation.state.responses[point].force[d];
+                let found = simulation.fields.responses[point].force[d];
                 assert!(
                     (found - mirrored).abs() < 1e-12 * scale,
                     "{found} {mirrored}"
@@ -368,7 +373,7 @@ fn together<const D: usize>(text: &str) {
 fn count_intact<const D: usize>(simulation: &mut Simulation<D>) -> u32 {
     let stored = simulation
         .forces
-        .stored(&simulation.model, &simulation.state.displacement);
+        .stored(&simulation.model, &simulation.fields.displacement);
     stored.iter().map(|stored| stored.neighbours).sum()
 }
 
@@ -400,12 +405,12 @@ fn a_bond_breaks_at_the_critical_stretch_and_not_before() {
         assert_eq!(count_intact(&mut simulation), 2);
         let energy = simulation
             .forces
-            .stored(&simulation.model, &simulation.state.displacement);
+            .stored(&simulation.model, &simulation.fields.displacement);
         displace(&mut simulation, |x| [x[0] * 1.125, 0.0, 0.0]);
         assert_eq!(count_intact(&mut simulation), 0);
         assert_eq!(largest_force(&simulation), 0.0);
         // What the bond held has been set free, half of it at each end.
-        let set_free: f64 = simulation.state.responses.iter().map(|r| r.set_free).sum();
+        let set_free: f64 = simulation.fields.responses.iter().map(|r| r.set_free).sum();
         let held: f64 = energy.iter().map(|stored| stored.energy).sum();
         assert!((set_free / held - 1.0).abs() < 1e-5);
         // Broken for good.
@@ -500,7 +505,7 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
         let far_left =
             (0..simulation.model.owned()).filter(|k| simulation.model.position(*k)[0] < 7.0);
         let forces: Vec<f64> = far_left
-            .map(|k| simulation.state.responses[k].force[1].abs())
+            .map(|k| simulation.fields.responses[k].force[1].abs())
             .collect();
         assert!(forces.iter().all(|force| *force == 0.0));
         assert!(largest_force(&simulation) > 0.0);

@@ -2,7 +2,7 @@
 
 use crate::support::simulate;
 use fissure::solver::Simulation;
-use fissure::solver::observe::{HistoryObserver, Snapshot};
+use fissure::solver::observers::{HistoryObserver, Snapshot};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// A system of one body or two.

@@ -52,7 +52,7 @@ impl Plane {
     fn centroid(&self, simulation: &Simulation<3>) -> f64 {
         let values = self.column.iter().map(|point| {
             let x = simulation.model.reference[0][*point];
-            (x, simulation.state.displacement[0][*point])
+            (x, simulation.fields.displacement[0][*point])
         });
         let right = values.filter(|(x, _)| *x > 0.0);
         let (mut weighted, mut sum) = (0.0, 0.0);
@@ -93,15 +93,15 @@ fn pulse_speed(horizon: f64, bodies: impl Fn(f64) -> String) -> f64 {
         let plane = Plane::new(&simulation);
         plane.follow(&mut simulation);
         let mut start = None;
-        while simulation.number < simulation.last {
+        while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
             plane.follow(&mut simulation);
-            if simulation.time() >= apart && start.is_none() {
-                start = Some((simulation.time(), plane.centroid(&simulation)));
+            if simulation.clock.time() >= apart && start.is_none() {
+                start = Some((simulation.clock.time(), plane.centroid(&simulation)));
             }
         }
         let (time, place) = start.expect("the run is longer");
-        (plane.centroid(&simulation) - place) / (simulation.time() - time)
+        (plane.centroid(&simulation) - place) / (simulation.clock.time() - time)
     })
 }
 
@@ -217,14 +217,15 @@ fn standing_waves_in_a_bar_disperse_as_the_integral_says() {
         simulate::<1, _>(&text, |mut simulation| {
             let middle = (0..801).find(|k| simulation.model.reference[0][*k].abs() < 1e-9);
             let middle = middle.expect("a point in the middle");
-            let at = |simulation: &Simulation<1>| simulation.state.displacement[0][middle];
+            let at = |simulation: &Simulation<1>| simulation.fields.displacement[0][middle];
             let mut before = at(&simulation);
             while at(&simulation) > 0.0 {
                 before = at(&simulation);
                 simulation.advance();
             }
             let after = at(&simulation);
-            let passed = simulation.time() - simulation.step * after / (after - before);
+            let passed =
+                simulation.clock.time() - simulation.clock.step() * after / (after - before);
             let found = quarter / passed;
             assert!((found / expected - 1.0).abs() < 0.005, "{number}: {found}");
         });

@@ -6,7 +6,7 @@ use crate::cli::say;
 
 use super::bench::{Family, Law};
 use super::format::{bytes, count, si};
-use fissure::solver::instructions::Instructions;
+use fissure::lanes::Instructions;
 
 /// Time of a phase of the loop over the ranks, s.
 pub struct Phase {

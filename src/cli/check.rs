@@ -4,18 +4,17 @@ use crate::cli::say;
 use fissure::comm::threads;
 use fissure::deck::{self, Plan};
 use fissure::error::Result;
-use fissure::material::AnyLaw;
 use fissure::solver::Simulation;
 use fissure::solver::assign::block_laws;
 use fissure::solver::conditions::members;
-use fissure::solver::observe::HistoryObserver;
+use fissure::solver::observers::HistoryObserver;
 
 use super::format::{bytes, count, si};
 use super::{CheckArguments, Verbosity, launch};
 
 /// Fewest bonds of a point, by dimension, below which it is poorly held: half of a family at a
 /// horizon of two spacings.
-const FEW_NEIGHBOURS: [u32; 3] = [2, 6, 16];
+const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Validates the deck and prints the figures.
 ///
@@ -67,13 +66,8 @@ fn report<const D: usize>(
             format!("{:.4}", body.material.elastic.poisson_ratio),
         );
         let laws = block_laws(plan, body);
-        match laws.law {
-            AnyLaw::Pmb(law) => line("micromodulus", format!("{:.4e} N/m⁶", law.micromodulus)),
-            AnyLaw::LinearMicroelastic(law) => {
-                line("micromodulus", format!("{:.4e} N/m⁶", law.micromodulus));
-            }
-            AnyLaw::Normalised(_) => line("micromodulus", "of each point's own family"),
-            AnyLaw::Ordinary(_) => line("forces", "ordinary state-based"),
+        for (name, value) in laws.law.described() {
+            line(name, value);
         }
         match laws.damage {
             None => line("damage", "none"),
@@ -103,8 +97,8 @@ fn report<const D: usize>(
     say!("time");
     line("end", si(plan.time.end, "s"));
     line("stable step", si(simulation.stable_step, "s"));
-    line("time step", si(simulation.step, "s"));
-    line("steps", count(simulation.last));
+    line("time step", si(simulation.clock.step(), "s"));
+    line("steps", count(simulation.clock.last()));
     say!("sets");
     let model = &simulation.model;
     for (index, set) in plan.sets.iter().enumerate() {
@@ -113,20 +107,16 @@ fn report<const D: usize>(
         line(&set.name, format!("{} points{note}", count(size as u64)));
     }
     let few = FEW_NEIGHBOURS[D - 1];
-    let snapshot = simulation
-        .forces
-        .stored(&simulation.model, &simulation.state.displacement);
-    let poor = snapshot
-        .iter()
-        .filter(|stored| stored.neighbours < few)
-        .count();
+    let stored = simulation.forces.stored(&simulation.model);
+    let neighbours = stored.neighbours.iter();
+    let poor = neighbours.filter(|count| **count < few).count();
     if poor > 0 {
         say!(
             "warning: {} points have fewer than {few} intact bonds",
             count(poor as u64)
         );
     }
-    if simulation.step > simulation.stable_step {
+    if simulation.clock.step() > simulation.stable_step {
         say!("warning: the time step is larger than the stable one");
     }
     Ok(())

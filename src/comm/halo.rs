@@ -73,9 +73,7 @@ impl Halo {
                 let values = neighbour.send.iter().map(|i| component[*i as usize]);
                 message.send.extend(values);
             }
-            message
-                .receive
-                .resize(count * neighbour.receive.len(), 0.0);
+            message.receive.resize(count * neighbour.receive.len(), 0.0);
         }
     }
 

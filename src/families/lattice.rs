@@ -321,9 +321,7 @@ impl BondLattice {
 
     /// Memory that the lattice takes beside its grid, bytes.
     pub fn bytes(&self) -> usize {
-        self.store.bytes()
-            + size_of_val(&self.vectors[..])
-            + size_of_val(&self.shifts[..])
+        self.store.bytes() + size_of_val(&self.vectors[..]) + size_of_val(&self.shifts[..])
     }
 }
 

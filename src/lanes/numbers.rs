@@ -70,21 +70,21 @@ impl<const N: usize> Numbers for [Lanes; N] {
         &mut self[quantity]
     }
 
-    fn columns(all: &[Vec<f64>]) -> [&[f64]; N] {
+    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_> {
         std::array::from_fn(|k| &all[k][..])
     }
 
-    fn columns_mut(all: &mut [Vec<f64>]) -> [&mut [f64]; N] {
+    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_> {
         let mut all = all.iter_mut();
         std::array::from_fn(|_| &mut all.next().expect("a column for each quantity")[..])
     }
 
     #[inline(always)]
-    fn column<'a>(columns: &[&'a [f64]; N], quantity: usize) -> &'a [f64] {
+    fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64] {
         columns[quantity]
     }
 
-    fn split_at(columns: [&mut [f64]; N], middle: usize) -> [[&mut [f64]; N]; 2] {
+    fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2] {
         let mut firsts = columns;
         let seconds = std::array::from_fn(|k| {
             let (first, second) = std::mem::take(&mut firsts[k]).split_at_mut(middle);
@@ -95,7 +95,7 @@ impl<const N: usize> Numbers for [Lanes; N] {
     }
 
     #[inline(always)]
-    fn column_mut<'a>(columns: &'a mut [&mut [f64]; N], quantity: usize) -> &'a mut [f64] {
+    fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64] {
         columns[quantity]
     }
 }

@@ -2,7 +2,8 @@
 //! bonds between blocks of different laws.
 
 use super::{
-    Bond, ElasticPlasticPmb, ForceState, Law, LinearMicroelastic, Normalised, Ordinary, Pmb,
+    Bond, Described, ElasticPlasticPmb, ForceState, Law, LinearMicroelastic, Normalised, Ordinary,
+    Pmb,
 };
 use crate::lanes::{Lanes, Numbers};
 
@@ -151,6 +152,11 @@ fn filled_up<A: Numbers, B: Numbers>(some: A) -> B {
 }
 
 impl AnyLaw {
+    /// [`Described::described`] of the law that it is.
+    pub fn described(&self) -> Vec<(&'static str, String)> {
+        with_law!(self, law => law.described())
+    }
+
     /// How many numbers the law has in `D` dimensions.
     pub fn counts<const D: usize>(&self) -> Counts {
         fn of<L: Law<D>, const D: usize>(_: &L) -> Counts {

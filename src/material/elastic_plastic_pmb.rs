@@ -5,7 +5,7 @@
 //! which unloading returns on a line of the same slope. The bond's elastic energy is c (s − s_p)² |ξ|/2;
 //! to let s_p grow by Δs_p takes c s_y |Δs_p| |ξ|, which is dissipated.
 
-use super::{Along, Bond, Law, Pmb};
+use super::{Along, Bond, Described, Law, Pmb};
 use crate::lanes::Lanes;
 
 /// The law with its constants.
@@ -15,6 +15,14 @@ pub struct ElasticPlasticPmb {
     pub elastic: Pmb,
     /// s_y.
     pub yield_stretch: f64,
+}
+
+impl Described for ElasticPlasticPmb {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        let mut facts = self.elastic.described();
+        facts.push(("yield stretch", format!("{:.4e}", self.yield_stretch)));
+        facts
+    }
 }
 
 impl<const D: usize> Law<D> for ElasticPlasticPmb {

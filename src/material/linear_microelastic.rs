@@ -5,7 +5,7 @@
 //! influence λ |ξ|³. Forces act along ξ, also after large motions, so a rotated body is not free of
 //! forces.
 
-use super::{Along, Bond, Law};
+use super::{Along, Bond, Described, Law};
 use crate::lanes::Lanes;
 
 /// The law with its constants.
@@ -16,6 +16,12 @@ pub struct LinearMicroelastic {
     /// Classical energy density at unit isotropic stretch W₁ (J/m³) that the sum over each point's
     /// own family is scaled to; `None` to scale nothing.
     pub corrected_to: Option<f64>,
+}
+
+impl Described for LinearMicroelastic {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![("micromodulus", format!("{:.4e} N/m⁶", self.micromodulus))]
+    }
 }
 
 impl<const D: usize> Law<D> for LinearMicroelastic {

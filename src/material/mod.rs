@@ -29,6 +29,12 @@ pub use pmb::Pmb;
 
 use crate::lanes::{Lanes, Numbers};
 
+/// What can be told of a law without bonds.
+pub trait Described {
+    /// Names and values of what it was given or has found, for people to read.
+    fn described(&self) -> Vec<(&'static str, String)>;
+}
+
 /// A material law: what bonds add to the numbers of a point, and the force state that follows.
 ///
 /// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They

@@ -8,7 +8,7 @@
 //!
 //! With the influence 1/|ξ| it is Diehl & Schweitzer's eq. 15: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
 
-use super::{Along, Bond, Law};
+use super::{Along, Bond, Described, Law};
 use crate::lanes::Lanes;
 
 /// The law with its constants.
@@ -19,6 +19,12 @@ pub struct Normalised {
     /// The micromodulus that the damage law's critical stretch belongs to, N/m⁶; `None` if that
     /// stretch holds for all bonds.
     pub reference: Option<f64>,
+}
+
+impl Described for Normalised {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![("micromodulus", "of each point's own family".to_owned())]
+    }
 }
 
 impl<const D: usize> Law<D> for Normalised {

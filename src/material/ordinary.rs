@@ -16,7 +16,7 @@
 //! W = ½ κθ² + ½ (A/m) Σ ω ε² Ṽ, of which t is the derivative with bonds broken as well: m is that of
 //! the whole family, θ sums over intact bonds.
 
-use super::{Along, Bond, Law};
+use super::{Along, Bond, Described, Law};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::lanes::Lanes;
@@ -74,6 +74,12 @@ fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
             Some(elastic.bulk_modulus() + elastic.shear_modulus() / 3.0)
         }
         Dimension::Space => Some(elastic.bulk_modulus()),
+    }
+}
+
+impl Described for Ordinary {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![("forces", "ordinary state-based".to_owned())]
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Along, Bond, Law};
+use super::{Along, Bond, Described, Law};
 use crate::dimension::Dimension;
 use crate::lanes::Lanes;
 
@@ -44,6 +44,12 @@ impl Pmb {
                 Dimension::PlaneStrain { .. } => 1.6,
                 Dimension::Line { .. } => 0.6,
             }
+    }
+}
+
+impl Described for Pmb {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![("micromodulus", format!("{:.4e} N/m⁶", self.micromodulus))]
     }
 }
 

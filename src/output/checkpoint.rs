@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::comm::{Communicator, IdOrder, agree};
 use crate::error::{Error, Result};
-use crate::solver::Saved;
+use crate::solver::motion::Saved;
 
 use super::access::Creation;
 use super::attribute::Attribute;
@@ -22,7 +22,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 2;
+const VERSION: i64 = 3;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]

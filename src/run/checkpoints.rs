@@ -65,8 +65,8 @@ impl CheckpointWriter {
         let begin = Instant::now();
         recorder.flush()?;
         let header = Header {
-            number: simulation.number,
-            step: simulation.step,
+            number: simulation.clock.number(),
+            step: simulation.clock.step(),
             points: simulation.model.total,
             fingerprint: self.fingerprint,
             outputs: recorder.file.steps(),

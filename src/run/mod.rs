@@ -45,7 +45,7 @@ use crate::deck::Plan;
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
-use crate::solver::observe::HistoryRow;
+use crate::solver::observers::HistoryRow;
 
 use checkpoints::CheckpointWriter;
 use recorder::{Recorder, Start, can_continue};
@@ -146,14 +146,14 @@ impl<'a> Job<'a> {
         let mut simulation = Simulation::<D>::new(self.plan, self.comm)?;
         simulation.check()?;
         self.observer.message(&Message::SetUp {
-            step: simulation.step,
+            step: simulation.clock.step(),
             stable_step: simulation.stable_step,
         });
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(&mut simulation)?,
             Existing::Refuse | Existing::Replace => self.begin_run(&mut simulation)?,
         };
-        let first = simulation.number;
+        let first = simulation.clock.number();
         self.observer.begin(&simulation);
         let left = self.make_steps(&mut simulation, &mut checkpoints, &mut recorder)?;
         self.observer.end(matches!(left, Left::Complete));
@@ -167,12 +167,12 @@ impl<'a> Job<'a> {
         };
         let whole = self.options.started.elapsed();
         let spent = (recorder.spent, checkpoints.spent, whole);
-        let steps = simulation.number - first;
+        let steps = simulation.clock.number() - first;
         Ok(Outcome {
             stopped,
-            number: simulation.number,
-            last: simulation.last,
-            time: simulation.time(),
+            number: simulation.clock.number(),
+            last: simulation.clock.last(),
+            time: simulation.clock.time(),
             last_row: recorder.last_row,
             files: self.files.clone(),
             summary: Summary::new(&simulation, steps, checkpoints.written, spent),
@@ -190,21 +190,25 @@ impl<'a> Job<'a> {
         let signals = self.options.signals.clone();
         let started = self.options.started;
         let limit = self.options.wall_time.map(|limit| (started, limit));
-        let steps = (simulation.step, simulation.number, simulation.last);
-        let mut watch = Watch::new(signals.as_ref(), self.plan.checkpoint, limit, steps);
-        while simulation.number < simulation.last {
+        let mut watch = Watch::new(
+            signals.as_ref(),
+            self.plan.checkpoint,
+            limit,
+            simulation.clock.number(),
+        );
+        while !simulation.clock.is_over() {
             simulation.advance();
-            let complete = simulation.number == simulation.last;
-            let number = simulation.number;
+            let clock = simulation.clock;
+            let complete = clock.is_over();
             let mut stop = None;
-            if complete || watch.is_due(number) || recorder.is_due(number) {
+            if complete || watch.is_due(&clock) || recorder.is_due(&clock) {
                 if let Err(error) = simulation.check() {
                     // The reader of the result should see where it went wrong.
                     recorder.write(simulation, true, true)?;
                     return Ok(Left::Failed(error));
                 }
                 recorder.record(simulation, self.observer)?;
-                let decision = watch.look(self.comm, number);
+                let decision = watch.look(self.comm, &clock);
                 if complete || decision.checkpoint || decision.stop.is_some() {
                     watch.wrote_checkpoint(checkpoints.write(simulation, recorder)?);
                 }
@@ -242,9 +246,9 @@ impl<'a> Job<'a> {
             header,
         } = restart(simulation, &self.files, self.physics.clone(), self.observer)?;
         self.observer.message(&Message::Continued {
-            number: simulation.number,
-            time: simulation.time(),
-            complete: simulation.number >= simulation.last,
+            number: simulation.clock.number(),
+            time: simulation.clock.time(),
+            complete: simulation.clock.is_over(),
         });
         let metadata = self.metadata(simulation);
         if can_continue(simulation, &self.files, &header)? {
@@ -254,7 +258,7 @@ impl<'a> Job<'a> {
             return Ok((checkpoints, recorder));
         }
         let aside = match self.comm.rank() {
-            0 => self.files.set_aside(simulation.number),
+            0 => self.files.set_aside(simulation.clock.number()),
             _ => Ok(PathBuf::new()),
         };
         let aside = self.text_of_rank_0(&agree(self.comm, aside)?.to_string_lossy());
@@ -307,7 +311,7 @@ impl<'a> Job<'a> {
             ),
             ("dimension", D.to_string()),
             ("section", self.plan.dimension.section().to_string()),
-            ("time_step", simulation.step.to_string()),
+            ("time_step", simulation.clock.step().to_string()),
         ];
         let more = self.options.attributes.iter();
         metadata.extend(more.map(|(name, text)| (*name, self.text_of_rank_0(text))));

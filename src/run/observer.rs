@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::solver::Simulation;
-use crate::solver::observe::{Energies, HistoryRow};
+use crate::solver::observers::{Energies, HistoryRow};
 
 /// Looks on while a run goes on. Its methods are called on all ranks alike; each does nothing unless
 /// it is given something to do.
@@ -90,19 +90,19 @@ pub trait View {
 
 impl<const D: usize> View for Simulation<'_, D> {
     fn number(&self) -> u64 {
-        self.number
+        self.clock.number()
     }
 
     fn last(&self) -> u64 {
-        self.last
+        self.clock.last()
     }
 
     fn time(&self) -> f64 {
-        Simulation::time(self)
+        self.clock.time()
     }
 
     fn step(&self) -> f64 {
-        self.step
+        self.clock.step()
     }
 
     fn dimension(&self) -> usize {
@@ -118,11 +118,11 @@ impl<const D: usize> View for Simulation<'_, D> {
     }
 
     fn displacement(&self, component: usize) -> &[f64] {
-        &self.state.displacement[component][..self.model.owned()]
+        &self.fields.displacement[component][..self.model.owned()]
     }
 
     fn velocity(&self, component: usize) -> &[f64] {
-        &self.state.velocity[component]
+        &self.fields.velocity[component]
     }
 }
 

@@ -12,8 +12,9 @@ use crate::output::{
     ResultReader,
 };
 use crate::solver::Simulation;
-use crate::solver::observe::{HistoryObserver, HistoryRow, Snapshot};
-use crate::solver::schedule::Schedule;
+use crate::solver::motion::Clock;
+use crate::solver::observers::Schedule;
+use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
 use super::files::Files;
 use super::observer::{Observer, Row};
@@ -74,15 +75,15 @@ impl<'a> Recorder<'a> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
         let order = id_order(simulation);
-        let schedule = |every| Schedule::new(every, simulation.step, simulation.last);
-        let (outputs, rows) = (schedule(plan.output.every), schedule(plan.history.every));
-        let layout = Layout::new(simulation, &order, outputs.count(), metadata);
+        let clock = &simulation.clock;
+        let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.history.every));
+        let layout = Layout::new(simulation, &order, outputs.count(clock), metadata);
         let fixed = layout.fixed();
         let contents = layout.contents(&fixed);
         let history = HistoryContents {
             columns: observer.columns(),
             csv: &files.history,
-            rows: rows.count(),
+            rows: rows.count(clock),
         };
         let file = match start {
             Start::New(creation) => {
@@ -125,8 +126,8 @@ impl<'a> Recorder<'a> {
     }
 
     /// Whether something is due after a step.
-    pub fn is_due(&self, number: u64) -> bool {
-        self.outputs.is_due(number) || self.rows.is_due(number)
+    pub fn is_due(&self, clock: &Clock) -> bool {
+        self.outputs.is_due(clock) || self.rows.is_due(clock)
     }
 
     /// Writes what is due after the present step, and shows `observer` the row of the history.
@@ -139,8 +140,8 @@ impl<'a> Recorder<'a> {
         simulation: &mut Simulation<'_, D>,
         observer: &mut dyn Observer,
     ) -> Result<()> {
-        let number = simulation.number;
-        let (output, row) = (self.outputs.is_due(number), self.rows.is_due(number));
+        let clock = &simulation.clock;
+        let (output, row) = (self.outputs.is_due(clock), self.rows.is_due(clock));
         self.write(simulation, output, row)?;
         if let (Some(values), true) = (&self.last_row, row) {
             let columns = self.observer.columns();
@@ -188,7 +189,7 @@ impl<'a> Recorder<'a> {
                 .collect();
             let data: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
             self.file
-                .write_step(simulation.time(), simulation.number, &data)?;
+                .write_step(simulation.clock.time(), simulation.clock.number(), &data)?;
         }
         self.spent += start.elapsed();
         Ok(())

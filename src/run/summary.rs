@@ -73,7 +73,7 @@ impl Summary {
             points: simulation.model.total,
             bonds: comm::total(simulation.comm, simulation.forces.directed_bonds()) / 2,
             steps,
-            step: simulation.step,
+            step: simulation.clock.step(),
             stable_step: simulation.stable_step,
             ranks: simulation.comm.size(),
             instructions: simulation.forces.instructions().name(),

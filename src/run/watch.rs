@@ -4,7 +4,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::comm::Communicator;
 use crate::deck::plan::CheckpointRule;
-use crate::solver::schedule::Schedule;
+use crate::solver::motion::Clock;
+use crate::solver::observers::Schedule;
 
 use super::signals::Signals;
 
@@ -48,17 +49,17 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// For a run of `steps`: length (s), number made, number of the last. `limit` is a wall-clock time
-    /// and when it began; without it that of the Slurm job counts.
+    /// For a run that has made `number` steps. `limit` is a wall-clock time and when it began; without
+    /// it that of the Slurm job counts.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
         limit: Option<(Instant, Duration)>,
-        (step, number, last): (f64, u64, u64),
+        number: u64,
     ) -> Self {
         let schedule = match rule {
             CheckpointRule::WallClock(_) => None,
-            CheckpointRule::Simulation(interval) => Some(Schedule::new(interval, step, last)),
+            CheckpointRule::Simulation(interval) => Some(Schedule(interval)),
         };
         let of_job = || Some((Instant::now(), left_to_slurm()?));
         Self {
@@ -76,17 +77,17 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether the ranks look together after this step.
-    pub fn is_due(&self, number: u64) -> bool {
-        number >= self.next_look || self.is_scheduled(number)
+    pub fn is_due(&self, clock: &Clock) -> bool {
+        clock.number() >= self.next_look || self.is_scheduled(clock)
     }
 
-    fn is_scheduled(&self, number: u64) -> bool {
-        self.schedule
-            .is_some_and(|schedule| schedule.is_due(number))
+    fn is_scheduled(&self, clock: &Clock) -> bool {
+        self.schedule.is_some_and(|schedule| schedule.is_due(clock))
     }
 
     /// What to do after this step: the same on all ranks. Collective.
-    pub fn look(&mut self, comm: &dyn Communicator, number: u64) -> Decision {
+    pub fn look(&mut self, comm: &dyn Communicator, clock: &Clock) -> Decision {
+        let number = clock.number();
         let (then, before) = self.last_look;
         let per_step = then.elapsed().as_secs_f64() / (number - before).max(1) as f64;
         let due = match self.rule {
@@ -111,7 +112,7 @@ impl<'a> Watch<'a> {
         self.next_look = number + steps.clamp(1, MOST_STEPS);
         self.last_look = (Instant::now(), number);
         Decision {
-            checkpoint: votes[2] > 0.0 || self.is_scheduled(number),
+            checkpoint: votes[2] > 0.0 || self.is_scheduled(clock),
             stop: match (votes[0] > 0.0, votes[1] > 0.0) {
                 (true, _) => Some(Reason::Signal),
                 (_, true) => Some(Reason::WallTime),

@@ -1,6 +1,6 @@
 //! From the plan to the law, the failure rule and the weights of every family.
 
-use crate::damage::{CriticalStretch, Criterion};
+use crate::damage::{Criterion, CriticalStretch};
 use crate::deck::plan::{
     Body, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Toughness, VolumeCorrection,
 };

@@ -120,8 +120,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
             times: Times::default(),
             bad: None,
         };
-        simulation.conditions.place(&mut simulation.fields, 0.0, 0.0);
-        simulation.conditions.load(&mut simulation.fields, 0.0, true);
+        simulation
+            .conditions
+            .place(&mut simulation.fields, 0.0, 0.0);
+        simulation
+            .conditions
+            .load(&mut simulation.fields, 0.0, true);
         simulation.evaluate(Evolution::Step);
         simulation.guide();
         simulation.fields.add_damped_energy(&simulation.model, 0.0);
@@ -175,7 +179,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
     fn guide(&mut self) -> bool {
         let (time, step) = (self.clock.time(), self.clock.step());
-        self.conditions.guide(&self.model, &mut self.fields, time, step)
+        self.conditions
+            .guide(&self.model, &mut self.fields, time, step)
     }
 
     /// Finds from the state, after it has been put back, what is not part of it. Collective.

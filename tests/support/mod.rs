@@ -65,7 +65,7 @@ pub fn displace<const D: usize>(
     for point in 0..simulation.model.volume.len() {
         let place = map(simulation.model.position(point));
         for d in 0..D {
-            simulation.state.displacement[d][point] =
+            simulation.fields.displacement[d][point] =
                 place[d] - simulation.model.reference[d][point];
         }
     }
@@ -73,8 +73,8 @@ pub fn displace<const D: usize>(
     simulation.forces.evaluate(
         simulation.comm,
         &simulation.model,
-        &mut simulation.state.displacement,
-        &mut simulation.state.responses,
+        &mut simulation.fields.displacement,
+        &mut simulation.fields.responses,
         &mut times,
     );
 }

@@ -1,6 +1,6 @@
 //! The bonds between two blocks with the laws that they follow.
 
-use crate::damage::{CriticalStretch, Criterion};
+use crate::damage::{Criterion, CriticalStretch};
 use crate::families::BlockBonds;
 use crate::material::{AnyLaw, PairLaw};
 

@@ -186,7 +186,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             inverse_square: inverse * inverse,
         };
         // SAFETY: as above.
-        let (numbers, threshold) = unsafe { (self.numbers(neighbours), self.thresholds(neighbours)) };
+        let (numbers, threshold) =
+            unsafe { (self.numbers(neighbours), self.thresholds(neighbours)) };
         let memory = row.groups.numbers(group);
         Group {
             bond: deform::<A, D>(&reference, eta, K::LINEAR),

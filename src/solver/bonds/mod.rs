@@ -167,7 +167,14 @@ impl<const D: usize> Forces<D> {
                 .into_iter()
                 .map(|grid| GridValues::new(grid, numbers.read, with_thresholds))
                 .collect(),
-            thresholds: vec![0.0; if with_thresholds { model.volume.len() } else { 0 }],
+            thresholds: vec![
+                0.0;
+                if with_thresholds {
+                    model.volume.len()
+                } else {
+                    0
+                }
+            ],
             interactions,
             blocks,
             numbers,
@@ -289,7 +296,8 @@ impl<const D: usize> Forces<D> {
 
     /// Takes note of the bonds, for [`Self::undo`].
     pub fn keep(&self, kept: &mut KeptBonds) {
-        kept.0.resize_with(self.interactions.len(), Default::default);
+        kept.0
+            .resize_with(self.interactions.len(), Default::default);
         for (interaction, kept) in self.interactions.iter().zip(&mut kept.0) {
             interaction.bonds.store().keep(kept);
         }
@@ -332,7 +340,9 @@ impl<const D: usize> Forces<D> {
         let start = Instant::now();
         let mut in_bonds = Duration::ZERO;
         for component in force.iter_mut() {
-            component.par_chunks_mut(CHUNK).for_each(|part| part.fill(0.0));
+            component
+                .par_chunks_mut(CHUNK)
+                .for_each(|part| part.fill(0.0));
         }
         for turn in 0..self.stages.len() {
             let stage = self.stages[turn];
@@ -389,7 +399,10 @@ impl<const D: usize> Forces<D> {
 
     /// What a stage reads anew from other ranks.
     fn news(&self, turn: usize) -> News {
-        match (turn.checked_sub(1).map(|before| self.stages[before]), self.stages[turn]) {
+        match (
+            turn.checked_sub(1).map(|before| self.stages[before]),
+            self.stages[turn],
+        ) {
             (None, _) => News::Displacement,
             (Some(Stage::SmallestStretch), _) => News::Thresholds,
             (Some(Stage::PointSum(_)), Stage::Force) => News::Numbers,
@@ -398,13 +411,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Shows the bonds what is new of some of the points.
-    fn update(
-        &mut self,
-        news: News,
-        which: Which,
-        model: &Model<D>,
-        displacement: &[Vec<f64>; D],
-    ) {
+    fn update(&mut self, news: News, which: Which, model: &Model<D>, displacement: &[Vec<f64>; D]) {
         for grid in &mut self.grids {
             match news {
                 News::Displacement => grid.update_displacement(which, displacement),
@@ -547,14 +554,23 @@ impl<const D: usize> Forces<D> {
             energy,
             volume,
             neighbours,
-            dissipated: if self.remembers { dissipated } else { Vec::new() },
+            dissipated: if self.remembers {
+                dissipated
+            } else {
+                Vec::new()
+            },
         }
     }
 
     /// Volume of the intact neighbours of each owned point, m³.
     pub fn family_volume(&mut self, model: &Model<D>) -> Vec<f64> {
         let mut columns = self.measure(model.owned(), 1, |interaction, sums, source| {
-            sweep_all(&mut interaction.bonds, sums, &measures::FamilyVolume, source);
+            sweep_all(
+                &mut interaction.bonds,
+                sums,
+                &measures::FamilyVolume,
+                source,
+            );
         });
         columns.remove(0)
     }
@@ -622,7 +638,10 @@ fn sum_stage<L: Law<D>, const D: usize>(
     }
     let half = sums.len() / 2;
     let (left, lost) = sums.split_at_mut(half);
-    let results = ((L::Sum::columns_mut(left), L::Sum::columns_mut(lost)), [freed]);
+    let results = (
+        (L::Sum::columns_mut(left), L::Sum::columns_mut(lost)),
+        [freed],
+    );
     // No law has more stages, and no loop is compiled for those that a law does not have.
     match number {
         0 if const { L::STAGES > 0 } => {

@@ -115,7 +115,11 @@ impl PointNumbers {
                         - energy_at::<D>(&law, stage, &left, numbers);
                 }
                 Law::<D>::point(&law, stage, &left[..counts.sum], &mut numbers);
-                for (column, number) in columns.iter_mut().zip(numbers).take(counts.point + counts.own) {
+                for (column, number) in columns
+                    .iter_mut()
+                    .zip(numbers)
+                    .take(counts.point + counts.own)
+                {
                     column[k] = number;
                 }
                 columns[COLUMNS - 1][k] += model.volume[point] * change;

@@ -176,12 +176,7 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Sums the force of the supports on a set's points by component, N. `members` is sorted.
-    pub fn reaction(
-        &self,
-        model: &Model<D>,
-        fields: &Fields<D>,
-        members: &[u32],
-    ) -> [ExactSum; D] {
+    pub fn reaction(&self, model: &Model<D>, fields: &Fields<D>, members: &[u32]) -> [ExactSum; D] {
         let mut sums = [const { ExactSum::ZERO }; D];
         let Some(reaction) = &fields.reaction else {
             return sums;

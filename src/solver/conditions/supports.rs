@@ -57,7 +57,8 @@ impl Support {
         let mut each = kept.iter();
         self.points.retain(|_| *each.next().expect("one a point"));
         let mut each = kept.iter();
-        self.positions.retain(|_| *each.next().expect("one a point"));
+        self.positions
+            .retain(|_| *each.next().expect("one a point"));
         self.before.truncate(self.points.len());
         self.moved_from.truncate(self.points.len());
     }

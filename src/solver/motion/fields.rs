@@ -249,8 +249,9 @@ impl<const D: usize> Fields<D> {
 
     /// The columns of a field, if decks may ask for it and it is one of the points'.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
-        self.each()
-            .find_map(|(description, columns)| (description.output == Some(field)).then_some(columns))
+        self.each().find_map(|(description, columns)| {
+            (description.output == Some(field)).then_some(columns)
+        })
     }
 }
 

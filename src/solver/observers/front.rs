@@ -3,9 +3,9 @@
 use crate::deck::plan;
 use crate::error::Result;
 
-use crate::solver::Simulation;
 use super::reach::Course;
 use super::snapshot::Snapshot;
+use crate::solver::Simulation;
 
 /// A front that is followed.
 pub struct Front {

@@ -3,9 +3,9 @@
 use crate::deck::plan;
 use crate::error::Result;
 
+use super::reach::{Course, Reached};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
-use super::reach::{Course, Reached};
 
 /// A crack tip that is followed.
 pub struct Tip {
