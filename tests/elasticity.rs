@@ -386,7 +386,7 @@ fn phase_speed<const D: usize>(deck: &str, wave_number: f64, density: f64) -> f6
         displace(&mut simulation, |[x, y, z]| {
             [x + amplitude * (wave_number * x).cos(), y, z]
         });
-        let force = simulation.fields.responses[centre(&simulation)].force[0];
+        let force = simulation.fields.internal_force[0][centre(&simulation)];
         (-force / (density * amplitude)).sqrt() / wave_number
     })
 }

@@ -73,7 +73,7 @@ fn cost<const D: usize>(dimension: &str, ratio: u32, law: &str, growth: f64) -> 
             (0..D).all(|k| k == axis || place[k].abs() < 1e-9)
         };
         let line = (0..model.owned()).filter(on_line);
-        let set_free = line.map(|point| simulation.fields.responses[point].set_free);
+        let set_free = line.map(|point| simulation.fields.freed_energy[point]);
         set_free.sum::<f64>() / FRACTURE_ENERGY
     })
 }

@@ -31,7 +31,7 @@ fn each_pair_has_its_rule() {
         simulate::<1, _>(&text(interface), |mut simulation| {
             // The middle stays; both bonds have the stretch 0.1.
             displace(&mut simulation, |[x, ..]| [1.5 + 1.1 * (x - 1.5), 0.0, 0.0]);
-            [0, 2].map(|point| simulation.fields.responses[point].force[0].abs() / 0.1)
+            [0, 2].map(|point| simulation.fields.internal_force[0][point].abs() / 0.1)
         })
     };
     let own =
@@ -132,7 +132,7 @@ fn momentum_is_kept_by_every_rule() {
             });
             assert!(largest_force(&simulation) > 0.0);
             for d in 0..2 {
-                let forces = simulation.fields.responses.iter().map(|r| r.force[d]);
+                let forces = simulation.fields.internal_force[d].iter();
                 let products: Vec<f64> = forces
                     .zip(&simulation.model.volume)
                     .map(|(force, volume)| force * volume)

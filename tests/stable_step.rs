@@ -2,6 +2,7 @@
 
 use crate::support::simulate;
 use fissure::solver::Simulation;
+use fissure::solver::bonds::Evolution;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -80,23 +81,15 @@ fn largest_frequency<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
         .collect();
     let mut matrix = DMatrix::zeros(D * points, D * points);
     for column in 0..D * points {
-        let mut forces = [SHIFT, -SHIFT].map(|shift| {
-            let state = &mut simulation.state;
-            state.displacement[column % D][column / D] = shift;
-            simulation.forces.evaluate(
-                simulation.comm,
-                &simulation.model,
-                &mut state.displacement,
-                &mut state.responses,
-                &mut Default::default(),
-            );
-            state.displacement[column % D][column / D] = 0.0;
-            state.responses.clone()
+        let [plus, minus] = [SHIFT, -SHIFT].map(|shift| {
+            simulation.fields.displacement[column % D][column / D] = shift;
+            simulation.evaluate(Evolution::None);
+            simulation.fields.displacement[column % D][column / D] = 0.0;
+            simulation.fields.internal_force.clone()
         });
-        let [plus, minus] = &mut forces;
         for row in 0..D * points {
             let (point, component) = (row / D, row % D);
-            let difference = plus[point].force[component] - minus[point].force[component];
+            let difference = plus[component][point] - minus[component][point];
             let stiffness = -simulation.model.volume[point] * difference / (2.0 * SHIFT);
             matrix[(row, column)] = stiffness / (mass[point] * mass[column / D]).sqrt();
         }

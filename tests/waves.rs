@@ -38,13 +38,13 @@ impl Plane {
     }
 
     fn follow(&self, simulation: &mut Simulation<3>) {
-        let state = &mut simulation.state;
+        let fields = &mut simulation.fields;
         for (point, leader) in self.leader.iter().copied().enumerate() {
             for d in 0..3 {
-                state.displacement[d][point] = state.displacement[d][leader];
-                state.velocity[d][point] = state.velocity[d][leader];
+                fields.displacement[d][point] = fields.displacement[d][leader];
+                fields.velocity[d][point] = fields.velocity[d][leader];
+                fields.internal_force[d][point] = fields.internal_force[d][leader];
             }
-            state.responses[point] = state.responses[leader];
         }
     }
 

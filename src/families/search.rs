@@ -227,7 +227,7 @@ mod tests {
                         let ids: Vec<u64> = row
                             .neighbours
                             .iter()
-                            .zip(row.intact.iter())
+                            .zip(row.groups.intact.iter())
                             .flat_map(|(group, bits)| {
                                 (0..WIDTH).filter(move |k| bits >> k & 1 == 1).map(|k| group[k])
                             })

@@ -121,9 +121,9 @@ mod tests {
                 // The halo must bring each ghost its own id.
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);
-                domain.halo.pack(&[&ids]);
+                domain.halo.pack([&ids[..]].into_iter());
                 domain.halo.exchange(comm, &mut || {});
-                domain.halo.unpack(&mut [&mut ids]);
+                domain.halo.unpack([&mut ids[..]].into_iter());
                 (domain, ids)
             });
             let mut owned: Vec<u64> = Vec::new();

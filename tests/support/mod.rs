@@ -10,6 +10,7 @@ use std::path::Path;
 use fissure::comm::{Communicator, threads};
 use fissure::deck::{self, Plan, Source};
 use fissure::solver::Simulation;
+use fissure::solver::bonds::Evolution;
 
 /// A validated deck from its text.
 pub fn plan(text: &str) -> Plan {
@@ -69,22 +70,23 @@ pub fn displace<const D: usize>(
                 place[d] - simulation.model.reference[d][point];
         }
     }
-    let mut times = Default::default();
-    simulation.forces.evaluate(
-        simulation.comm,
-        &simulation.model,
-        &mut simulation.fields.displacement,
-        &mut simulation.fields.responses,
-        &mut times,
-    );
+    simulation.evaluate(Evolution::Step);
+}
+
+/// The internal force density of an owned point, N/m³.
+pub fn force<const D: usize>(simulation: &Simulation<D>, point: usize) -> [f64; D] {
+    let force = &simulation.fields.internal_force;
+    force.each_ref().map(|component| component[point])
+}
+
+/// The internal force densities of all owned points, N/m³.
+pub fn forces<const D: usize>(simulation: &Simulation<D>) -> Vec<[f64; D]> {
+    let points = 0..simulation.model.owned();
+    points.map(|point| force(simulation, point)).collect()
 }
 
 /// The largest force density of any point, N/m³.
 pub fn largest_force<const D: usize>(simulation: &Simulation<D>) -> f64 {
-    let components = simulation
-        .state
-        .responses
-        .iter()
-        .flat_map(|response| response.force);
+    let components = forces(simulation).into_iter().flatten();
     components.fold(0.0, |largest, force| force.abs().max(largest))
 }
