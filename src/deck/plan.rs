@@ -301,8 +301,13 @@ pub enum Selector {
     Where(Expression),
     /// Those within a region.
     Within(Shape),
-    /// Those with these global ids, sorted.
-    Ids(Vec<u64>),
+    /// Those with these global ids.
+    Ids {
+        /// Sorted.
+        ids: Vec<u64>,
+        /// Where the largest one stands in the deck.
+        largest: Range<usize>,
+    },
 }
 
 /// A surface that cuts bonds; lengths in m.

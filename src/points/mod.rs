@@ -12,7 +12,7 @@ pub mod shape;
 use bytemuck::{Pod, Zeroable};
 
 use crate::comm::{Communicator, agree};
-use crate::deck::plan::{Plan, PointSource};
+use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::error::{Error, Result};
 
 /// A point as it travels between ranks.
@@ -53,8 +53,8 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// This rank's piece of the points: a contiguous range of ids, and the total over all ranks.
 ///
 /// # Errors
-/// A body without points, an unreadable or wrong point file, more points than a rank can number;
-/// the same on all ranks.
+/// A body without points, an unreadable or wrong point file, a set with an id that no point has, more
+/// points than a rank can number; the same on all ranks.
 pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
@@ -80,6 +80,7 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
         total += all;
     }
     no_empty_body(plan, comm, &points)?;
+    ids_are_those_of_points(plan, total)?;
     let fits = if points.len() < u32::MAX as usize / 2 {
         Ok(())
     } else {
@@ -89,6 +90,22 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
     };
     agree(comm, fits)?;
     Ok((points, total))
+}
+
+fn ids_are_those_of_points(plan: &Plan, total: u64) -> Result<()> {
+    for set in &plan.sets {
+        if let Selector::Ids { ids, largest } = &set.selector
+            && let Some(id) = ids.last().filter(|id| **id >= total)
+        {
+            let message = format!(
+                "[set.{}] ids: no point has the id {id}; those of the {total} points are 0 to {}",
+                set.name,
+                total - 1
+            );
+            return Err(plan.source.error(largest.clone(), message));
+        }
+    }
+    Ok(())
 }
 
 fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
