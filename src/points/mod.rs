@@ -5,15 +5,21 @@
 pub mod bins;
 pub mod crack;
 mod file;
-mod lattice;
+pub mod lattice;
+mod region;
 pub mod set;
 pub mod shape;
+
+pub use lattice::LatticeBody;
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::comm::{Communicator, agree};
 use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::error::{Error, Result};
+
+/// The most points of a rank.
+pub const MOST_A_RANK: f64 = 2_147_483_647.0;
 
 /// A point as it travels between ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -81,7 +87,7 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
     }
     no_empty_body(plan, comm, &points)?;
     ids_are_those_of_points(plan, total)?;
-    let fits = if points.len() < u32::MAX as usize / 2 {
+    let fits = if (points.len() as f64) < MOST_A_RANK {
         Ok(())
     } else {
         Err(Error::run(

@@ -21,6 +21,7 @@ mod places;
 mod saved;
 pub mod schedule;
 pub mod simulation;
+pub mod size;
 pub mod stable_step;
 pub mod state;
 mod sweep;

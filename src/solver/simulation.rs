@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
 use crate::deck::plan::{Plan, StepRule};
+use crate::deck::shown;
 use crate::error::{Error, Result};
 use crate::partition::distribute;
 use crate::{families, points};
@@ -14,6 +15,7 @@ use super::damping::Damping;
 use super::forces::{ForceTimes, Forces};
 use super::grids::grids;
 use super::model::Model;
+use super::size;
 use super::stable_step::stable_step;
 use super::state::State;
 use super::verlet;
@@ -80,15 +82,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// same on all ranks.
     pub fn new(plan: &'a Plan, comm: &'a dyn Communicator) -> Result<Self> {
         let start = Instant::now();
-        let (pieces, total) = points::generate(plan, comm)?;
         let cutoffs = cutoffs(plan);
+        size::is_feasible(plan, &cutoffs, comm.size())?;
+        let (pieces, total) = points::generate(plan, comm)?;
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // Bonds at the limit must find their ghosts however their length is rounded.
         let mut domain = distribute(comm, pieces, total, longest * (1.0 + SLACK))?;
         let frames = grids(plan, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
         let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
-        let found = families::find(&domain, &frames, bodies, &cutoffs, dimension);
+        let found = families::find(&domain, &frames, bodies, &cutoffs, dimension)
+            .map_err(|fault| fault.error(plan));
         let (families, grids) = agree(comm, found)?;
         let model = Model::new(plan, &domain);
         let bodies = plan.bodies.iter();
@@ -243,9 +247,10 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
     let (step, last) = match plan.time.step {
         StepRule::Fixed(step) => (step, steps_to(plan.time.end, step)),
         StepRule::Automatic(_) if stable.is_infinite() => {
-            return Err(Error::input(
-                "no point has a neighbour, so there is no stable step; is the horizon in m and \
-                 larger than the distance of the points?",
+            return Err(plan.source.error(
+                plan.places.horizon.clone(),
+                "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
+                 in m and larger than the distance of the points?",
             ));
         }
         StepRule::Automatic(safety) => {
@@ -254,10 +259,11 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
         }
     };
     if last > 1e15 {
-        return Err(Error::input(format!(
+        let message = format!(
             "[time] end: {} s take {last:.1e} steps of {step:.1e} s",
-            plan.time.end
-        )));
+            shown(plan.time.end)
+        );
+        return Err(plan.source.error(plan.places.step.clone(), message));
     }
     Ok((step, last.max(1.0) as u64))
 }
