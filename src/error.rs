@@ -23,6 +23,25 @@ pub struct Error {
 /// The result of anything that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Most characters of a user's text that a message repeats.
+const EXCERPT: usize = 40;
+
+/// A user's text for a message: in backticks, without control characters, and not too long.
+pub fn excerpt(text: &str) -> String {
+    let escape = |c: char| {
+        if c.is_control() {
+            c.escape_default().to_string()
+        } else {
+            c.to_string()
+        }
+    };
+    let mut shown: String = text.chars().take(EXCERPT).map(escape).collect();
+    if text.chars().nth(EXCERPT).is_some() {
+        shown.push('…');
+    }
+    format!("`{shown}`")
+}
+
 impl Error {
     /// A wrong deck or wrong arguments.
     pub fn input(message: impl Into<String>) -> Self {
@@ -56,3 +75,15 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::excerpt;
+
+    #[test]
+    fn an_excerpt_is_short_and_on_one_line() {
+        assert_eq!(excerpt("half"), "`half`");
+        assert_eq!(excerpt("a\nb\0é"), "`a\\nb\\u{0}é`");
+        assert_eq!(excerpt(&"µ".repeat(41)), format!("`{}…`", "µ".repeat(40)));
+    }
+}

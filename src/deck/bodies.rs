@@ -58,9 +58,15 @@ pub fn bodies(
                 Ok(damages[index].clone())
             })
             .transpose()?;
-        let horizon = match &body.horizon {
-            None => scope.number(&deck.grid.get_ref().horizon, "[grid] horizon")?,
-            Some(number) => scope.positive(number, &format!("{key} horizon"))?,
+        let (horizon, horizon_place) = match &body.horizon {
+            None => {
+                let number = &deck.grid.get_ref().horizon;
+                (scope.length(number, "[grid] horizon")?, number.span())
+            }
+            Some(number) => {
+                let key = format!("{key} horizon");
+                (scope.length(number, &key)?, number.span())
+            }
         };
         let unbreakable = matches!(
             materials[material].law,
@@ -81,6 +87,7 @@ pub fn bodies(
             material: materials[material].clone(),
             damage,
             horizon,
+            horizon_place,
         })
     })
     .and_then(|bodies| rows_are_taken_once(scope, bodies.into_values().collect()))

@@ -446,7 +446,7 @@ pub struct Set {
     pub shape: Option<Spanned<Shape>>,
     /// The points' global ids, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub ids: Option<Spanned<Vec<u64>>>,
+    pub ids: Option<Spanned<Vec<Spanned<u64>>>>,
 }
 
 /// A surface that cuts bonds.

@@ -24,6 +24,7 @@ mod validate;
 use std::path::Path;
 
 pub use difference::differences;
+pub use number::shown;
 pub use plan::Plan;
 pub use source::Source;
 

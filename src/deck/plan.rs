@@ -18,6 +18,8 @@ pub struct Plan {
     pub source: Source,
     /// One line.
     pub title: String,
+    /// Where some of the values stand in the deck.
+    pub places: Places,
     /// The setting.
     pub dimension: Dimension,
     /// Horizon δ of the grid, m; bodies may have their own.
@@ -50,6 +52,17 @@ pub struct Plan {
     pub checkpoint: CheckpointRule,
 }
 
+/// Where values stand in the deck whose mistakes only the points show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Places {
+    /// The horizon of the grid.
+    pub horizon: Range<usize>,
+    /// The end time.
+    pub end: Range<usize>,
+    /// The time step; the end time if the step is automatic.
+    pub step: Range<usize>,
+}
+
 /// A body, which is a block with its own material and damage.
 #[derive(Debug, Clone)]
 pub struct Body {
@@ -65,6 +78,8 @@ pub struct Body {
     pub damage: Option<CriticalStretch>,
     /// Horizon δ, m.
     pub horizon: f64,
+    /// Where its horizon stands in the deck: its own or that of the grid.
+    pub horizon_place: Range<usize>,
     /// Where its points come from.
     pub points: PointSource,
 }
@@ -148,6 +163,16 @@ pub enum Quadrature {
     Midpoint,
     /// Two by direction, at ±√3/3 of half the edge.
     Gauss,
+}
+
+impl Quadrature {
+    /// Number of points of a cell of so many dimensions.
+    pub fn points(self, dimension: usize) -> u32 {
+        match self {
+            Self::Midpoint => 1,
+            Self::Gauss => 1 << dimension,
+        }
+    }
 }
 
 /// How bonds are kept.
@@ -301,8 +326,13 @@ pub enum Selector {
     Where(Expression),
     /// Those within a region.
     Within(Shape),
-    /// Those with these global ids, sorted.
-    Ids(Vec<u64>),
+    /// Those with these global ids.
+    Ids {
+        /// Sorted.
+        ids: Vec<u64>,
+        /// Where the largest one stands in the deck.
+        largest: Range<usize>,
+    },
 }
 
 /// A surface that cuts bonds; lengths in m.

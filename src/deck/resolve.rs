@@ -1,6 +1,6 @@
 //! Numbers, vectors and expressions of a deck, evaluated against its parameters.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use indexmap::IndexMap;
 use serde_spanned::Spanned;
@@ -11,6 +11,9 @@ use super::number::{Number, Vector, Written, shown};
 use super::parameters;
 use super::source::{Source, suggestion};
 use crate::error::{Error, Result};
+
+/// Lengths from those far below atoms to those far above galaxies, m.
+const LENGTHS: RangeInclusive<f64> = 1e-30..=1e30;
 
 /// The deck's text, its parameters and its dimension: what values are resolved against.
 pub struct Scope<'a> {
@@ -55,6 +58,21 @@ impl<'a> Scope<'a> {
     /// A number above 0.
     pub fn positive(&self, number: &Number, key: &str) -> Result<f64> {
         self.within(number, key, f64::MIN_POSITIVE..f64::INFINITY, "above 0")
+    }
+
+    /// A length in m of which squares and volumes can be taken.
+    pub fn length(&self, number: &Number, key: &str) -> Result<f64> {
+        let length = self.positive(number, key)?;
+        if LENGTHS.contains(&length) {
+            return Ok(length);
+        }
+        let message = format!(
+            "{key}: must be between {:e} and {:e} m, is {}",
+            LENGTHS.start(),
+            LENGTHS.end(),
+            shown(length)
+        );
+        Err(self.error(number.span(), message))
     }
 
     /// A number within a range, which `words` describes.

@@ -62,13 +62,15 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
     } else if let Some(shape) = &set.shape {
         shapes::shape(scope, &format!("{key} shape"), shape).map(plan::Selector::Within)
     } else {
-        let mut ids = set
-            .ids
-            .as_ref()
-            .map_or(Vec::new(), |ids| ids.get_ref().clone());
+        let given = set.ids.as_ref().map_or(&[][..], |ids| ids.get_ref());
+        let mut ids: Vec<u64> = given.iter().map(|id| *id.get_ref()).collect();
         ids.sort_unstable();
         ids.dedup();
-        Ok(plan::Selector::Ids(ids))
+        let largest = given.iter().max_by_key(|id| *id.get_ref());
+        Ok(plan::Selector::Ids {
+            ids,
+            largest: largest.map_or(table.span(), Spanned::span),
+        })
     }
 }
 

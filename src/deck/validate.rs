@@ -18,7 +18,7 @@ use crate::error::Result;
 pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let scope = Scope::of(source, deck)?;
     let dimension = dimension(&scope, deck)?;
-    let horizon = scope.positive(&deck.grid.get_ref().horizon, "[grid] horizon")?;
+    let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;
     let spacing = match &deck.grid.get_ref().spacing {
         None => None,
         Some(edges) => Some(spacing(&scope, edges, "[grid] spacing", horizon)?),
@@ -41,6 +41,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     Ok(Plan {
         source: source.clone(),
         title: deck.title.clone(),
+        places: places(deck),
         dimension,
         horizon,
         volume_correction,
@@ -60,6 +61,15 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         sets,
         time,
     })
+}
+
+fn places(deck: &Deck) -> plan::Places {
+    let time = deck.time.get_ref();
+    plan::Places {
+        horizon: deck.grid.get_ref().horizon.span(),
+        end: time.end.span(),
+        step: time.step.as_ref().unwrap_or(&time.end).span(),
+    }
 }
 
 fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
@@ -100,7 +110,7 @@ pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -
     let written = Spanned::new(edges.span(), written);
     let mut spacing = [1.0; 3];
     for (edge, number) in spacing.iter_mut().zip(scope.entries(&written, key)?) {
-        *edge = scope.positive(number, key)?;
+        *edge = scope.length(number, key)?;
         if *edge > horizon {
             let message = format!(
                 "{key}: {} m is larger than the horizon {} m, so no point would have a neighbour; \

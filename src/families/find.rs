@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::error::Result;
 use crate::partition::Domain;
 
+use super::fault::{Fault, MOST_NEIGHBOURS};
+use super::offset::most_neighbours;
 use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
 /// The families of a domain that has been [arranged](super::arrange) for these grids, for blocks
@@ -12,23 +13,40 @@ use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 /// each pair of blocks, row by row, and is symmetric.
 ///
 /// # Errors
-/// When two points lie at the same place.
+/// When two points lie at the same place, or one would have too many neighbours.
 pub fn find(
     domain: &Domain,
     frames: &[GridFrame],
     blocks: usize,
     cutoffs: &[f64],
     dimension: usize,
-) -> Result<(Vec<BlockBonds>, Vec<Arc<Grid>>)> {
+) -> Result<(Vec<BlockBonds>, Vec<Arc<Grid>>), Fault> {
     let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-    let layout = |frame: &GridFrame| Grid::new(frame.clone(), domain, longest).map(Arc::new);
-    let grids = frames.iter().map(layout).collect::<Result<Vec<_>>>()?;
     let shared = |pair: usize| {
         let [here, there] = [pair / blocks, pair % blocks];
         frames
             .iter()
             .position(|frame| frame.blocks[here] && frame.blocks[there])
     };
+    for (pair, cutoff) in cutoffs.iter().enumerate() {
+        let Some(frame) = shared(pair).map(|index| &frames[index]) else {
+            continue;
+        };
+        let cells = std::array::from_fn(|k| domain.extent[k] / frame.spacing[k] + 1.0);
+        let neighbours = most_neighbours(frame.spacing, *cutoff, cells, dimension);
+        if neighbours.min(domain.total as f64) > MOST_NEIGHBOURS {
+            return Err(Fault::TooManyNeighbours {
+                blocks: [pair / blocks, pair % blocks],
+                neighbours: Some(neighbours),
+                spacings: Some(cutoff / frame.spacing[0]),
+            });
+        }
+    }
+    let layout = |frame: &GridFrame| Grid::new(frame.clone(), domain, longest).map(Arc::new);
+    let grids = frames
+        .iter()
+        .map(layout)
+        .collect::<Result<Vec<_>, Fault>>()?;
     // No two points are as close as that, but those at the same place are found all the same.
     let listed: Vec<f64> = cutoffs
         .iter()
@@ -55,4 +73,45 @@ pub fn find(
     }
     families.sort_by_key(BlockBonds::blocks);
     Ok((families, grids))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::partition::distribute;
+    use crate::points::Point;
+
+    fn cube(edge: u64) -> (Domain, GridFrame) {
+        let place = |k: u64| [k % edge, k / edge % edge, k / edge / edge].map(|x| 1e-3 * x as f64);
+        let points = (0..edge.pow(3)).map(|k| Point::new(k, place(k), 1e-9, 0));
+        let domain = distribute(&threads::alone(), points.collect(), edge.pow(3), 3.0).unwrap();
+        let frame = GridFrame {
+            origin: [0.0; 3],
+            spacing: [1e-3; 3],
+            blocks: vec![true],
+        };
+        (domain, frame)
+    }
+
+    #[test]
+    fn a_horizon_far_beyond_a_body_bonds_all_its_points() {
+        let (domain, frame) = cube(3);
+        for cutoff in [3.0, 1e30] {
+            let (families, _) = find(&domain, &[frame.clone()], 1, &[cutoff], 3).unwrap();
+            let bonds: u64 = families.iter().map(BlockBonds::bonds).sum();
+            assert_eq!(bonds, 27 * 26);
+            assert!(families[0].bytes() < 10_000, "{}", families[0].bytes());
+        }
+    }
+
+    #[test]
+    fn a_horizon_that_holds_too_many_points_is_an_error() {
+        let (domain, frame) = cube(28);
+        let fault = find(&domain, &[frame], 1, &[3.0], 3).unwrap_err();
+        let Fault::TooManyNeighbours { neighbours, .. } = fault else {
+            panic!("{fault:?}");
+        };
+        assert!((neighbours.unwrap() / 28_f64.powi(3) - 1.0).abs() < 1e-9);
+    }
 }

@@ -10,11 +10,11 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
 use crate::lanes::WIDTH;
 use crate::partition::Domain;
 
-use super::search::at_one_place;
+use super::fault::Fault;
+use super::offset::steps;
 
 /// A block number for holes.
 pub(super) const HOLE: u16 = u16::MAX;
@@ -84,7 +84,7 @@ impl Grid {
     ///
     /// # Errors
     /// When two points lie at the same place, or there are too many holes between them.
-    pub fn new(frame: GridFrame, domain: &Domain, longest: f64) -> Result<Self> {
+    pub fn new(frame: GridFrame, domain: &Domain, longest: f64) -> Result<Self, Fault> {
         let cells: Vec<([i64; 3], u32)> = domain
             .points
             .iter()
@@ -95,14 +95,14 @@ impl Grid {
                 ([z, y, x], index)
             })
             .collect();
-        let reach = (longest / frame.spacing[0]) as i64 + 1;
+        let reach = steps(longest, frame.spacing[0], domain.extent[0]) + 1;
         let starts = bands(&cells, reach);
         let band = |x: i64| starts.partition_point(|start| *start <= x) as i64;
         let mut cells = cells;
         cells.par_sort_unstable_by_key(|([z, y, x], _)| [band(*x), *z, *y, *x]);
         if let Some(pair) = cells.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            let [a, b] = [pair[0].1, pair[1].1].map(|index| &domain.points[index as usize]);
-            return Err(at_one_place(a, b));
+            let points = [pair[0].1, pair[1].1].map(|index| domain.points[index as usize]);
+            return Err(Fault::SamePlace(points));
         }
         let line_of = |([z, y, x], _): &([i64; 3], u32)| [band(*x), *y, *z];
         let mut lines: Vec<Line> = Vec::new();
@@ -136,10 +136,7 @@ impl Grid {
         });
         let places = front as usize + total + back as usize;
         if places > i32::MAX as usize {
-            return Err(Error::run(
-                "a rank's part of a grid has too many holes for a lattice (2³¹ places at most); \
-                 use more ranks or `family = \"list\"`",
-            ));
+            return Err(Fault::TooManyHoles);
         }
         let (mut points, mut blocks) = (vec![0; places], vec![HOLE; places]);
         let chunks = cells.chunk_by(|a, b| line_of(a) == line_of(b));

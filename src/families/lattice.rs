@@ -57,7 +57,7 @@ impl BondLattice {
         cutoff: f64,
         dimension: usize,
     ) -> Self {
-        let (offsets, around) = offsets(grid.frame.spacing, cutoff, dimension);
+        let (offsets, around) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
         let mut shifts = vec![0; grid.lines.len() * around.len()];
         // A body whose points are farther apart than its bonds reach has none.
         let none = offsets.is_empty();

@@ -5,6 +5,7 @@
 //! global id, a lattice by offset.
 
 mod arrange;
+mod fault;
 mod find;
 mod grid;
 mod lattice;
@@ -16,11 +17,12 @@ mod vectors;
 mod volume;
 
 pub use arrange::arrange;
+pub use fault::{Fault, MOST_NEIGHBOURS};
 pub use find::find;
 pub use grid::{Grid, GridFrame, Which};
 pub use lattice::BondLattice;
 pub use list::{BondList, Row, Rows};
-pub use offset::Offset;
+pub use offset::{Offset, most_neighbours};
 pub use search::cutoff;
 use search::search;
 pub use store::{Groups, Store};

@@ -23,15 +23,36 @@ pub struct Offset {
     pub(super) line: u32,
 }
 
-/// The offsets up to a length (m) by z, y and x, and the lines that they lead to.
+/// How many steps of a spacing (m) a bond up to a length (m) can make among points that are at most
+/// `extent` (m) apart.
+pub(super) fn steps(cutoff: f64, spacing: f64, extent: f64) -> i64 {
+    let most = (extent / spacing).ceil();
+    (cutoff / spacing).floor().min(most) as i64
+}
+
+/// The most neighbours that a point can have up to a length (m) on a lattice with so many cells by
+/// direction, about.
+pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimension: usize) -> f64 {
+    use std::f64::consts::PI;
+    let reach = |k: usize| cutoff / spacing[k];
+    let directions = 0..dimension;
+    let ball = [2.0, PI, 4.0 / 3.0 * PI][dimension - 1];
+    let within = ball * directions.clone().map(reach).product::<f64>();
+    let widths = directions.map(|k| (2.0 * reach(k) + 1.0).min(cells[k]));
+    within.min(widths.product())
+}
+
+/// The offsets up to a length (m) by z, y and x among points that are at most `extent` (m) apart by
+/// direction, and the lines that they lead to.
 pub(super) fn offsets(
     spacing: [f64; 3],
     cutoff: f64,
+    extent: [f64; 3],
     dimension: usize,
 ) -> (Vec<Offset>, Vec<[i64; 2]>) {
     let range = |k: usize| match k < dimension {
         true => {
-            let reach = (cutoff / spacing[k]).floor() as i64;
+            let reach = steps(cutoff, spacing[k], extent[k]);
             -reach..=reach
         }
         false => 0..=0,
@@ -74,7 +95,7 @@ mod tests {
 
     #[test]
     fn offsets_of_known_horizons() {
-        let count = |cutoff, dimension| offsets([1.0; 3], cutoff, dimension).0.len();
+        let count = |cutoff, dimension| offsets([1.0; 3], cutoff, [9.0; 3], dimension).0.len();
         assert_eq!(count(3.015, 3), 122);
         assert_eq!(count(2.52, 3), 80);
         assert_eq!(count(3.0, 2), 28);
@@ -83,11 +104,31 @@ mod tests {
 
     #[test]
     fn both_ends_of_a_bond_have_the_same_length() {
-        let (offsets, _) = offsets([0.1, 0.2, 0.1], 0.35, 3);
+        let (offsets, _) = offsets([0.1, 0.2, 0.1], 0.35, [9.0; 3], 3);
         for offset in &offsets {
             let opposite = offset.reference.map(|x| -x);
             let other = offsets.iter().find(|other| other.reference == opposite);
             assert_eq!(other.unwrap().length, offset.length);
+        }
+    }
+
+    #[test]
+    fn offsets_lead_no_farther_than_the_points_lie() {
+        let count = |extent, dimension| offsets([0.1; 3], 300.0, extent, dimension).0.len();
+        assert_eq!(count([0.2, 0.2, 0.0], 2), 5 * 5 - 1);
+        assert_eq!(count([0.2, 0.1, 0.0], 3), 5 * 3 - 1);
+        assert_eq!(count([0.0; 3], 1), 0);
+        assert_eq!(steps(1e308, 1e-3, 5e-3), 5);
+    }
+
+    #[test]
+    fn neighbours_are_counted_without_looking_at_them() {
+        let cells = [30.0, 60.0, 30.0];
+        assert_eq!(most_neighbours([1e-3; 3], 3.0, cells, 3), 54_000.0);
+        for (cutoff, dimension) in [(9.5, 1), (9.5, 2), (9.5, 3), (3.015, 3)] {
+            let counted = offsets([1.0; 3], cutoff, [99.0; 3], dimension).0.len() as f64;
+            let found = most_neighbours([1.0; 3], cutoff, [99.0; 3], dimension);
+            assert!((found / counted - 1.0).abs() < 0.1, "{found} {counted}");
         }
     }
 }

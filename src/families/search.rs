@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
 use crate::lanes::WIDTH;
 use crate::partition::Domain;
 use crate::points::Point;
 use crate::points::bins::Bins;
 
+use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
 
 /// A bond as long as the horizon must not depend on rounding: lengths up to δ (1 + 10⁻⁹) count.
@@ -73,22 +73,12 @@ struct Chunk {
     places: Vec<u32>,
 }
 
-/// The error that two points lie at the same place.
-pub(super) fn at_one_place(a: &Point, b: &Point) -> Error {
-    Error::input(format!(
-        "points {} and {} lie at the same place, {:?} m; do two bodies overlap?",
-        a.id.min(b.id),
-        a.id.max(b.id),
-        a.position,
-    ))
-}
-
 /// The bond lists of a domain, for blocks 0 … `blocks` − 1; `cutoffs` has the longest bond (m) of each
 /// pair of them, row by row, and is symmetric.
 ///
 /// # Errors
-/// When two points lie at the same place.
-pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>> {
+/// When two points lie at the same place, or one has too many neighbours.
+pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>, Fault> {
     let longest = cutoffs.iter().copied().fold(0.0, f64::max);
     let order = Order::new(&domain.points, blocks, longest);
     let squares: Vec<f64> = cutoffs.iter().map(|cutoff| cutoff * cutoff).collect();
@@ -134,7 +124,7 @@ impl Chunk {
         order: &Order,
         range: Range<usize>,
         squares: &[f64],
-    ) -> Result<()> {
+    ) -> Result<(), Fault> {
         self.rows.clear();
         self.neighbours.clear();
         self.intact.clear();
@@ -155,7 +145,14 @@ impl Chunk {
                 }
             });
             if let Some(other) = coincident {
-                return Err(at_one_place(here, &domain.points[other]));
+                return Err(Fault::SamePlace([*here, domain.points[other]]));
+            }
+            if self.places.len() as f64 > MOST_NEIGHBOURS {
+                return Err(Fault::TooManyNeighbours {
+                    blocks: [here.block as usize; 2],
+                    neighbours: None,
+                    spacings: None,
+                });
             }
             self.places.sort_unstable();
             let mut rest = &self.places[..];
@@ -266,7 +263,26 @@ mod tests {
             Point::new(1, [1.0; 3], 1.0, 0),
         ];
         let domain = distribute(&threads::alone(), points, 2, 1.0).unwrap();
-        let error = search(&domain, 1, &[1.0]).unwrap_err();
-        assert!(error.message.contains("points 0 and 1"), "{error}");
+        let fault = search(&domain, 1, &[1.0]).unwrap_err();
+        let Fault::SamePlace([a, b]) = fault else {
+            panic!("{fault:?}");
+        };
+        assert_eq!(a.id.min(b.id), 0);
+        assert_eq!(a.id.max(b.id), 1);
+    }
+
+    #[test]
+    fn a_horizon_that_holds_too_many_points_is_an_error() {
+        let count = MOST_NEIGHBOURS as u64 + 2;
+        let points: Vec<Point> = (0..count)
+            .map(|k| Point::new(k, [k as f64, 0.0, 0.0], 1.0, 0))
+            .collect();
+        let cutoff = 1.1 * count as f64;
+        let domain = distribute(&threads::alone(), points, count, cutoff).unwrap();
+        let fault = search(&domain, 1, &[cutoff]).unwrap_err();
+        assert!(
+            matches!(fault, Fault::TooManyNeighbours { blocks: [0, 0], .. }),
+            "{fault:?}"
+        );
     }
 }

@@ -28,6 +28,7 @@ pub fn most_cells(ranks: usize) -> usize {
 #[derive(Debug, Clone)]
 pub struct Cells {
     lower: [f64; 3],
+    upper: [f64; 3],
     /// Edge of a box, about the cut-off, m.
     edge: f64,
     /// Number of boxes along the edge of a cell.
@@ -60,10 +61,16 @@ impl Cells {
         let boxes = boxes.expect("one cell is few enough");
         Self {
             lower,
+            upper,
             edge,
             boxes,
             counts: cells(boxes),
         }
+    }
+
+    /// How far the points are apart at most, by direction, m.
+    pub fn extent(&self) -> [f64; 3] {
+        std::array::from_fn(|k| (self.upper[k] - self.lower[k]).max(0.0))
     }
 
     /// Number of cells.

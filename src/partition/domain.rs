@@ -16,6 +16,8 @@ pub struct Domain {
     pub owned: usize,
     /// Number of points over all ranks.
     pub total: u64,
+    /// How far the points of all ranks are apart at most, by direction, m.
+    pub extent: [f64; 3],
     /// The halo plan.
     pub halo: Halo,
 }

@@ -73,6 +73,7 @@ pub fn domain(
         interior,
         owned: count,
         total,
+        extent: cells.extent(),
         halo,
     }
 }

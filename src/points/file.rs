@@ -1,15 +1,16 @@
 //! Points from a text file, read in pieces by all ranks.
 //!
-//! Each row is `x [y [z]] volume block`, separated by commas or white space. Empty rows and rows
-//! that start with `#` are skipped, and so is a first row that names the columns.
+//! Each row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Empty rows and
+//! rows that start with `#` are skipped, and so is the first other row if it names the columns: if no
+//! entry of it is a number.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use crate::comm::{Communicator, agree, scan};
 use crate::deck::plan::{Plan, PointSource};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, excerpt};
 
 use super::Point;
 
@@ -25,13 +26,29 @@ pub(super) fn users(plan: &Plan, file: &Path) -> Vec<(usize, Option<u32>)> {
         .collect()
 }
 
+/// The most bytes of a row.
+const LONGEST_ROW: u64 = 1 << 16;
+
+/// The largest size of a coordinate, m: squares of distances stay far from overflow.
+const FARTHEST: f64 = 1e30;
+
+/// What a file may begin with to say that it is UTF-8.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// What is wrong with a row: its line within the share, from 0, and the message.
+type Mistake = (u64, String);
+
 /// What one rank found in its share of the file.
 #[derive(Default)]
 struct Share {
     points: Vec<Point>,
     lines: u64,
-    /// The first wrong row: its line within the share, from 0, and what is wrong with it.
-    mistake: Option<(u64, String)>,
+    /// Whether there is a row at all.
+    has_rows: bool,
+    /// The first row if it holds no number, which is a mistake unless it is the first of the file.
+    heading: Option<Mistake>,
+    /// The first wrong row after that.
+    mistake: Option<Mistake>,
 }
 
 /// This rank's piece of a file's points, for all bodies that use it.
@@ -49,7 +66,9 @@ pub(super) fn piece(plan: &Plan, path: &Path, comm: &dyn Communicator) -> Result
     });
     let share = agree(comm, share)?;
     let (lines_before, _) = scan(comm, share.lines);
-    let checked = match share.mistake {
+    let (ranks_before, _) = scan(comm, u64::from(share.has_rows));
+    let heading = share.heading.filter(|_| ranks_before > 0);
+    let checked = match heading.or(share.mistake) {
         None => Ok(share.points),
         Some((line, message)) => {
             let line = lines_before + line + 1;
@@ -70,6 +89,10 @@ fn read_share(
     rank: usize,
     size: usize,
 ) -> std::io::Result<Share> {
+    // Opening a pipe would wait for its other end.
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
     let mut file = File::open(path)?;
     let length = file.metadata()?.len();
     let border = |rank: usize| (u128::from(length) * rank as u128 / size as u128) as u64;
@@ -83,52 +106,86 @@ fn read_share(
         // The row that is under way at `start` belongs to the share before.
         file.seek(SeekFrom::Start(start - 1))?;
         let mut reader = BufReader::new(file);
-        at = start - 1 + reader.read_until(b'\n', &mut line)? as u64;
+        at = start - 1 + reader.skip_until(b'\n')? as u64;
         reader
     };
     while at < end {
         line.clear();
-        let read = reader.read_until(b'\n', &mut line)?;
+        let read = (&mut reader)
+            .take(LONGEST_ROW)
+            .read_until(b'\n', &mut line)? as u64;
         if read == 0 {
             break;
         }
-        let first = at == 0;
-        at += read as u64;
-        let row = match std::str::from_utf8(&line) {
-            Ok(text) => parse_row(plan, users, text, first),
-            Err(_) => Err("is not text".to_owned()),
+        let bytes = match at {
+            0 => line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line),
+            _ => &line[..],
         };
-        match row {
-            Ok(point) => share.points.extend(point),
-            Err(message) => {
-                share.mistake.get_or_insert((share.lines, message));
-            }
+        at += read;
+        if read == LONGEST_ROW && !bytes.ends_with(b"\n") {
+            let message = format!("is longer than {LONGEST_ROW} bytes; is this a point file?");
+            share.mistake.get_or_insert((share.lines, message));
+            break;
         }
+        share.read_row(plan, users, bytes);
         share.lines += 1;
     }
     Ok(share)
 }
 
-/// The point of a row; none where the row is empty, a comment or the head of the table.
-fn parse_row(
+impl Share {
+    /// Takes the point of the next row, if it has one.
+    fn read_row(&mut self, plan: &Plan, users: &[(usize, Option<u32>)], row: &[u8]) {
+        let entries = match std::str::from_utf8(row) {
+            Ok(row) if row.trim_start().starts_with('#') => return,
+            Ok(row) => entries(row),
+            Err(_) => Err("is not UTF-8 text".to_owned()),
+        };
+        if entries.as_ref().is_ok_and(Vec::is_empty) {
+            return;
+        }
+        let is_first = !std::mem::replace(&mut self.has_rows, true);
+        let names_columns = |entries: &Vec<&str>| !entries.iter().any(|entry| has_number(entry));
+        let is_heading = is_first && entries.as_ref().is_ok_and(names_columns);
+        match entries.and_then(|entries| point(plan, users, &entries)) {
+            Ok(point) => self.points.push(point),
+            Err(message) if is_heading => self.heading = Some((self.lines, message)),
+            Err(message) => {
+                self.mistake.get_or_insert((self.lines, message));
+            }
+        }
+    }
+}
+
+/// The entries of a row.
+fn entries(row: &str) -> std::result::Result<Vec<&str>, String> {
+    let row = row.trim();
+    let mut entries = Vec::new();
+    for part in row.split([',', ';']) {
+        let before = entries.len();
+        entries.extend(part.split_whitespace());
+        if entries.len() == before && !row.is_empty() {
+            return Err(format!("entry {} is empty", before + 1));
+        }
+    }
+    Ok(entries)
+}
+
+/// Whether an entry is a number, or one with a slip in it or in quotes.
+fn has_number(entry: &str) -> bool {
+    let bare = entry.trim_matches(['"', '\'']);
+    let digits = bare.trim_start_matches(['+', '-', '.']);
+    bare.parse::<f64>().is_ok() || digits.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// The point of a row.
+fn point(
     plan: &Plan,
     users: &[(usize, Option<u32>)],
-    row: &str,
-    first: bool,
-) -> std::result::Result<Option<Point>, String> {
-    let row = row.trim();
-    if row.is_empty() || row.starts_with('#') {
-        return Ok(None);
-    }
+    entries: &[&str],
+) -> std::result::Result<Point, String> {
     let dimension = plan.dimension.count();
     let names = &["x", "y", "z"][..dimension];
-    let entries: Vec<&str> = row
-        .split(|c: char| c == ',' || c == ';' || c.is_whitespace())
-        .filter(|entry| !entry.is_empty())
-        .collect();
-    if first && entries[0].parse::<f64>().is_err() {
-        return Ok(None);
-    }
     if entries.len() != dimension + 2 {
         return Err(format!(
             "has {} entries, must have {}: {} volume block",
@@ -142,11 +199,17 @@ fn parse_row(
             .parse::<f64>()
             .ok()
             .filter(|value| value.is_finite());
-        value.ok_or_else(|| format!("{name} must be a number, is `{}`", entries[k]))
+        value.ok_or_else(|| format!("{name} must be a number, is {}", excerpt(entries[k])))
     };
     let mut position = [0.0; 3];
     for (k, name) in names.iter().enumerate() {
         position[k] = number(k, name)?;
+        if position[k].abs() > FARTHEST {
+            return Err(format!(
+                "{name} must be at most {FARTHEST:e} m, is {:e}",
+                position[k]
+            ));
+        }
     }
     let volume = number(dimension, "volume")?;
     if volume <= 0.0 {
@@ -154,8 +217,8 @@ fn parse_row(
     }
     let block: u32 = entries[dimension + 1].parse().map_err(|_| {
         format!(
-            "block must be a whole number, is `{}`",
-            entries[dimension + 1]
+            "block must be a whole number, is {}",
+            excerpt(entries[dimension + 1])
         )
     })?;
     let body = users
@@ -167,5 +230,137 @@ fn parse_row(
              {block} }}`"
         ));
     };
-    Ok(Some(Point::new(0, position, volume, *body)))
+    Ok(Point::new(0, position, volume, *body))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::deck::{self, Source};
+
+    /// The x of all points of a file in the plane, in the order of their ids, or the error, which must
+    /// be the same on any number of ranks.
+    fn read(name: &str, text: &[u8]) -> std::result::Result<Vec<f64>, String> {
+        let folder = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("points.csv"), text).unwrap();
+        let found = read_in(&folder);
+        std::fs::remove_dir_all(&folder).unwrap();
+        found
+    }
+
+    fn read_in(folder: &Path) -> std::result::Result<Vec<f64>, String> {
+        let plan = deck::parse(&Source {
+            path: folder.join("deck.toml"),
+            text: "dimension = 'plane-stress'
+                grid.horizon = 3
+                material.glass.pmb = { density = 2, youngs_modulus = 5 }
+                body.plate = { material = 'glass', points.file = 'points.csv' }
+                time.end = 1
+                "
+            .to_owned(),
+        });
+        let plan = plan.unwrap_or_else(|error| panic!("{error}"));
+        let on = |ranks: usize| {
+            let path = folder.join("points.csv");
+            let pieces = threads::run(ranks, |comm| piece(&plan, &path, comm));
+            let pieces: Result<Vec<Vec<Point>>> = pieces.into_iter().collect();
+            let shorten = |error: Error| {
+                let folder = folder.display().to_string();
+                error
+                    .message
+                    .replace(&folder, "")
+                    .replace("/points", "points")
+            };
+            let xs = |pieces: Vec<Vec<Point>>| {
+                pieces
+                    .concat()
+                    .iter()
+                    .map(|point| point.position[0])
+                    .collect()
+            };
+            pieces.map(xs).map_err(shorten)
+        };
+        let alone = on(1);
+        for ranks in 2..7 {
+            assert_eq!(on(ranks), alone, "{ranks} ranks");
+        }
+        alone
+    }
+
+    #[test]
+    fn a_heading_is_a_row_without_any_number() {
+        let rows = "0,0,1,1\n1,0,1,1\n2,0,1,1\n";
+        for before in [
+            "",
+            "x,y,volume,block\n",
+            "\"Points:0\",\"Points:1\",\"m³\",\"id\"\r\n",
+            "# by hand\n\n  # twice\nx y volume block\n",
+            "\u{feff}",
+            "\u{feff}# marked\nx;y;volume;block\n",
+            "\u{feff}x,y,volume,block\n",
+        ] {
+            let text = format!("{before}{rows}");
+            assert_eq!(
+                read("heading", text.as_bytes()),
+                Ok(vec![0.0, 1.0, 2.0]),
+                "{before}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_row_is_taken_for_a_heading_or_for_another() {
+        let rows = "1,0,1,1\n2,0,1,1\n";
+        for (row, message) in [
+            ("O.0,0,1,1", "x must be a number, is `O.0`"),
+            ("0x0,0,1,1", "x must be a number, is `0x0`"),
+            ("'0','0','1','1'", "x must be a number, is `'0'`"),
+            ("nan,nan,nan,nan", "x must be a number, is `nan`"),
+            ("-.5e,a,b,c", "x must be a number, is `-.5e`"),
+            ("x,y,volume,1", "x must be a number, is `x`"),
+            ("0,,0,1,1", "entry 2 is empty"),
+            (",0,0,1,1", "entry 1 is empty"),
+            ("0,0,1,1,", "entry 5 is empty"),
+            ("0, ;0,1,1", "entry 2 is empty"),
+            ("1e31,0,1,1", "x must be at most 1e30 m, is 1e31"),
+        ] {
+            let first = format!("{row}\n{rows}");
+            let expected = Err(format!("points.csv:1: {message}"));
+            assert_eq!(read("first", first.as_bytes()), expected);
+            let third = format!("{rows}{row}\n{rows}");
+            let expected = Err(format!("points.csv:3: {message}"));
+            assert_eq!(read("third", third.as_bytes()), expected);
+        }
+        let message = "x must be a number, is `x`";
+        let twice = format!("x y volume block\n# and\nx y volume block\n{rows}");
+        let expected = Err(format!("points.csv:3: {message}"));
+        assert_eq!(read("twice", twice.as_bytes()), expected);
+        let late = format!("{rows}x y volume block\n");
+        assert_eq!(read("late", late.as_bytes()), expected);
+        let expected = Err("points.csv:2: is not UTF-8 text".to_owned());
+        assert_eq!(read("latin", b"0,0,1,1\n# \xb5m\n1,0,1,1\n"), expected);
+    }
+
+    #[test]
+    fn a_row_without_end_is_not_read_to_its_end() {
+        let long = [b"0 0 1 1\n".to_vec(), vec![b'0'; 1 << 17]].concat();
+        let expected = "points.csv:2: is longer than 65536 bytes; is this a point file?";
+        assert_eq!(read("long", &long), Err(expected.to_owned()));
+    }
+
+    #[test]
+    fn a_pipe_is_no_point_file() {
+        let folder = std::env::temp_dir().join(format!("fissure-pipe-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let made = std::process::Command::new("mkfifo")
+            .arg(folder.join("points.csv"))
+            .status();
+        assert!(made.unwrap().success());
+        let error = read_in(&folder).unwrap_err();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(error.contains("cannot read the point file"), "{error}");
+        assert!(error.contains("it is not a regular file"), "{error}");
+    }
 }

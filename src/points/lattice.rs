@@ -1,120 +1,172 @@
 //! Points in lattice cells, made in pieces: one at the centre of each, or at the places of the Gauss
 //! rule, ±√3/3 of half the edge by direction (Emmrich & Weckner 2006, §4).
 
-use crate::comm::{Communicator, agree};
-use crate::deck::plan::{Plan, PointSource, Quadrature, Shape};
+use crate::comm::Communicator;
+use crate::deck::plan::{Body, Plan, PointSource, Quadrature, Shape};
 use crate::error::{Error, Result};
 
-use super::{Point, shape};
-
-/// The share of a cell's edge by which a point may lie outside a shape and still count as within.
-const TOLERANCE: f64 = 1e-9;
+use super::region::{Region, TOLERANCE};
+use super::{MOST_A_RANK, Point, shape};
 
 /// Binary logarithm of the cells that one rank goes through; some minutes' worth.
 const CELLS_A_RANK: u32 = 33;
 
-/// The cells that a shape can touch: the first cell's index and the number of cells, by direction.
-struct Range {
-    first: [i64; 3],
-    counts: [u64; 3],
+/// Cells looked at to estimate how many of a region belong to a body.
+const SAMPLES: u64 = 1 << 17;
+
+/// Consecutive multiples of this share of 1, less whole numbers, fill it evenly: the golden ratio.
+const EVENLY: f64 = 0.618_033_988_749_894_9;
+
+/// A body made of lattice cells. A cell belongs to it if its centre lies within its shape; one that also
+/// lies in a later lattice body is left to that one.
+pub struct LatticeBody<'a> {
+    shape: &'a Shape,
+    later: Vec<&'a Shape>,
+    spacing: [f64; 3],
+    origin: [f64; 3],
+    dimension: usize,
+    tolerance: f64,
+    region: Region,
+    quadrature: Quadrature,
+    section: f64,
 }
 
-impl Range {
-    fn new(shape: &Shape, spacing: [f64; 3], origin: [f64; 3], dimension: usize) -> Option<Self> {
-        let (lower, upper) = shape::bounds(shape);
-        let mut range = Self {
-            first: [0; 3],
-            counts: [1; 3],
+impl<'a> LatticeBody<'a> {
+    /// A body of a plan, by index; `None` if it has its points from a file.
+    ///
+    /// # Errors
+    /// When its cells are too far away to be numbered.
+    pub fn new(plan: &'a Plan, body: usize) -> Result<Option<Self>> {
+        let lattice = |body: &'a Body| match &body.points {
+            PointSource::Lattice {
+                shape,
+                spacing,
+                origin,
+            } => Some((shape, *spacing, *origin)),
+            PointSource::File { .. } => None,
         };
-        for k in 0..dimension {
-            let low = ((lower[k] - origin[k]) / spacing[k] - TOLERANCE).floor();
-            let high = ((upper[k] - origin[k]) / spacing[k] + TOLERANCE).ceil();
-            if low.abs().max(high.abs()) > 1e15 {
-                return None;
-            }
-            range.first[k] = low as i64;
-            range.counts[k] = (high - low).max(0.0) as u64;
+        let Some((shape, spacing, origin)) = lattice(&plan.bodies[body]) else {
+            return Ok(None);
+        };
+        let dimension = plan.dimension.count();
+        let Some(region) = Region::new(shape, spacing, origin, dimension) else {
+            return Err(too_many(plan, body));
+        };
+        let later = plan.bodies[body + 1..].iter().filter_map(lattice);
+        let edges = spacing[..dimension].iter().copied();
+        Ok(Some(Self {
+            shape,
+            later: later.map(|(shape, ..)| shape).collect(),
+            spacing,
+            origin,
+            dimension,
+            tolerance: TOLERANCE * edges.fold(f64::INFINITY, f64::min),
+            region,
+            quadrature: plan.quadrature,
+            section: plan.dimension.section(),
+        }))
+    }
+
+    /// Number of cells whose centres can lie within the shape, at most the largest number there is.
+    pub fn cells(&self) -> u64 {
+        self.region.total()
+    }
+
+    /// The centre (m) of one of these cells, if it belongs to the body.
+    pub fn centre(&self, index: u64) -> Option<[f64; 3]> {
+        let cell = self.region.cell(index);
+        let mut centre = [0.0; 3];
+        for k in 0..self.dimension {
+            centre[k] = self.origin[k] + (cell[k] as f64 + 0.5) * self.spacing[k];
         }
-        Some(range)
+        let within = |shape: &Shape| shape::contains(shape, centre, self.tolerance);
+        let belongs = within(self.shape) && !self.later.iter().any(|shape| within(shape));
+        belongs.then_some(centre)
     }
 
-    fn total(&self) -> Option<u64> {
-        let [nx, ny, nz] = self.counts;
-        nx.checked_mul(ny)?.checked_mul(nz)
+    /// Volume of a cell, m³.
+    pub fn cell_volume(&self) -> f64 {
+        self.spacing[..self.dimension].iter().product::<f64>() * self.section
     }
 
-    fn cell(&self, index: u64) -> [i64; 3] {
-        let [nx, ny, _] = self.counts;
-        let offset = [index % nx, index / nx % ny, index / nx / ny];
-        std::array::from_fn(|k| self.first[k] + offset[k] as i64)
+    /// Number of points of a cell.
+    pub fn points_of_cell(&self) -> u64 {
+        u64::from(self.quadrature.points(self.dimension))
+    }
+
+    /// Number of points; of a large region an estimate from some of its cells.
+    pub fn points(&self) -> f64 {
+        let belongs = |index: &u64| self.centre(*index).is_some();
+        let (cells, all) = (self.cells(), self.cells() as f64);
+        let share = if cells <= SAMPLES {
+            (0..cells).filter(belongs).count() as f64 / all.max(1.0)
+        } else {
+            let at = |k: u64| ((k as f64 * EVENLY).fract() * all) as u64;
+            let found = (0..SAMPLES).map(at).filter(belongs).count();
+            found as f64 / SAMPLES as f64
+        };
+        share * all * self.points_of_cell() as f64
     }
 }
 
 /// This rank's piece of a body's points; ids count from 0 within the piece. Cells are numbered with
-/// x fastest, and ranks take consecutive ranges of them. A cell belongs to a body if its centre does;
-/// one that also lies in a later lattice body is left to that one.
+/// x fastest, and ranks take consecutive ranges of them.
 ///
 /// # Errors
-/// When the lattice has more cells than the ranks can go through.
+/// When cells are too far away to be numbered.
 pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result<Vec<Point>> {
-    let PointSource::Lattice {
-        shape: region,
-        spacing,
-        origin,
-    } = &plan.bodies[body].points
-    else {
-        unreachable!("only called for lattice bodies");
+    let Some(lattice) = LatticeBody::new(plan, body)? else {
+        return Ok(Vec::new());
     };
-    let dimension = plan.dimension.count();
-    let cells = Range::new(region, *spacing, *origin, dimension);
-    let most = (comm.size() as u64) << CELLS_A_RANK;
-    let (Some(cells), Some(total)) = (&cells, cells.as_ref().and_then(Range::total)) else {
-        return agree(comm, Err(too_many(plan, body)));
-    };
-    if total > most {
-        return agree(comm, Err(too_many(plan, body)));
-    }
-    let later: Vec<&Shape> = plan.bodies[body + 1..]
-        .iter()
-        .filter_map(|body| match &body.points {
-            PointSource::Lattice { shape, .. } => Some(shape),
-            PointSource::File { .. } => None,
-        })
-        .collect();
-    let edges = &spacing[..dimension];
-    let tolerance = TOLERANCE * edges.iter().copied().fold(f64::INFINITY, f64::min);
-    let volume = edges.iter().product::<f64>() * plan.dimension.section();
+    let total = lattice.cells();
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
     let share = |rank: u64| (u128::from(total) * u128::from(rank) / u128::from(size)) as u64;
+    let count = lattice.points_of_cell();
+    let volume = lattice.cell_volume();
     let mut points = Vec::new();
     for index in share(rank)..share(rank + 1) {
-        let cell = cells.cell(index);
-        let mut position = [0.0; 3];
-        for k in 0..dimension {
-            position[k] = origin[k] + (cell[k] as f64 + 0.5) * spacing[k];
-        }
-        let taken = later
-            .iter()
-            .any(|shape| shape::contains(shape, position, tolerance));
-        if !shape::contains(region, position, tolerance) || taken {
+        let Some(centre) = lattice.centre(index) else {
+            continue;
+        };
+        if count == 1 {
+            points.push(Point::new(0, centre, volume, body));
             continue;
         }
-        match plan.quadrature {
-            Quadrature::Midpoint => points.push(Point::new(0, position, volume, body)),
-            Quadrature::Gauss => {
-                let count = 1 << dimension;
-                for corner in 0..count {
-                    let mut place = position;
-                    for k in 0..dimension {
-                        let shift = spacing[k] / 12.0_f64.sqrt();
-                        place[k] += if corner >> k & 1 == 1 { shift } else { -shift };
-                    }
-                    points.push(Point::new(0, place, volume / f64::from(count), body));
-                }
+        for corner in 0..count {
+            let mut place = centre;
+            for k in 0..lattice.dimension {
+                let shift = lattice.spacing[k] / 12.0_f64.sqrt();
+                place[k] += if corner >> k & 1 == 1 { shift } else { -shift };
             }
+            points.push(Point::new(0, place, volume / count as f64, body));
         }
     }
     Ok(points)
+}
+
+/// Whether so many ranks can go through a body's cells and hold its points, as far as both are known
+/// beforehand.
+///
+/// # Errors
+/// Names the body; the same on all ranks.
+pub fn is_feasible(plan: &Plan, body: usize, ranks: usize) -> Result<()> {
+    let Some(lattice) = LatticeBody::new(plan, body)? else {
+        return Ok(());
+    };
+    if lattice.cells() > (ranks as u64) << CELLS_A_RANK {
+        return Err(too_many(plan, body));
+    }
+    let most = MOST_A_RANK * ranks as f64;
+    if lattice.cells() as f64 > most && lattice.points() > most {
+        let message = format!(
+            "[body.{}]: about {:.1e} points are too many for {ranks} rank(s), of 2³¹ each at most; \
+             use more ranks, or is the spacing not in m?",
+            plan.bodies[body].name,
+            lattice.points()
+        );
+        return Err(plan.source.error(plan.bodies[body].span.clone(), message));
+    }
+    Ok(())
 }
 
 fn too_many(plan: &Plan, body: usize) -> Error {
@@ -124,4 +176,41 @@ fn too_many(plan: &Plan, body: usize) -> Error {
         body.name
     );
     plan.source.error(body.span.clone(), message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deck::{self, Source};
+
+    fn plan(spacing: f64, shape: &str) -> Plan {
+        let text = format!(
+            "dimension = '3d'
+            grid = {{ spacing = {spacing}, horizon = 3 }}
+            material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.block = {{ material = 'glass', shape.{shape} }}
+            time.end = 1
+            "
+        );
+        let source = Source {
+            path: "test.toml".into(),
+            text,
+        };
+        deck::parse(&source).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn points_are_counted_without_being_made() {
+        let ball = "sphere = { centre = [0, 0, 0], radius = 1 }";
+        let volume = 4.0 / 3.0 * std::f64::consts::PI;
+        for spacing in [0.1_f64, 1e-2, 1e-4] {
+            let plan = plan(spacing, ball);
+            let found = LatticeBody::new(&plan, 0).unwrap().unwrap().points();
+            let expected = volume / spacing.powi(3);
+            assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+        }
+        let cube = plan(5e-4, "box = { lower = [0, 0, 0], upper = [1, 1, 1] }");
+        let cube = LatticeBody::new(&cube, 0).unwrap().unwrap();
+        assert_eq!(cube.points(), 8e9);
+    }
 }

@@ -5,15 +5,21 @@
 pub mod bins;
 pub mod crack;
 mod file;
-mod lattice;
+pub mod lattice;
+mod region;
 pub mod set;
 pub mod shape;
+
+pub use lattice::LatticeBody;
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::comm::{Communicator, agree};
-use crate::deck::plan::{Plan, PointSource};
+use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::error::{Error, Result};
+
+/// The most points of a rank.
+pub const MOST_A_RANK: f64 = 2_147_483_647.0;
 
 /// A point as it travels between ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -53,8 +59,8 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// This rank's piece of the points: a contiguous range of ids, and the total over all ranks.
 ///
 /// # Errors
-/// A body without points, an unreadable or wrong point file, more points than a rank can number;
-/// the same on all ranks.
+/// A body without points, an unreadable or wrong point file, a set with an id that no point has, more
+/// points than a rank can number; the same on all ranks.
 pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
@@ -80,7 +86,8 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
         total += all;
     }
     no_empty_body(plan, comm, &points)?;
-    let fits = if points.len() < u32::MAX as usize / 2 {
+    ids_are_those_of_points(plan, total)?;
+    let fits = if (points.len() as f64) < MOST_A_RANK {
         Ok(())
     } else {
         Err(Error::run(
@@ -89,6 +96,22 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
     };
     agree(comm, fits)?;
     Ok((points, total))
+}
+
+fn ids_are_those_of_points(plan: &Plan, total: u64) -> Result<()> {
+    for set in &plan.sets {
+        if let Selector::Ids { ids, largest } = &set.selector
+            && let Some(id) = ids.last().filter(|id| **id >= total)
+        {
+            let message = format!(
+                "[set.{}] ids: no point has the id {id}; those of the {total} points are 0 to {}",
+                set.name,
+                total - 1
+            );
+            return Err(plan.source.error(largest.clone(), message));
+        }
+    }
+    Ok(())
 }
 
 fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Result<()> {

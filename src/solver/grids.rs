@@ -14,6 +14,9 @@ use crate::points::bins::Bins;
 /// The share of a cell's edge by which a point may be off its place, and two grids apart.
 const ON_GRID: f64 = 1e-6;
 
+/// Cells are numbered with integers that a float holds exactly.
+const FARTHEST: f64 = 1e15;
+
 /// The share by which the volume of a file's points may differ from that of a cell.
 const VOLUME: f64 = 1e-2;
 
@@ -129,7 +132,7 @@ fn detected(
     let on_grid = points().all(|point| {
         (0..dimension).all(|k| {
             let steps = (point.position[k] - centre[k]) / edges[k];
-            (steps - steps.round()).abs() < ON_GRID
+            steps < FARTHEST && (steps - steps.round()).abs() < ON_GRID
         })
     });
     let mut good = [f64::from(u8::from(fits && on_grid))];

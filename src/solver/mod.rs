@@ -8,5 +8,6 @@ pub mod model;
 pub mod motion;
 pub mod observers;
 pub mod simulation;
+pub mod size;
 
 pub use simulation::Simulation;

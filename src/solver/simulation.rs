@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
 use crate::deck::plan::{Plan, StepRule};
+use crate::deck::shown;
 use crate::error::{Error, Result};
 use crate::partition::distribute;
 use crate::{families, points};
@@ -17,6 +18,7 @@ use super::motion::clock::steps_to;
 use super::motion::fields::Needs;
 use super::motion::stable_step::stable_step;
 use super::motion::{Clock, Fields, verlet};
+use super::size;
 
 /// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
 /// cell off their grid.
@@ -75,15 +77,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// same on all ranks.
     pub fn new(plan: &'a Plan, comm: &'a dyn Communicator) -> Result<Self> {
         let start = Instant::now();
-        let (pieces, total) = points::generate(plan, comm)?;
         let cutoffs = cutoffs(plan);
+        size::is_feasible(plan, &cutoffs, comm.size())?;
+        let (pieces, total) = points::generate(plan, comm)?;
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // Bonds at the limit must find their ghosts however their length is rounded.
         let mut domain = distribute(comm, pieces, total, longest * (1.0 + SLACK))?;
         let frames = grids(plan, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
         let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
-        let found = families::find(&domain, &frames, bodies, &cutoffs, dimension);
+        let found = families::find(&domain, &frames, bodies, &cutoffs, dimension)
+            .map_err(|fault| fault.error(plan));
         let (bonds, grids) = agree(comm, found)?;
         let model = Model::new(plan, &domain);
         let bodies = plan.bodies.iter();
@@ -257,9 +261,10 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
     let (step, steps) = match plan.time.step {
         StepRule::Fixed(step) => (step, steps_to(end, step)),
         StepRule::Automatic(_) if stable.is_infinite() => {
-            return Err(Error::input(
-                "no point has a neighbour, so there is no stable step; is the horizon in m and \
-                 larger than the distance of the points?",
+            return Err(plan.source.error(
+                plan.places.horizon.clone(),
+                "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
+                 in m and larger than the distance of the points?",
             ));
         }
         StepRule::Automatic(safety) => {
@@ -268,9 +273,11 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
         }
     };
     if steps > 1e15 {
-        return Err(Error::input(format!(
-            "[time] end: {end} s take {steps:.1e} steps of {step:.1e} s"
-        )));
+        let message = format!(
+            "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",
+            shown(end)
+        );
+        return Err(plan.source.error(plan.places.step.clone(), message));
     }
     Ok(Clock::new(step, end))
 }

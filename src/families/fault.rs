@@ -1,0 +1,99 @@
+//! What can be wrong with points so that they cannot be bonded.
+
+use crate::deck::{Plan, shown};
+use crate::error::Error;
+use crate::points::Point;
+
+/// The most neighbours of a point; a horizon of 16 spacings has as many in 3-D, one of 80 in the plane.
+pub const MOST_NEIGHBOURS: f64 = 20_000.0;
+
+/// Why points cannot be bonded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fault {
+    /// Two points lie at the same place.
+    SamePlace([Point; 2]),
+    /// A point would have too many neighbours.
+    TooManyNeighbours {
+        /// Its block and that of the neighbours.
+        blocks: [usize; 2],
+        /// How many there would be, as far as that is known.
+        neighbours: Option<f64>,
+        /// The horizon in spacings of the neighbours, if they lie on a lattice.
+        spacings: Option<f64>,
+    },
+    /// The layout of a grid has too many places without a point.
+    TooManyHoles,
+}
+
+impl Fault {
+    /// The error, with the place in the deck that it is about.
+    pub fn error(&self, plan: &Plan) -> Error {
+        match self {
+            Self::SamePlace(points) => same_place(plan, points),
+            Self::TooManyNeighbours {
+                blocks,
+                neighbours,
+                spacings,
+            } => too_many_neighbours(plan, *blocks, *neighbours, *spacings),
+            Self::TooManyHoles => Error::run(
+                "a rank's part of a grid has too many holes for a lattice (2³¹ places at most); \
+                 use more ranks or `family = \"list\"`",
+            ),
+        }
+    }
+}
+
+fn same_place(plan: &Plan, points: &[Point; 2]) -> Error {
+    let [a, b] = *points;
+    let [first, second] = if a.id < b.id { [a, b] } else { [b, a] };
+    let [body, other] = [second, first].map(|point| &plan.bodies[point.block as usize]);
+    let place = &first.position[..plan.dimension.count()];
+    let message = if second.block == first.block {
+        format!(
+            "[body.{}]: its points {} and {} lie at the same place, {place:?} m",
+            body.name, first.id, second.id
+        )
+    } else {
+        format!(
+            "[body.{}]: its point {} lies at the same place as point {} of [body.{}], {place:?} m; \
+             do the bodies overlap?",
+            body.name, second.id, first.id, other.name
+        )
+    };
+    plan.source.error(body.span.clone(), message)
+}
+
+/// A large number for a message, to two digits.
+fn rounded(value: f64) -> String {
+    let unit = 10_f64.powf(value.log10().floor() - 1.0);
+    shown((value / unit).round() * unit)
+}
+
+fn too_many_neighbours(
+    plan: &Plan,
+    blocks: [usize; 2],
+    neighbours: Option<f64>,
+    spacings: Option<f64>,
+) -> Error {
+    let [body, other] = blocks.map(|block| &plan.bodies[block]);
+    let key = if body.horizon_place == plan.places.horizon {
+        "[grid] horizon".to_owned()
+    } else {
+        format!("[body.{}] horizon", body.name)
+    };
+    let is = match spacings {
+        Some(spacings) => format!(" is {spacings:.0} spacings of [body.{}]", other.name),
+        None => String::new(),
+    };
+    let count = match neighbours {
+        Some(neighbours) => format!("about {}", rounded(neighbours)),
+        None => format!("more than {MOST_NEIGHBOURS}"),
+    };
+    let message = format!(
+        "{key}: {} m{is}, so a point of [body.{}] would have {count} neighbours there \
+         ({MOST_NEIGHBOURS} at most); is the horizon in metres?",
+        shown(body.horizon),
+        body.name
+    );
+    plan.source.error(body.horizon_place.clone(), message)
+}

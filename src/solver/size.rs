@@ -1,0 +1,51 @@
+//! Whether a run is small enough to be made, found from the plan before its points are.
+
+use crate::deck::plan::{Plan, PointSource};
+use crate::error::Result;
+use crate::families::{Fault, MOST_NEIGHBOURS, most_neighbours};
+use crate::points::{lattice, shape};
+
+/// An error if a point would have too many neighbours or a rank too many points, as far as the shapes
+/// of the plan show it; `cutoffs` has the longest bond (m) of each pair of bodies, row by row.
+///
+/// # Errors
+/// Names the horizon or the body; the same on all ranks.
+pub fn is_feasible(plan: &Plan, cutoffs: &[f64], ranks: usize) -> Result<()> {
+    let bodies = plan.bodies.len();
+    (0..bodies).try_for_each(|body| lattice::is_feasible(plan, body, ranks))?;
+    // First each body alone: it is the one to name.
+    let alone = (0..bodies).map(|body| [body, body]);
+    let pairs = (0..bodies * bodies).map(|pair| [pair / bodies, pair % bodies]);
+    for [here, there] in alone.chain(pairs) {
+        not_too_many_neighbours(plan, [here, there], cutoffs[here * bodies + there])?;
+    }
+    Ok(())
+}
+
+fn not_too_many_neighbours(plan: &Plan, [here, there]: [usize; 2], cutoff: f64) -> Result<()> {
+    let PointSource::Lattice { shape, spacing, .. } = &plan.bodies[there].points else {
+        return Ok(());
+    };
+    let dimension = plan.dimension.count();
+    let (lower, upper) = shape::bounds(shape);
+    if let PointSource::Lattice { shape: own, .. } = &plan.bodies[here].points {
+        let (own_lower, own_upper) = shape::bounds(own);
+        let apart = |k: usize| (own_lower[k] - upper[k]).max(lower[k] - own_upper[k]);
+        if (0..dimension).any(|k| apart(k) > cutoff) {
+            return Ok(());
+        }
+    }
+    let cells =
+        std::array::from_fn(|k| ((upper[k] - lower[k]) / spacing[k] - 1e-9).ceil().max(1.0));
+    let points = f64::from(plan.quadrature.points(dimension));
+    let neighbours = points * most_neighbours(*spacing, cutoff, cells, dimension);
+    if neighbours <= MOST_NEIGHBOURS {
+        return Ok(());
+    }
+    let fault = Fault::TooManyNeighbours {
+        blocks: [here, there],
+        neighbours: Some(neighbours),
+        spacings: Some(cutoff / spacing[0]),
+    };
+    Err(fault.error(plan))
+}
