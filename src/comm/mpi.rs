@@ -13,7 +13,7 @@ use mpi::topology::{Communicator as _, SimpleCommunicator};
 use mpi::traits::*;
 use mpi_sys::{MPI_Request, RSMPI_COMM_WORLD};
 
-use super::{Communicator, Message, RawCommunicator};
+use super::{Communicator, During, Message, RawCommunicator};
 use crate::error::{Error, Result};
 
 /// One MPI message holds at most this many bytes: counts are 32-bit.
@@ -149,12 +149,28 @@ impl InFlight<'_> {
             });
         }
     }
+
+    /// Moves what can be moved now; returns whether any message is still under way.
+    fn advance(&mut self) -> bool {
+        let count = self.0.len() as c_int;
+        let mut arrived = 0;
+        // SAFETY: these are as many requests, each made by MPI; those that are completed are null.
+        unsafe {
+            mpi_sys::MPI_Testall(
+                count,
+                self.0.as_mut_ptr(),
+                &mut arrived,
+                mpi_sys::RSMPI_STATUSES_IGNORE,
+            );
+        }
+        arrived == 0
+    }
 }
 
 impl Drop for InFlight<'_> {
     fn drop(&mut self) {
         let count = self.0.len() as c_int;
-        // SAFETY: these are as many requests, each made by MPI and not yet completed.
+        // SAFETY: these are as many requests, each made by MPI; those that are completed are null.
         unsafe {
             mpi_sys::MPI_Waitall(count, self.0.as_mut_ptr(), mpi_sys::RSMPI_STATUSES_IGNORE);
         }
@@ -216,7 +232,7 @@ impl Communicator for World {
         incoming
     }
 
-    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut()) {
+    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>) {
         let mut in_flight = self.in_flight();
         for message in messages.iter_mut() {
             let bytes = bytemuck::cast_slice_mut(&mut message.receive);
@@ -229,7 +245,7 @@ impl Communicator for World {
             // SAFETY: as above.
             unsafe { in_flight.send(bytes, message.rank, HALO_TAG) };
         }
-        during();
+        during(&mut || in_flight.advance());
         // Waits, here and where `during` panics.
         drop(in_flight);
     }

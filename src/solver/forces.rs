@@ -30,6 +30,10 @@ pub struct Forces<const D: usize> {
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
+/// Interior points for each thread that are worked on before messages are driven on again: some tenths
+/// of a millisecond in space.
+const PIECE: usize = 4096;
+
 /// Where the time of a force evaluation went.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ForceTimes {
@@ -78,7 +82,7 @@ impl<const D: usize> Forces<D> {
             passes.constants[point] = law.constant(sum);
         }
         halo.pack(&[&passes.constants]);
-        halo.exchange(comm, &mut || {});
+        halo.exchange(comm, &mut |_| {});
         halo.unpack(&mut [&mut passes.constants]);
         passes.bring_constants();
     }
@@ -162,7 +166,7 @@ impl<const D: usize> Forces<D> {
     /// Brings the ghosts' displacements up to date.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         self.halo.pack(&components(displacement));
-        self.halo.exchange(comm, &mut || {});
+        self.halo.exchange(comm, &mut |_| {});
         self.halo.unpack(&mut components_mut(displacement));
     }
 
@@ -170,7 +174,7 @@ impl<const D: usize> Forces<D> {
     /// brought from their owners.
     pub fn protect(&mut self, comm: &dyn Communicator, protected: &mut [f64]) {
         self.halo.pack(&[protected]);
-        self.halo.exchange(comm, &mut || {});
+        self.halo.exchange(comm, &mut |_| {});
         self.halo.unpack(&mut [protected]);
         for bonds in &mut self.passes.bonds {
             bonds.family.protect(|point| protected[point] == 1.0);
@@ -188,6 +192,7 @@ impl<const D: usize> Forces<D> {
     ) {
         let Self { passes, halo } = self;
         let owned = responses.len();
+        let piece = PIECE * rayon::current_num_threads();
         let start = Instant::now();
         let mut in_bonds = Duration::ZERO;
         let mut timed = |work: &mut dyn FnMut()| {
@@ -207,11 +212,16 @@ impl<const D: usize> Forces<D> {
                 Some(found) => halo.pack(&[found]),
             }
             passes.start(pass, owned);
-            halo.exchange(comm, &mut || {
-                timed(&mut || {
-                    passes.bring(before, Which::Owned, model, displacement);
-                    passes.run(pass, 0..model.interior, responses);
-                });
+            halo.exchange(comm, &mut |progress| {
+                timed(&mut || passes.bring(before, Which::Owned, model, displacement));
+                let mut rest = 0..model.interior;
+                // Once all messages have arrived the rest is done in one piece.
+                while rest.len() > piece && progress() {
+                    let next = rest.start + piece;
+                    timed(&mut || passes.run(pass, rest.start..next, responses));
+                    rest.start = next;
+                }
+                timed(&mut || passes.run(pass, rest.clone(), responses));
             });
             match before.and_then(|pass| passes.found(pass)) {
                 None => halo.unpack(&mut components_mut(displacement)),
