@@ -21,12 +21,42 @@ const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
 
+// `mpi-sys` is not built anew when another MPI is chosen within one target folder.
+const _: () = assert!(
+    OF_OPEN_MPI == cfg!(open_mpi),
+    "the target folder holds bindings to another MPI: take one folder for each (--target-dir), or \
+     run `cargo clean -p mpi-sys`"
+);
+
+/// Whether the bindings are those of Open MPI.
+const OF_OPEN_MPI: bool = {
+    // Theirs, where there is one, goes before the one below.
+    #[allow(unused_imports)]
+    use mpi_sys::*;
+    OMPI_MAJOR_VERSION > 0
+};
+#[allow(dead_code)]
+const OMPI_MAJOR_VERSION: u32 = 0;
+
 /// Whether MPI has been started in this process.
 pub fn is_running() -> bool {
-    let mut running = 0;
-    // SAFETY: may be called at any time; the pointer is to a local.
-    unsafe { mpi_sys::MPI_Initialized(&mut running) };
-    running != 0
+    mpi::environment::is_initialized()
+}
+
+/// Name and version of the MPI library. MPI need not be started.
+pub fn library() -> String {
+    let text = mpi::environment::library_version().unwrap_or_default();
+    name_and_version(&text)
+}
+
+/// The beginning of what an MPI library says of itself, such as `Open MPI v4.1.4, package: …`.
+fn name_and_version(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    let beginning = line.split(',').next().unwrap_or_default();
+    let words = beginning
+        .split_whitespace()
+        .filter(|word| *word != "Version:");
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// All ranks that `mpirun` started; one rank when started without it.
@@ -257,5 +287,30 @@ impl Communicator for World {
     fn raw(&self) -> Option<RawCommunicator> {
         // SAFETY: a constant of the MPI library.
         Some(unsafe { RSMPI_COMM_WORLD })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn libraries_by_their_names() {
+        for (text, name) in [
+            (
+                "Open MPI v4.1.4, package: Debian OpenMPI, ident: 4.1.4",
+                "Open MPI v4.1.4",
+            ),
+            (
+                "MPICH Version:\t4.0.2\nMPICH Release date:\tThu Apr  7",
+                "MPICH 4.0.2",
+            ),
+            (
+                "Intel(R) MPI Library 2021.8 for Linux* OS\n",
+                "Intel(R) MPI Library 2021.8 for Linux* OS",
+            ),
+        ] {
+            assert_eq!(name_and_version(text), name);
+        }
     }
 }
