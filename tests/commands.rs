@@ -156,6 +156,11 @@ fn the_benchmark_counts_what_it_does() {
             let sent = figure(&json, "halo_bytes_per_step");
             assert_eq!(sent, 8.0 * numbers * figure(&json, "ghosts"), "{json}");
             assert_eq!(sent > 0.0, ranks == 2);
+            let alone = figure(&json, "halo_seconds_per_step_alone");
+            assert_eq!(alone > 0.0, ranks == 2, "{json}");
+            if ranks == 2 {
+                assert!((0.0..=1.0).contains(&figure(&json, "halo_hidden")));
+            }
         }
     }
     let wrong = finish(fissure(1).args(["bench", "--points", "5,4"]));

@@ -190,6 +190,36 @@ fn a_result_is_never_replaced_without_being_asked_to() {
 }
 
 #[test]
+fn a_launcher_of_another_mpi_does_not_run_the_deck_several_times() {
+    let folder = Folder::new("launcher");
+    let deck = folder.write("deck.toml", &bar("end = 3"));
+    let out = folder.join("out");
+    let run = |variables: &[(&str, &str)]| {
+        let mut command = fissure(1);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        command.envs(variables.iter().copied());
+        command
+    };
+    // What the launchers of MPICH and of Slurm set.
+    for (variables, name) in [
+        (&[("PMI_SIZE", "3"), ("PMI_RANK", "0")][..], "PMI_SIZE"),
+        (
+            &[("SLURM_STEP_NUM_TASKS", "3"), ("SLURM_PROCID", "0")],
+            "SLURM_STEP_NUM_TASKS",
+        ),
+    ] {
+        let message = format!("{name} says that 3 ranks were started");
+        failing(&mut run(variables), &message, 2);
+        assert!(!out.exists());
+    }
+    // Only the first rank speaks, and ends no sooner than it has.
+    let other = finish(&mut run(&[("PMI_SIZE", "3"), ("PMI_RANK", "1")]));
+    assert_eq!(other.status.code(), Some(2));
+    assert_eq!(text(&other), "");
+    succeed(&mut run(&[("PMI_SIZE", "1"), ("SLURM_NTASKS", "3")]));
+}
+
+#[test]
 fn wrong_arguments_are_told_once() {
     let mut command = fissure(3);
     command.args(["run", "deck.toml", "--thraeds", "2"]);

@@ -2,6 +2,7 @@
 //! compiled anew for each.
 
 mod commands;
+mod communicator;
 mod crack_branching;
 mod decks;
 mod decomposition;

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
+use fissure::comm::halo::Traffic;
 use fissure::comm::mpi::World;
 use fissure::comm::{self, Communicator, agree};
 use fissure::deck::{self, Source};
@@ -167,6 +168,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     }
     let whole = start.elapsed();
     simulation.check()?;
+    let sent = simulation.forces.halo().sent;
+    let alone = exchange_alone(world, &mut simulation, arguments.steps);
     let after = resident();
 
     let total = |value: u64| comm::total(world, value) as f64;
@@ -182,13 +185,15 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     };
     let times = simulation.times;
     let steps = f64::from(arguments.steps);
-    let sent = simulation.forces.halo().sent;
     let messages = (sent.messages - halo.messages) as f64 / steps;
     let ghosts = simulation.model.volume.len() - simulation.model.owned();
     let points = simulation.model.total;
     let bonds = total(simulation.forces.directed_bonds());
     let bonds_bytes = total(simulation.forces.bytes() as u64);
     let halo_bytes = total(sent.bytes - halo.bytes) / steps;
+    let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
+    // Further passes send fewer numbers than the first, which alone was repeated.
+    let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let phases = vec![
         phase("bonds", times.forces.bonds),
         phase("halo", times.forces.halo),
@@ -242,12 +247,30 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         phases,
         memory,
         halo_bytes,
+        messages_time: mean(sent.time - halo.time),
+        messages_time_alone: mean(alone.time) * as_many,
         messages: total((messages * steps) as u64) / steps,
         most_messages: largest(messages),
         ghosts: total(ghosts as u64),
         most_ghosts: largest(ghosts as f64),
         limits,
     })
+}
+
+/// Sends the messages of a step so many times, with nothing to do meanwhile.
+fn exchange_alone(world: &World, simulation: &mut Simulation<'_, 3>, times: u32) -> Traffic {
+    let before = simulation.forces.halo().sent;
+    world.sum(&mut [0]);
+    for _ in 0..times {
+        let displacement = &mut simulation.state.displacement;
+        simulation.forces.update_ghosts(world, displacement);
+    }
+    let after = simulation.forces.halo().sent;
+    Traffic {
+        messages: after.messages - before.messages,
+        bytes: after.bytes - before.bytes,
+        time: after.time - before.time,
+    }
 }
 
 #[cfg(test)]

@@ -64,6 +64,10 @@ pub struct Figures {
     pub memory: Vec<(&'static str, f64)>,
     /// Sent in a step.
     pub halo_bytes: f64,
+    /// Time that the messages of a step take of a rank beside its work, mean of the ranks, s.
+    pub messages_time: f64,
+    /// Time that they take where there is no work meanwhile, s.
+    pub messages_time_alone: f64,
     /// Messages in a step.
     pub messages: f64,
     /// Those of the rank that sends most.
@@ -85,6 +89,15 @@ impl Figures {
     /// Neighbours visited in a second.
     fn updates(&self) -> f64 {
         self.bonds * self.steps / self.seconds()
+    }
+
+    /// The share of the messages' time that is hidden behind the interior bonds; NaN without messages.
+    /// Ranks that wait for one another may take longer than the messages alone.
+    fn hidden(&self) -> f64 {
+        match self.messages > 0.0 {
+            true => (1.0 - self.messages_time / self.messages_time_alone).max(0.0),
+            false => f64::NAN,
+        }
     }
 
     fn law_name(&self) -> String {
@@ -147,6 +160,15 @@ impl Figures {
             format!("{}   (at most {most} of a rank)", self.messages),
         );
         line("sent", bytes(self.halo_bytes));
+        if self.messages > 0.0 {
+            let took = si(self.messages_time, "s");
+            let alone = si(self.messages_time_alone, "s");
+            let hidden = 100.0 * self.hidden();
+            line(
+                "time",
+                format!("{took}, without work meanwhile {alone}   hidden: {hidden:.0} %"),
+            );
+        }
         let most = count(self.most_ghosts as u64);
         line(
             "ghosts",
@@ -211,6 +233,9 @@ impl Figures {
             number(&format!("memory_{name}_bytes"), *all);
         }
         number("halo_bytes_per_step", self.halo_bytes);
+        number("halo_seconds_per_step", self.messages_time);
+        number("halo_seconds_per_step_alone", self.messages_time_alone);
+        number("halo_hidden", self.hidden());
         number("halo_messages_per_step", self.messages);
         number("halo_messages_per_step_most", self.most_messages);
         number("ghosts", self.ghosts);

@@ -2,9 +2,10 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
+use std::time::Duration;
 
-use fissure::comm::Communicator;
 use fissure::comm::mpi::World;
+use fissure::comm::{self, Communicator};
 use fissure::error::{Error, Result};
 use fissure::run::start_mpi;
 
@@ -12,15 +13,64 @@ use super::{finish, tell};
 
 /// Starts MPI, runs `body` on all ranks, and ends MPI. Its errors must be the same on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
+    // MPI may set such variables for a process that it finds alone.
+    let (started, rank) = (started(), rank_from_environment());
     let world = match start_mpi() {
         Ok(world) => world,
         Err(error) => return finish(Err(error), true),
     };
+    if let Err(error) = joined(started, world.size()) {
+        let speaks = rank.unwrap_or(0) == 0;
+        if !speaks {
+            // The launcher ends all processes as soon as one has failed.
+            std::thread::sleep(TIME_TO_SPEAK);
+        }
+        return finish(Err(error), speaks);
+    }
     let speaks = world.rank() == 0;
     // A panic on one rank would leave the others waiting; its message has been printed.
     catch_unwind(AssertUnwindSafe(|| body(&world)))
         .unwrap_or_else(|_| world.abort(1))
         .unwrap_or_else(|error| finish(Err(error), speaks))
+}
+
+/// How long the other processes of a launcher wait for the first one to print an error.
+const TIME_TO_SPEAK: Duration = Duration::from_secs(1);
+
+/// Where launchers say how many processes they have started, the innermost launcher first.
+const SIZES: [&str; 5] = [
+    "OMPI_COMM_WORLD_SIZE",
+    "MV2_COMM_WORLD_SIZE",
+    "PMI_SIZE",
+    "MPI_LOCALNRANKS",
+    "SLURM_STEP_NUM_TASKS",
+];
+
+/// How many processes the launcher has started, and which variable says so; `None` without a launcher.
+fn started() -> Option<(&'static str, usize)> {
+    SIZES
+        .iter()
+        .find_map(|name| Some((*name, number(&[name])?)))
+}
+
+/// Refuses a launcher that MPI does not know, whose processes would each run alone.
+///
+/// # Errors
+/// MPI sees one rank, and the launcher says that it has started several.
+fn joined(started: Option<(&str, usize)>, ranks: usize) -> Result<()> {
+    match started {
+        Some((name, started)) if ranks == 1 && started > 1 => {
+            let mpi = comm::mpi::library();
+            Err(Error::input(format!(
+                "{name} says that {started} ranks were started, but MPI ({mpi}) sees only this one: \
+                 the launcher is of another MPI\n\
+                 Start with the mpirun of {mpi}, or with srun and the --mpi=… of `srun --mpi=list` \
+                 that it was built for, or build fissure with the launcher's MPI; to run on one \
+                 rank, unset {name}"
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The first of some environment variables that holds a number.

@@ -4,8 +4,9 @@
 //! one contiguous range here.
 
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
-use super::{Communicator, Message};
+use super::{Communicator, During, Message};
 
 /// What is exchanged with one other rank.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +26,9 @@ pub struct Traffic {
     pub messages: u64,
     /// Bytes in them.
     pub bytes: u64,
+    /// Time that they took of the rank: sending, driving them on and waiting, without the work that
+    /// was done meanwhile.
+    pub time: Duration,
 }
 
 /// The plan with its message buffers, all allocated once.
@@ -77,13 +81,27 @@ impl Halo {
         }
     }
 
-    /// Sends what was packed, and calls `during` while the messages are in flight.
-    pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut dyn FnMut()) {
+    /// Sends what was packed, and calls `during` while the messages are in flight; see
+    /// [`Communicator::exchange`].
+    pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut During<'_>) {
+        let start = Instant::now();
+        let mut working = Duration::ZERO;
         self.sent.messages += self.messages.len() as u64;
         for message in &self.messages {
             self.sent.bytes += size_of_val(&message.send[..]) as u64;
         }
-        comm.exchange(&mut self.messages, during);
+        comm.exchange(&mut self.messages, &mut |progress| {
+            let start = Instant::now();
+            let mut driving = Duration::ZERO;
+            during(&mut || {
+                let start = Instant::now();
+                let under_way = progress();
+                driving += start.elapsed();
+                under_way
+            });
+            working += start.elapsed() - driving;
+        });
+        self.sent.time += start.elapsed() - working;
     }
 
     /// Copies what was received to the ghosts: the same arrays, in the same order, as in `pack`.

@@ -31,6 +31,9 @@ pub struct Message {
     pub receive: Vec<f64>,
 }
 
+/// Work that is done while messages are in flight; see [`Communicator::exchange`].
+pub type During<'a> = dyn FnMut(&mut dyn FnMut() -> bool) + 'a;
+
 /// What a rank can ask of the others. Every method is collective: all ranks call it alike.
 pub trait Communicator {
     /// This rank's number, from 0.
@@ -52,7 +55,10 @@ pub trait Communicator {
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
 
     /// Sends and receives all messages, and calls `during` while they are in flight.
-    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut());
+    ///
+    /// Large messages move only while MPI is called: `during` should call its argument now and then,
+    /// which drives them on and returns whether any is still under way.
+    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>);
 
     /// Ends all ranks at once, for when agreement is no longer possible.
     fn abort(&self, code: i32) -> !;

@@ -2,8 +2,9 @@
 //!
 //! Only the thread that made the world may call it (MPI's "funneled" level of thread support).
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
 use std::ffi::c_void;
+use std::marker::PhantomData;
 use std::os::raw::c_int;
 
 use mpi::collective::SystemOperation;
@@ -12,7 +13,7 @@ use mpi::topology::{Communicator as _, SimpleCommunicator};
 use mpi::traits::*;
 use mpi_sys::{MPI_Request, RSMPI_COMM_WORLD};
 
-use super::{Communicator, Message, RawCommunicator};
+use super::{Communicator, During, Message, RawCommunicator};
 use crate::error::{Error, Result};
 
 /// One MPI message holds at most this many bytes: counts are 32-bit.
@@ -20,19 +21,57 @@ const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
 
+// `mpi-sys` is not built anew when another MPI is chosen within one target folder.
+const _: () = assert!(
+    OF_OPEN_MPI == cfg!(open_mpi),
+    "the target folder holds bindings to another MPI: take one folder for each (--target-dir), or \
+     run `cargo clean -p mpi-sys`"
+);
+
+/// Whether the bindings are those of Open MPI.
+const OF_OPEN_MPI: bool = {
+    // Theirs, where there is one, goes before the one below.
+    #[allow(unused_imports)]
+    use mpi_sys::*;
+    OMPI_MAJOR_VERSION > 0
+};
+#[allow(dead_code)]
+const OMPI_MAJOR_VERSION: u32 = 0;
+
 /// Whether MPI has been started in this process.
 pub fn is_running() -> bool {
-    let mut running = 0;
-    // SAFETY: may be called at any time; the pointer is to a local.
-    unsafe { mpi_sys::MPI_Initialized(&mut running) };
-    running != 0
+    mpi::environment::is_initialized()
+}
+
+/// Name and version of the MPI library. MPI need not be started.
+pub fn library() -> String {
+    let text = mpi::environment::library_version().unwrap_or_default();
+    name_and_version(&text)
+}
+
+/// The beginning of what an MPI library says of itself, such as `Open MPI v4.1.4, package: …`.
+fn name_and_version(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    let beginning = line.split(',').next().unwrap_or_default();
+    let words = beginning
+        .split_whitespace()
+        .filter(|word| *word != "Version:");
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// All ranks that `mpirun` started; one rank when started without it.
+///
+/// It stays on the thread that made it, whatever the MPI library's handles are:
+///
+/// ```compile_fail,E0277
+/// fn move_to_a_thread<T: Send>() {}
+/// move_to_a_thread::<fissure::comm::mpi::World>();
+/// ```
 pub struct World {
     world: SimpleCommunicator,
     /// Kept so that an exchange in the time loop allocates nothing.
-    requests: RefCell<Requests>,
+    requests: RefCell<Vec<MPI_Request>>,
+    _stays: PhantomData<*const ()>,
     // Dropped last: it calls MPI_Finalize.
     _universe: Universe,
 }
@@ -53,8 +92,14 @@ impl World {
         Ok(Self {
             world: universe.world(),
             requests: RefCell::default(),
+            _stays: PhantomData,
             _universe: universe,
         })
+    }
+
+    /// For new messages; those of before have arrived.
+    fn in_flight(&self) -> InFlight<'_> {
+        InFlight(self.requests.borrow_mut())
     }
 
     /// The number of hosts that the ranks run on.
@@ -82,17 +127,21 @@ impl World {
     }
 }
 
-/// Non-blocking sends and receives of byte ranges, completed together.
-#[derive(Default)]
-struct Requests(Vec<MPI_Request>);
+/// Messages under way. Dropping it waits for all of them, also while a panic unwinds, so that no
+/// buffer is freed that MPI still reads or writes.
+struct InFlight<'a>(RefMut<'a, Vec<MPI_Request>>);
 
-impl Requests {
+impl InFlight<'_> {
+    /// Begins to send.
+    ///
     /// # Safety
-    /// The bytes must stay in place until `wait`.
+    /// The bytes must stay in place and unchanged until `self` is dropped, and it must be dropped.
     unsafe fn send(&mut self, bytes: &[u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks(LARGEST_MESSAGE) {
-            let mut request = unsafe { mpi_sys::RSMPI_REQUEST_NULL };
-            unsafe {
+            // SAFETY: the chunk is valid for as long as the caller promises, and its length fits a
+            // C integer. MPI ends the job where the rank or the call is wrong.
+            self.0.push(unsafe {
+                let mut request = mpi_sys::RSMPI_REQUEST_NULL;
                 mpi_sys::MPI_Isend(
                     chunk.as_ptr().cast::<c_void>(),
                     chunk.len() as c_int,
@@ -102,17 +151,21 @@ impl Requests {
                     RSMPI_COMM_WORLD,
                     &mut request,
                 );
-            }
-            self.0.push(request);
+                request
+            });
         }
     }
 
+    /// Begins to receive.
+    ///
     /// # Safety
-    /// The bytes must stay in place, and nobody may read them, until `wait`.
+    /// The bytes must stay in place, and nobody else may touch them, until `self` is dropped, and it
+    /// must be dropped.
     unsafe fn receive(&mut self, bytes: &mut [u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks_mut(LARGEST_MESSAGE) {
-            let mut request = unsafe { mpi_sys::RSMPI_REQUEST_NULL };
-            unsafe {
+            // SAFETY: as for sending. A message longer than the chunk ends the job.
+            self.0.push(unsafe {
+                let mut request = mpi_sys::RSMPI_REQUEST_NULL;
                 mpi_sys::MPI_Irecv(
                     chunk.as_mut_ptr().cast::<c_void>(),
                     chunk.len() as c_int,
@@ -122,14 +175,34 @@ impl Requests {
                     RSMPI_COMM_WORLD,
                     &mut request,
                 );
-            }
-            self.0.push(request);
+                request
+            });
         }
     }
 
-    fn wait(&mut self) {
-        for request in &mut self.0 {
-            unsafe { mpi_sys::MPI_Wait(request, mpi_sys::RSMPI_STATUS_IGNORE) };
+    /// Moves what can be moved now; returns whether any message is still under way.
+    fn advance(&mut self) -> bool {
+        let count = self.0.len() as c_int;
+        let mut arrived = 0;
+        // SAFETY: these are as many requests, each made by MPI; those that are completed are null.
+        unsafe {
+            mpi_sys::MPI_Testall(
+                count,
+                self.0.as_mut_ptr(),
+                &mut arrived,
+                mpi_sys::RSMPI_STATUSES_IGNORE,
+            );
+        }
+        arrived == 0
+    }
+}
+
+impl Drop for InFlight<'_> {
+    fn drop(&mut self) {
+        let count = self.0.len() as c_int;
+        // SAFETY: these are as many requests, each made by MPI; those that are completed are null.
+        unsafe {
+            mpi_sys::MPI_Waitall(count, self.0.as_mut_ptr(), mpi_sys::RSMPI_STATUSES_IGNORE);
         }
         self.0.clear();
     }
@@ -167,6 +240,7 @@ impl Communicator for World {
     }
 
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        assert_eq!(outgoing.len(), self.size(), "one message for each rank");
         let sizes: Vec<u64> = outgoing.iter().map(|bytes| bytes.len() as u64).collect();
         let mut incoming_sizes = vec![0_u64; self.size()];
         self.world
@@ -175,29 +249,35 @@ impl Communicator for World {
             .iter()
             .map(|size| vec![0; *size as usize])
             .collect();
-        let mut requests = self.requests.borrow_mut();
+        let mut in_flight = self.in_flight();
         for (rank, bytes) in incoming.iter_mut().enumerate() {
-            unsafe { requests.receive(bytes, rank, SET_UP_TAG) };
+            // SAFETY: `incoming` outlives `in_flight` and is not touched meanwhile.
+            unsafe { in_flight.receive(bytes, rank, SET_UP_TAG) };
         }
         for (rank, bytes) in outgoing.iter().enumerate() {
-            unsafe { requests.send(bytes, rank, SET_UP_TAG) };
+            // SAFETY: `outgoing` outlives `in_flight` and is not changed meanwhile.
+            unsafe { in_flight.send(bytes, rank, SET_UP_TAG) };
         }
-        requests.wait();
+        drop(in_flight);
         incoming
     }
 
-    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut()) {
-        let mut requests = self.requests.borrow_mut();
+    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>) {
+        let mut in_flight = self.in_flight();
         for message in messages.iter_mut() {
             let bytes = bytemuck::cast_slice_mut(&mut message.receive);
-            unsafe { requests.receive(bytes, message.rank, HALO_TAG) };
+            // SAFETY: `messages` outlives `in_flight`; nobody but this function can reach it, and
+            // it leaves the buffers alone.
+            unsafe { in_flight.receive(bytes, message.rank, HALO_TAG) };
         }
         for message in messages.iter() {
             let bytes = bytemuck::cast_slice(&message.send);
-            unsafe { requests.send(bytes, message.rank, HALO_TAG) };
+            // SAFETY: as above.
+            unsafe { in_flight.send(bytes, message.rank, HALO_TAG) };
         }
-        during();
-        requests.wait();
+        during(&mut || in_flight.advance());
+        // Waits, here and where `during` panics.
+        drop(in_flight);
     }
 
     fn abort(&self, code: i32) -> ! {
@@ -205,6 +285,32 @@ impl Communicator for World {
     }
 
     fn raw(&self) -> Option<RawCommunicator> {
+        // SAFETY: a constant of the MPI library.
         Some(unsafe { RSMPI_COMM_WORLD })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn libraries_by_their_names() {
+        for (text, name) in [
+            (
+                "Open MPI v4.1.4, package: Debian OpenMPI, ident: 4.1.4",
+                "Open MPI v4.1.4",
+            ),
+            (
+                "MPICH Version:\t4.0.2\nMPICH Release date:\tThu Apr  7",
+                "MPICH 4.0.2",
+            ),
+            (
+                "Intel(R) MPI Library 2021.8 for Linux* OS\n",
+                "Intel(R) MPI Library 2021.8 for Linux* OS",
+            ),
+        ] {
+            assert_eq!(name_and_version(text), name);
+        }
     }
 }

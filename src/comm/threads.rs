@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Barrier, Mutex};
 
-use super::{Communicator, Message, RawCommunicator};
+use super::{Communicator, During, Message, RawCommunicator};
 
 /// What the ranks share: a barrier and, per pair of ranks, a slot for one message.
 struct Shared {
@@ -122,12 +122,14 @@ impl Communicator for ThreadRank {
         incoming
     }
 
-    fn exchange(&self, messages: &mut [Message], during: &mut dyn FnMut()) {
+    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>) {
         let mut outgoing = vec![Vec::new(); self.size];
         for message in messages.iter() {
             outgoing[message.rank] = bytemuck::cast_slice(&message.send).to_vec();
         }
-        during();
+        // Messages move when all ranks have done their work.
+        let under_way = !messages.is_empty();
+        during(&mut || under_way);
         let incoming = self.all_to_all(outgoing);
         for message in messages {
             let values: Vec<f64> = bytemuck::pod_collect_to_vec(&incoming[message.rank]);

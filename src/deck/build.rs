@@ -5,7 +5,7 @@ use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
     Action, Body, CheckpointRule, Condition, CriticalStretch, FamilyRule, History, Initial,
-    Interface, InterfaceRule, Interval, Law, Material, Output, Plan, PointSource, Quadrature,
+    Interface, InterfaceRule, Interval, Law, Material, Output, Plan, Places, PointSource, Quadrature,
     Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
 };
 use super::source::Source;
@@ -21,6 +21,7 @@ impl Plan {
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
             source: Source::default(),
+            places: Places::default(),
             title: String::new(),
             dimension,
             horizon,
@@ -85,6 +86,7 @@ impl Plan {
             material,
             damage,
             horizon: self.horizon,
+            horizon_place: 0..0,
             points: PointSource::Lattice {
                 shape,
                 spacing: edges,

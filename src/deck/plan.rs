@@ -53,7 +53,7 @@ pub struct Plan {
 }
 
 /// Where values stand in the deck whose mistakes only the points show.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Places {
     /// The horizon of the grid.
     pub horizon: Range<usize>,

@@ -235,7 +235,7 @@ impl<'a> CollectiveFile<'a> {
     ///
     /// # Errors
     /// The dataset has no such rows or numbers of another type, or it cannot be read.
-    pub fn read_rows<T: hdf5::H5Type + Clone + Default>(
+    pub fn read_rows<T: hdf5::H5Type + bytemuck::Pod>(
         &mut self,
         dataset: &Dataset,
         first_row: u64,
@@ -245,7 +245,7 @@ impl<'a> CollectiveFile<'a> {
             if first_row + count as u64 > dataset.rows {
                 return Err("it has too few rows".into());
             }
-            let mut values = vec![T::default(); count * dataset.columns.unwrap_or(1)];
+            let mut values = vec![T::zeroed(); count * dataset.columns.unwrap_or(1)];
             file.transfer.read(&dataset.inner, first_row, &mut values)?;
             Ok(values)
         })

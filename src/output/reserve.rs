@@ -78,8 +78,9 @@ fn allocate(file: &File, from: u64, length: u64) -> io::Result<()> {
 }
 
 fn compare(file: &File, additional: u64) -> io::Result<()> {
-    // SAFETY: the structure is plain numbers, for which zeros are valid, and lives through the call.
+    // SAFETY: the structure is plain numbers, for which zeros are valid.
     let mut disc: libc::statvfs = unsafe { std::mem::zeroed() };
+    // SAFETY: the descriptor is open, and the structure lives through the call.
     if unsafe { libc::fstatvfs(file.as_raw_fd(), &mut disc) } != 0 {
         return Err(io::Error::last_os_error());
     }

@@ -48,7 +48,7 @@ impl Transfer {
         })?;
         if collective {
             let mode = h5p::H5FD_mpio_xfer_t::H5FD_MPIO_COLLECTIVE;
-            // SAFETY: the list is alive.
+            // SAFETY: a call by value, which checks the handle.
             sync(|| hdf5::h5check(unsafe { h5p::H5Pset_dxpl_mpio(list.id(), mode) }))?;
         }
         Ok(Self {
@@ -68,7 +68,7 @@ impl Transfer {
         let selection = Selection::new(dataset, first_row, values.len())?;
         let number = hdf5::Datatype::from_type::<T>()?;
         sync(|| {
-            // SAFETY: all handles are alive, and the selection has as many elements as `values`.
+            // SAFETY: all handles are alive, and the selection has no more elements than `values`.
             unsafe {
                 hdf5::h5check(h5d::H5Dwrite(
                     dataset.id(),
@@ -85,7 +85,7 @@ impl Transfer {
 
     /// Reads whole rows from `first_row` on into `values`, none where that is empty. Returns the
     /// causes that kept the transfer from being collective.
-    pub(super) fn read<T: hdf5::H5Type>(
+    pub(super) fn read<T: hdf5::H5Type + bytemuck::Pod>(
         &self,
         dataset: &hdf5::Dataset,
         first_row: u64,
@@ -94,7 +94,8 @@ impl Transfer {
         let selection = Selection::new(dataset, first_row, values.len())?;
         let number = hdf5::Datatype::from_type::<T>()?;
         sync(|| {
-            // SAFETY: all handles are alive, and the selection has as many elements as `values`.
+            // SAFETY: all handles are alive, the selection has no more elements than `values`, and
+            // these may hold any bits.
             unsafe {
                 hdf5::h5check(h5d::H5Dread(
                     dataset.id(),
@@ -114,7 +115,7 @@ impl Transfer {
         let (mut local, mut global) = (0, 0);
         if self.collective {
             let list = self.list.id();
-            // SAFETY: the list is alive, and the pointers are to locals.
+            // SAFETY: the handle is checked, and the pointers are to locals.
             hdf5::h5check(unsafe {
                 H5Pget_mpio_no_collective_cause(list, &mut local, &mut global)
             })?;

@@ -122,7 +122,7 @@ mod tests {
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);
                 domain.halo.pack([&ids[..]].into_iter());
-                domain.halo.exchange(comm, &mut || {});
+                domain.halo.exchange(comm, &mut |_| {});
                 domain.halo.unpack([&mut ids[..]].into_iter());
                 (domain, ids)
             });

@@ -1,5 +1,6 @@
 //! Running the `fissure` command, alone and under mpirun.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -44,8 +45,30 @@ pub fn fissure(ranks: usize) -> Command {
     if ranks == 1 {
         return Command::new(binary);
     }
+    under_mpirun(ranks, binary)
+}
+
+/// Set for the ranks of a test that uses MPI itself.
+const RANK_OF_A_TEST: &str = "FISSURE_RANK_OF_A_TEST";
+
+/// Whether this process is a rank of a test that uses MPI itself. Where it is not, runs that test,
+/// named in full, on so many ranks; it must pass on all of them.
+pub fn is_rank(ranks: usize, test: &str) -> bool {
+    if std::env::var_os(RANK_OF_A_TEST).is_some() {
+        return true;
+    }
+    let mut command = under_mpirun(ranks, std::env::current_exe().unwrap());
+    command.args([test, "--exact", "--nocapture"]);
+    let printed = succeed(command.env(RANK_OF_A_TEST, "yes"));
+    let passed = printed.matches("1 passed").count();
+    assert_eq!(passed, ranks, "{printed}");
+    false
+}
+
+fn under_mpirun(ranks: usize, program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new("mpirun");
-    command.args(["--bind-to", "none", "-n", &ranks.to_string(), binary]);
+    command.args(["--bind-to", "none", "-n", &ranks.to_string()]);
+    command.arg(program);
     command.envs([
         ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
         ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),

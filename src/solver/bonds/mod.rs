@@ -45,6 +45,10 @@ pub use interaction::{BlockLaws, Interaction};
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
+/// Interior points for each thread that are worked on before messages are driven on again: some tenths
+/// of a millisecond in space.
+const PIECE: usize = 4096;
+
 /// One sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
@@ -201,7 +205,7 @@ impl<const D: usize> Forces<D> {
         let Self { numbers, halo, .. } = self;
         let read = &mut numbers.columns[..numbers.read];
         halo.pack(read.iter().map(Vec::as_slice));
-        halo.exchange(comm, &mut || {});
+        halo.exchange(comm, &mut |_| {});
         halo.unpack(read.iter_mut().map(Vec::as_mut_slice));
         for grid in &mut self.grids {
             grid.update_numbers(Which::All, 0, &self.numbers.columns);
@@ -314,7 +318,7 @@ impl<const D: usize> Forces<D> {
     /// brought from their owners.
     pub fn protect(&mut self, comm: &dyn Communicator, protected: &mut [f64]) {
         self.halo.pack([&*protected].into_iter());
-        self.halo.exchange(comm, &mut || {});
+        self.halo.exchange(comm, &mut |_| {});
         self.halo.unpack([&mut *protected].into_iter());
         for interaction in &mut self.interactions {
             interaction.bonds.protect(|point| protected[point] == 1.0);
@@ -337,6 +341,7 @@ impl<const D: usize> Forces<D> {
             freed,
         } = acting;
         let owned = model.owned();
+        let piece = PIECE * rayon::current_num_threads();
         let start = Instant::now();
         let mut in_bonds = Duration::ZERO;
         for component in force.iter_mut() {
@@ -360,21 +365,26 @@ impl<const D: usize> Forces<D> {
                 News::Nothing => {}
             }
             self.clear(stage, owned);
-            let mut work = |forces: &mut Self,
-                            displacement: &[Vec<f64>; D],
-                            which: Which,
-                            points: Range<usize>| {
+            let mut timed = |work: &mut dyn FnMut()| {
                 let start = Instant::now();
-                forces.update(news, which, model, displacement);
-                forces.run(stage, points, force, freed, evolution);
+                work();
                 in_bonds += start.elapsed();
             };
-            if news != News::Nothing {
-                halo.exchange(comm, &mut || {
-                    work(self, displacement, Which::Owned, 0..model.interior);
-                });
+            let mut interior = |progress: &mut dyn FnMut() -> bool| {
+                timed(&mut || self.update(news, Which::Owned, model, displacement));
+                let mut rest = 0..model.interior;
+                // Once all messages have arrived the rest is done in one piece.
+                while rest.len() > piece && progress() {
+                    let next = rest.start + piece;
+                    timed(&mut || self.run(stage, rest.start..next, force, freed, evolution));
+                    rest.start = next;
+                }
+                timed(&mut || self.run(stage, rest.clone(), force, freed, evolution));
+            };
+            if news == News::Nothing {
+                interior(&mut || false);
             } else {
-                work(self, displacement, Which::Owned, 0..model.interior);
+                halo.exchange(comm, &mut interior);
             }
             match news {
                 News::Displacement => {
@@ -388,8 +398,9 @@ impl<const D: usize> Forces<D> {
                 News::Nothing => {}
             }
             self.halo = halo;
-            work(self, displacement, Which::Ghosts, model.interior..owned);
             let start = Instant::now();
+            self.update(news, Which::Ghosts, model, displacement);
+            self.run(stage, model.interior..owned, force, freed, evolution);
             self.finish(stage, model, freed);
             in_bonds += start.elapsed();
         }

@@ -1,0 +1,30 @@
+//! Before the crate is compiled: are its MPI and that of HDF5 the same?
+
+mod one_mpi;
+
+fn main() {
+    println!("cargo::rerun-if-changed=build");
+    for name in [
+        "MPICC",
+        "MPI_PKG_CONFIG",
+        "CRAY_MPICH_DIR",
+        "HDF5_DIR",
+        "PKG_CONFIG_PATH",
+        "PATH",
+    ] {
+        println!("cargo::rerun-if-env-changed={name}");
+    }
+    println!("cargo::rustc-check-cfg=cfg(open_mpi)");
+    match one_mpi::check() {
+        Ok(mpi) => {
+            if mpi.is_open_mpi {
+                println!("cargo::rustc-cfg=open_mpi");
+            }
+        }
+        Err(message) => {
+            for line in message.lines() {
+                println!("cargo::error={line}");
+            }
+        }
+    }
+}

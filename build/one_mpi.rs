@@ -1,0 +1,143 @@
+//! Refuses an HDF5 that was built with another MPI than the one that is linked: the program would have
+//! both and die at its start.
+//!
+//! `mpi-sys` and `hdf5-metno-sys` each find their library by themselves; this looks where they look, and
+//! compares the names under which the two ask the loader for MPI.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The MPI that is linked.
+pub struct Mpi {
+    /// Whether it is Open MPI; its bindings differ from those of MPICH and its relatives.
+    pub is_open_mpi: bool,
+}
+
+/// Finds MPI and HDF5.
+///
+/// # Errors
+/// HDF5 wants another MPI; what to do about it.
+pub fn check() -> Result<Mpi, String> {
+    let mpi = build_probe_mpi::probe().map_err(|errors| {
+        let reasons: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        format!("no MPI was found: {}", reasons.join("; "))
+    })?;
+    let folders = mpi.include_paths.iter().map(PathBuf::as_path);
+    let header = folders
+        .chain([Path::new("/usr/include")])
+        .find_map(|folder| std::fs::read_to_string(folder.join("mpi.h")).ok());
+    let is_open_mpi = header.is_some_and(|text| text.contains("OMPI_MAJOR_VERSION"));
+    let linked: Vec<String> = (mpi.libs.iter())
+        .filter(|name| name.starts_with("mpi"))
+        .filter_map(|name| loader_name(name, &mpi.lib_paths))
+        .collect();
+    let Some(hdf5) = hdf5_library() else {
+        return Ok(Mpi { is_open_mpi });
+    };
+    let wanted: Vec<String> = (wanted_libraries(&hdf5).into_iter())
+        .filter(|name| name.starts_with("libmpi"))
+        .collect();
+    // Either is empty where the library is a static one or the tools that read it are not there.
+    if linked.is_empty() || wanted.is_empty() || wanted.iter().any(|name| linked.contains(name)) {
+        return Ok(Mpi { is_open_mpi });
+    }
+    let compiler = mpi.mpicc.as_deref().unwrap_or("pkg-config");
+    Err(format!(
+        "HDF5 and MPI do not fit: {} was built for {}, but `{compiler}` links {}\n\
+         set HDF5_DIR to an HDF5 that was built with this MPI{}, or MPICC to the compiler wrapper of \
+         the MPI that HDF5 was built with",
+        hdf5.display(),
+        wanted.join(", "),
+        linked.join(", "),
+        example(&linked)
+    ))
+}
+
+/// Where Debian and its kin keep the HDF5 of this MPI, if it is installed.
+fn example(linked: &[String]) -> String {
+    let family = match linked.iter().any(|name| name.starts_with("libmpich")) {
+        true => "mpich",
+        false => "openmpi",
+    };
+    let machine = std::env::consts::ARCH;
+    let folder = format!("/usr/lib/{machine}-linux-gnu/hdf5/{family}");
+    match Path::new(&folder).exists() {
+        true => format!(" (HDF5_DIR={folder})"),
+        false => String::new(),
+    }
+}
+
+/// The shared library that `hdf5-metno-sys` links, if it can be told.
+fn hdf5_library() -> Option<PathBuf> {
+    let own = std::env::var_os("HDF5_DIR").map(|root| vec![PathBuf::from(root).join("lib")]);
+    let folders = own.or_else(|| {
+        let mut configuration = pkg_config::Config::new();
+        let found = configuration.cargo_metadata(false).probe("hdf5").ok()?;
+        Some(found.link_paths)
+    });
+    let mut folders = folders.unwrap_or_default();
+    // Set by the build of `hdf5-metno-sys`.
+    if let Some(include) = std::env::var_os("DEP_HDF5_INCLUDE") {
+        folders.extend(Path::new(&include).parent().map(|root| root.join("lib")));
+    }
+    let files = folders
+        .iter()
+        .flat_map(|folder| ["libhdf5.so", "libhdf5.dylib"].map(|name| folder.join(name)));
+    files.into_iter().find(|file| file.exists())
+}
+
+/// The name under which a program that is linked with `-l NAME` asks for the library.
+fn loader_name(name: &str, folders: &[PathBuf]) -> Option<String> {
+    let system = ["/usr/lib64", "/usr/lib"].map(PathBuf::from);
+    let files = folders.iter().chain(&system);
+    let mut files = files.flat_map(|folder| {
+        ["so", "dylib"].map(|ending| folder.join(format!("lib{name}.{ending}")))
+    });
+    let file = files.find(|file| file.exists())?;
+    if file.extension().is_some_and(|ending| ending == "dylib") {
+        let lines = printed("otool", &["-D"], &file)?;
+        return Some(base_name(lines.lines().nth(1)?));
+    }
+    entries(&file, "SONAME").into_iter().next()
+}
+
+/// The names of the libraries that a shared library asks for.
+fn wanted_libraries(file: &Path) -> Vec<String> {
+    if file.extension().is_some_and(|ending| ending == "dylib") {
+        let lines = printed("otool", &["-L"], file).unwrap_or_default();
+        let names = lines
+            .lines()
+            .skip(1)
+            .filter_map(|line| line.split_whitespace().next());
+        return names.map(base_name).collect();
+    }
+    entries(file, "NEEDED")
+}
+
+/// The values of one kind in the dynamic section of an ELF file.
+fn entries(file: &Path, kind: &str) -> Vec<String> {
+    let lines = printed("readelf", &["-d", "-W"], file).unwrap_or_default();
+    let value = |line: &str| {
+        let (_, rest) = line.split_once('[')?;
+        Some(rest.split_once(']')?.0.to_owned())
+    };
+    let kind = format!("({kind})");
+    let lines = lines.lines().filter(|line| line.contains(&kind));
+    lines.filter_map(value).collect()
+}
+
+fn base_name(path: &str) -> String {
+    path.rsplit('/').next().unwrap_or(path).to_owned()
+}
+
+/// What a program prints about a file, in English; `None` if there is no such program.
+fn printed(program: &str, options: &[&str], file: &Path) -> Option<String> {
+    let mut command = Command::new(program);
+    let output = command
+        .args(options)
+        .arg(file)
+        .env("LC_ALL", "C")
+        .output()
+        .ok()?;
+    Some(String::from_utf8_lossy(&output.stdout).into_owned())
+}
