@@ -93,7 +93,7 @@ fn interior_bonds_in_pieces_give_the_same_bits() {
                 let model = &simulation.model;
                 assert!(ranks == 1 || model.interior > 4096);
                 let bits = |point: usize| {
-                    let motion = &simulation.state.displacement;
+                    let motion = &simulation.fields.displacement;
                     (model.ids[point], [0, 1].map(|d| motion[d][point].to_bits()))
                 };
                 (0..model.owned()).map(bits).collect::<Vec<_>>()

@@ -262,7 +262,7 @@ fn exchange_alone(world: &World, simulation: &mut Simulation<'_, 3>, times: u32)
     let before = simulation.forces.halo().sent;
     world.sum(&mut [0]);
     for _ in 0..times {
-        let displacement = &mut simulation.state.displacement;
+        let displacement = &mut simulation.fields.displacement;
         simulation.forces.update_ghosts(world, displacement);
     }
     let after = simulation.forces.halo().sent;
