@@ -1,6 +1,8 @@
-//! When a bond breaks, decided by the same operations from both ends.
+//! When a bond breaks, decided by the same operations from both ends: stretches are compared by x of
+//! [`crate::material::bond`], which needs no root.
 
-use crate::lanes::{Arithmetic, Lanes};
+use crate::lanes::{Lanes, Simd};
+use crate::material::bond::{NEAR, growth_of};
 use crate::material::{Bond, Law};
 
 /// When the bonds between two blocks break.
@@ -33,10 +35,21 @@ impl Criterion {
         matches!(self, Self::Thresholds(_))
     }
 
+    /// The |x| of [`crate::material::bond`] beyond which bonds must be marked; none below breaks.
+    #[inline(always)]
+    pub fn limit(self) -> f64 {
+        match self {
+            // What equals the limit is not beyond it.
+            Self::Stretch(critical) => NEAR.min(growth_of(critical).next_down()),
+            Self::Never | Self::Thresholds(_) => NEAR,
+        }
+    }
+
     /// A bit for each bond that breaks.
     #[inline(always)]
-    pub fn met<A: Arithmetic, L: Law<D>, const D: usize>(
+    pub fn met<S: Simd, L: Law<D>, const D: usize>(
         self,
+        simd: S,
         bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
     ) -> u8 {
@@ -46,8 +59,12 @@ impl Criterion {
         };
         let threshold = match self {
             Self::Never => return 0,
+            // A bond that breaks is marked.
+            Self::Stretch(_) if !L::SCALED && bond.marked == 0 => return 0,
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) => Lanes::splat(critical),
+            Self::Stretch(critical) => {
+                return simd.at_least(bond.growth, Lanes::splat(growth_of(critical)));
+            }
             Self::Thresholds(critical) => {
                 let [mut here, mut there] = *ends.thresholds;
                 if L::SCALED {
@@ -58,6 +75,7 @@ impl Criterion {
                 here.min(there)
             }
         };
-        A::at_least(bond.stretch, threshold)
+        let threshold = threshold * (Lanes::splat(2.0) + threshold);
+        simd.at_least(bond.growth, threshold)
     }
 }

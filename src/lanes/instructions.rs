@@ -1,32 +1,34 @@
 //! Which vector instructions the loops over bonds use: the best that all ranks have, found at run
 //! time.
 //!
-//! Between two kinds results differ in the last bits, see [`super::arithmetic`]; between
-//! ranks they never do.
+//! All kinds that round products and sums once give the same bits, see [`super::simd`]. A machine
+//! without them is the exception; between the ranks of a run there is never a difference.
 
 use crate::comm::{self, Communicator, agree};
 use crate::error::{Error, Result};
 
-/// Sets of vector instructions, each with all that come before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+use super::simd::Portable;
+#[cfg(target_arch = "x86_64")]
+use super::simd::{Avx2, Avx512};
+
+/// Sets of vector instructions that this machine has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Instructions {
     /// Those that the program was built for.
     Baseline,
     /// AVX2 with fused multiplication and addition.
-    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
     /// AVX-512.
-    Avx512,
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
 }
 
-/// The environment variable that names the most to use: for machines of several kinds that are to
-/// come to the same bits.
+/// The environment variable that names the most to use, for tests.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
-const ALL: [Instructions; 3] = [
-    Instructions::Baseline,
-    Instructions::Avx2,
-    Instructions::Avx512,
-];
+/// Names of the sets in the order of what they can.
+const NAMES: [&str; 3] = ["baseline", "AVX2", "AVX-512"];
 
 impl Instructions {
     /// The best that all ranks have, or the most that [`VARIABLE`] allows; collective.
@@ -35,89 +37,62 @@ impl Instructions {
     /// When the variable names none; the same on all ranks.
     pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
         let allowed = match std::env::var(VARIABLE) {
-            Ok(name) if !name.is_empty() => Self::named(&name),
-            _ => Ok(Self::Avx512),
+            Ok(name) if !name.is_empty() => named(&name),
+            _ => Ok(NAMES.len() - 1),
         };
-        let own = Self::of_this_machine().min(agree(comm, allowed)?);
-        let mut level = [f64::from(own as u8)];
+        let allowed = agree(comm, allowed)?;
+        let own = Self::up_to(allowed);
+        let mut level = [own.level() as f64];
         comm::min(comm, &mut level);
-        let best = ALL[level[0] as usize];
-        if best < Self::Avx512 {
-            return Ok(best);
-        }
-        // Makers are free in the estimates that roots start from.
-        let estimates = estimates_of_roots();
-        let mut extremes = [estimates, -estimates];
-        comm.max(&mut extremes);
-        Ok(match extremes[0] == -extremes[1] {
-            true => Self::Avx512,
-            false => Self::Avx2,
-        })
+        Ok(Self::up_to(level[0] as usize))
     }
 
-    fn named(name: &str) -> Result<Self> {
-        let short = |instructions: Self| instructions.name().replace('-', "").to_lowercase();
-        let wanted = name.replace('-', "").to_lowercase();
-        let found = ALL.into_iter().find(|known| short(*known) == wanted);
-        found.ok_or_else(|| {
-            let known = ALL.map(short).join(", ");
-            Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
-        })
-    }
-
-    /// Its name, as a summary shows it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Baseline => "baseline",
-            Self::Avx2 => "AVX2",
-            Self::Avx512 => "AVX-512",
-        }
-    }
-
+    /// The best of this machine up to a level.
     #[cfg(target_arch = "x86_64")]
-    fn of_this_machine() -> Self {
-        let avx2 = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("fma");
-        let avx512 = is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl")
-            && is_x86_feature_detected!("avx512bw");
-        match (avx2, avx512) {
-            (true, true) => Self::Avx512,
-            (true, false) => Self::Avx2,
+    fn up_to(level: usize) -> Self {
+        match (Avx512::detect(), Avx2::detect()) {
+            (Some(avx512), _) if level >= 2 => Self::Avx512(avx512),
+            (_, Some(avx2)) if level >= 1 => Self::Avx2(avx2),
             _ => Self::Baseline,
         }
     }
 
+    /// The best of this machine.
     #[cfg(not(target_arch = "x86_64"))]
-    fn of_this_machine() -> Self {
+    fn up_to(_: usize) -> Self {
         Self::Baseline
+    }
+
+    fn level(self) -> usize {
+        match self {
+            Self::Baseline => 0,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => 1,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => 2,
+        }
+    }
+
+    /// Its name, as a summary shows it.
+    pub fn name(self) -> &'static str {
+        NAMES[self.level()]
+    }
+
+    /// Whether products and sums are rounded once, so that results have the bits of all other
+    /// machines that do so.
+    pub fn are_fused(self) -> bool {
+        self.level() > 0 || Portable::FUSED
     }
 }
 
-/// A number that is the same only where AVX-512 gives the same estimates of 1/√a; only on machines
-/// that have it.
-fn estimates_of_roots() -> f64 {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use crate::lanes::Lanes;
-        use crate::lanes::arithmetic::estimate_of_inverse_sqrt;
-        let mut hash = 0_u64;
-        for k in 0..2048 {
-            let a = Lanes(std::array::from_fn(|lane| {
-                1.0 + f64::from(8 * k + lane as u32) * (3.0 / 16384.0)
-            }));
-            // SAFETY: the machine has AVX-512.
-            let estimates = unsafe { estimate_of_inverse_sqrt(a) };
-            for estimate in estimates.0 {
-                hash = (hash ^ estimate.to_bits()).wrapping_mul(0x0000_0100_0000_01b3);
-            }
-        }
-        (hash >> 12) as f64
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    0.0
+/// The level of a name.
+fn named(name: &str) -> Result<usize> {
+    let short = |name: &str| name.replace('-', "").to_lowercase();
+    let found = NAMES.iter().position(|known| short(known) == short(name));
+    found.ok_or_else(|| {
+        let known = NAMES.map(short).join(", ");
+        Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
+    })
 }
 
 #[cfg(test)]
@@ -126,16 +101,10 @@ mod tests {
 
     #[test]
     fn names_of_the_variable() {
-        assert_eq!(Instructions::named("avx512").unwrap(), Instructions::Avx512);
-        assert_eq!(
-            Instructions::named("AVX-512").unwrap(),
-            Instructions::Avx512
-        );
-        assert_eq!(
-            Instructions::named("baseline").unwrap(),
-            Instructions::Baseline
-        );
-        let error = Instructions::named("sse").unwrap_err();
+        assert_eq!(named("avx512").unwrap(), 2);
+        assert_eq!(named("AVX-512").unwrap(), 2);
+        assert_eq!(named("baseline").unwrap(), 0);
+        let error = named("sse").unwrap_err();
         assert!(error.message.contains("baseline, avx2, avx512"), "{error}");
     }
 }

@@ -1,15 +1,15 @@
 //! Eight numbers that are worked on together: the same quantity of eight bonds.
 //!
 //! Plain arrays and IEEE operations without contraction: whatever instructions the compiler picks,
-//! the bits are the same. Operations of which this does not hold are in [`arithmetic`].
+//! the bits are the same. Operations of which this does not hold are in [`simd`].
 
-pub mod arithmetic;
 pub mod instructions;
 pub mod numbers;
+pub mod simd;
 
-pub use arithmetic::Arithmetic;
 pub use instructions::Instructions;
 pub use numbers::Numbers;
+pub use simd::Simd;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
@@ -70,30 +70,6 @@ impl Lanes {
     #[inline(always)]
     pub fn abs(self) -> Self {
         self.map(f64::abs)
-    }
-
-    /// The lanes whose bit is set; `otherwise` in the others.
-    #[inline(always)]
-    pub fn select(self, bits: u8, otherwise: f64) -> Self {
-        let mut result = self;
-        for k in 0..WIDTH {
-            result.0[k] = if bits >> k & 1 == 1 {
-                self.0[k]
-            } else {
-                otherwise
-            };
-        }
-        result
-    }
-
-    /// A bit for each lane that is at least as large as the other's.
-    #[inline(always)]
-    pub fn at_least(self, other: Self) -> u8 {
-        let mut bits = 0;
-        for k in 0..WIDTH {
-            bits |= u8::from(self.0[k] >= other.0[k]) << k;
-        }
-        bits
     }
 
     /// A bit for each lane that is larger than a number.

@@ -56,8 +56,12 @@ impl<const N: usize> Numbers for [Lanes; N] {
     type ColumnsMut<'a> = [&'a mut [f64]; N];
 
     #[inline(always)]
-    fn each(value: impl FnMut(usize) -> Lanes) -> Self {
-        std::array::from_fn(value)
+    fn each(mut value: impl FnMut(usize) -> Lanes) -> Self {
+        let mut all = [Lanes::splat(0.0); N];
+        for (k, lanes) in all.iter_mut().enumerate() {
+            *lanes = value(k);
+        }
+        all
     }
 
     #[inline(always)]

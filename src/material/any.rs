@@ -176,6 +176,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     const HOT: bool = false;
     const STAGES: usize = MOST.stages;
     const OWN_NUMBERS: usize = MOST.own;
+    const FORCE_READS_STRETCH: bool = true;
     const SCALED: bool = true;
 
     #[inline(always)]

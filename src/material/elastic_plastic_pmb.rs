@@ -32,6 +32,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     type WholeSum = [Lanes; 0];
     type Sum = [Lanes; 0];
     type Force = Along;
+    const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]
     fn memory(&self, bond: &Bond<D>, _: &[Lanes; 0], before: &[Lanes; 2]) -> [Lanes; 2] {
@@ -44,7 +45,9 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], [plastic, _]: &[Lanes; 2]) -> Along {
-        Along((bond.stretch - *plastic) * (0.5 * self.elastic.micromodulus))
+        // s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
+        let elastic = bond.shortening - *plastic * (Lanes::splat(1.0) - bond.shortening);
+        Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))
     }
 
     #[inline(always)]

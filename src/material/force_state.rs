@@ -2,9 +2,9 @@
 //! bond.
 
 use super::Bond;
-use crate::lanes::{Arithmetic, Lanes};
+use crate::lanes::{Lanes, Simd};
 
-/// The force state of one end of eight bonds, N/m⁶.
+/// The force state of one end of eight bonds.
 pub trait ForceState<const D: usize>: Copy {
     /// Times a number for each bond.
     fn times(self, factor: Lanes) -> Self;
@@ -13,7 +13,7 @@ pub trait ForceState<const D: usize>: Copy {
     fn plus(self, other: Self) -> Self;
 
     /// Adds the force density (N/m³) of the bonds whose bit is set to the sums.
-    fn add<A: Arithmetic>(self, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]);
+    fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]);
 
     /// A component of T⊗Y, of the part that does not turn the bond.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
@@ -22,7 +22,7 @@ pub trait ForceState<const D: usize>: Copy {
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
 }
 
-/// Along Y, or along ξ for linear laws; positive pulls the ends together.
+/// T = t Y with t in N/m⁷, or t ξ for linear laws; positive pulls the ends together.
 #[derive(Debug, Clone, Copy)]
 pub struct Along(pub Lanes);
 
@@ -38,26 +38,25 @@ impl<const D: usize> ForceState<D> for Along {
     }
 
     #[inline(always)]
-    fn add<A: Arithmetic>(self, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]) {
-        let strength = A::select(self.0 * volume * bond.inverse_length, bits, 0.0);
+    fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]) {
+        let strength = simd.keep(self.0 * volume, bits);
         for d in 0..D {
-            sums[d] = A::multiply_add(strength, bond.along[d], sums[d]);
+            sums[d] = simd.multiply_add(strength, bond.along[d], sums[d]);
         }
     }
 
     #[inline(always)]
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes {
-        self.0 * bond.inverse_length * bond.along[a] * bond.along[b]
+        self.0 * bond.along[a] * bond.along[b]
     }
 
     #[inline(always)]
     fn vector(self, bond: &Bond<D>) -> [Lanes; D] {
-        let strength = self.0 * bond.inverse_length;
-        std::array::from_fn(|d| strength * bond.along[d])
+        bond.along.map(|component| self.0 * component)
     }
 }
 
-/// In any direction.
+/// In any direction, N/m⁶.
 impl<const D: usize> ForceState<D> for [Lanes; D] {
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
@@ -70,9 +69,9 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
     }
 
     #[inline(always)]
-    fn add<A: Arithmetic>(self, _: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]) {
+    fn add<S: Simd>(self, simd: S, _: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]) {
         for d in 0..D {
-            sums[d] += A::select(self[d] * volume, bits, 0.0);
+            sums[d] += simd.keep(self[d] * volume, bits);
         }
     }
 

@@ -33,6 +33,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     type Sum = [Lanes; 0];
     type Force = Along;
     const CONSTANTS: usize = 1;
+    const FORCE_READS_STRETCH: bool = true;
     const LINEAR: bool = true;
 
     #[inline(always)]
@@ -50,7 +51,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, [factor]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
-        Along(bond.stretch * *factor * (0.5 * self.micromodulus))
+        Along(bond.stretch * *factor * (bond.inverse * (0.5 * self.micromodulus)))
     }
 
     #[inline(always)]

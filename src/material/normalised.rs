@@ -49,7 +49,7 @@ impl<const D: usize> Law<D> for Normalised {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
-        Along(bond.stretch * *inverse * (2.0 * self.energy))
+        Along(bond.shortening * *inverse * (bond.inverse * (2.0 * self.energy)))
     }
 
     #[inline(always)]

@@ -16,10 +16,11 @@
 //! W = ½ κθ² + ½ (A/m) Σ ω ε² Ṽ, of which t is the derivative with bonds broken as well: m is that of
 //! the whole family, θ sums over intact bonds.
 
+use super::bond::Weights;
 use super::{Along, Bond, Described, Law};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Simd};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +85,7 @@ impl Described for Ordinary {
 }
 
 impl<const D: usize> Law<D> for Ordinary {
-    /// 1/m, 1/m⁵; d κ θ/m, N/m⁷.
+    /// A/m and d κ θ/m, N/m⁷.
     type Point = [Lanes; 2];
     type Memory = [Lanes; 0];
     /// m = Σ ω|ξ|²Ṽ, m⁵.
@@ -103,7 +104,11 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
-        numbers[0] = if sums[0] > 0.0 { 1.0 / sums[0] } else { 0.0 };
+        numbers[0] = if sums[0] > 0.0 {
+            self.extensional / sums[0]
+        } else {
+            0.0
+        };
     }
 
     #[inline(always)]
@@ -113,20 +118,36 @@ impl<const D: usize> Law<D> for Ordinary {
 
     #[inline(always)]
     fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64]) {
-        let dilatation = self.dimension * sums[0] * numbers[0];
-        numbers[1] = self.dimension * self.volumetric * dilatation * numbers[0];
+        let share = self.dimension * numbers[0] / self.extensional;
+        let dilatation = share * sums[0];
+        numbers[1] = share * self.volumetric * dilatation;
         numbers[2] = dilatation;
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, [inverse, push]: &[Lanes; 2], _: &[Lanes; 0]) -> Along {
-        Along(bond.length * (*push + bond.stretch * *inverse * self.extensional))
+    fn force(&self, bond: &Bond<D>, [pull, push]: &[Lanes; 2], _: &[Lanes; 0]) -> Along {
+        // |ξ|/|Y| = 1 − P and |ξ| s/|Y| = P.
+        Along(*push + bond.shortening * (*pull - *push))
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond<D>, [inverse, _]: &[Lanes; 2], _: &[Lanes; 0]) -> Lanes {
+    fn bond_force<S: Simd>(
+        simd: S,
+        _: &[Self; 2],
+        bond: &Bond<D>,
+        [here, there]: &[[Lanes; 2]; 2],
+        _: &[[Lanes; 0]; 2],
+        weights: Weights,
+    ) -> Along {
+        let pull = weights.sum(here[0], there[0]);
+        let push = weights.sum(here[1], there[1]);
+        Along(simd.multiply_add(bond.shortening, pull - push, push))
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, [pull, _]: &[Lanes; 2], _: &[Lanes; 0]) -> Lanes {
         let extension = bond.length * bond.stretch;
-        extension * extension * *inverse * (0.5 * self.extensional)
+        extension * extension * *pull * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -135,8 +156,8 @@ impl<const D: usize> Law<D> for Ordinary {
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, [inverse, _]: &[Lanes; 2]) -> Lanes {
+    fn stiffness(&self, _: Lanes, [pull, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;
-        *inverse * (self.extensional + square * self.volumetric.max(0.0))
+        *pull * (1.0 + square * self.volumetric.max(0.0) / self.extensional)
     }
 }

@@ -6,9 +6,10 @@
 
 use std::f64::consts::PI;
 
+use super::bond::Weights;
 use super::{Along, Bond, Described, Law};
 use crate::dimension::Dimension;
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Simd};
 
 /// The law with its only constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +63,20 @@ impl<const D: usize> Law<D> for Pmb {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 0]) -> Along {
-        Along(bond.stretch * (0.5 * self.micromodulus))
+        Along(bond.shortening * (bond.inverse * (0.5 * self.micromodulus)))
+    }
+
+    #[inline(always)]
+    fn bond_force<S: Simd>(
+        _: S,
+        laws: &[Self; 2],
+        bond: &Bond<D>,
+        _: &[[Lanes; 0]; 2],
+        _: &[[Lanes; 0]; 2],
+        weights: Weights,
+    ) -> Along {
+        let [here, there] = laws.map(|law| Lanes::splat(0.5 * law.micromodulus));
+        Along(bond.shortening * (bond.inverse * weights.sum(here, there)))
     }
 
     #[inline(always)]

@@ -1,10 +1,11 @@
 //! The sum of the bond forces, and the breaking of bonds where it needs no force states.
 
 use crate::damage::{Criterion, Ends};
-use crate::lanes::{Arithmetic, Lanes, Numbers};
+use crate::lanes::{Lanes, Numbers, Simd};
+use crate::material::bond::Wanted;
 use crate::material::{ForceState, Law};
 
-use super::kernel::{Group, Kernel, Weights};
+use super::kernel::{Group, Kernel};
 
 /// What happens to bonds while forces are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,13 +16,15 @@ pub enum Evolution {
     None,
 }
 
-/// Breaks the intact bonds that must; returns which, and their energy at the own end (J).
+/// Breaks the intact bonds that must, and adds their energy at the own end (J); returns which.
 #[inline(always)]
-pub fn break_bonds<A: Arithmetic, L: Law<D>, K, const D: usize>(
+pub fn break_bonds<S: Simd, L: Law<D>, K, const D: usize>(
+    simd: S,
     laws: &[L; 2],
     criterion: Criterion,
     group: &mut Group<K, D>,
-) -> (u8, Lanes)
+    freed: &mut Lanes,
+) -> u8
 where
     K: Kernel<D, Point = L::Point, Memory = L::Memory>,
 {
@@ -30,16 +33,22 @@ where
         points: &group.points,
         thresholds: &group.thresholds,
     };
-    let broken = group.intact & criterion.met::<A, L, D>(&group.bond, ends);
+    let broken = group.intact & criterion.met::<S, L, D>(simd, &group.bond, ends);
     if broken == 0 {
-        return (0, Lanes::splat(0.0));
+        return 0;
     }
     let broken = broken & group.breakable;
     group.intact &= !broken;
-    let energy = laws[0].bond_energy(&group.bond, &group.points[0], &group.memory[0]);
-    let energy = energy * group.volume;
-    let energy = energy * group.weights.own() * group.own_volume;
-    (broken, A::select(energy, broken, 0.0))
+    // Copies, so that a loop need not keep them where they can be pointed to.
+    let (bond, own, memory) = (group.bond, group.points[0], group.memory[0]);
+    let (volume, share) = (group.volume, group.weights.own() * group.own_volume);
+    let law = laws[0];
+    simd.aside(move || {
+        let bond = bond.with_stretch(L::LINEAR);
+        let energy = law.bond_energy(&bond, &own, &memory) * volume;
+        *freed += simd.keep(energy * share, broken);
+    });
+    broken
 }
 
 /// Sums the forces of bonds, of which some may break before: force density by component (N/m³), then
@@ -55,11 +64,21 @@ pub struct Force<L> {
 }
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
-    type Sums = ([Lanes; D], [Lanes; 1]);
+    type Sums = [Lanes; D];
+    type Rare = [Lanes; 1];
     type Point = L::Point;
     type Memory = L::Memory;
     const HOT: bool = L::HOT;
-    const LINEAR: bool = L::LINEAR;
+    const WANTED: Wanted = Wanted {
+        linear: L::LINEAR,
+        stretch: L::FORCE_READS_STRETCH,
+        shortening: true,
+    };
+
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.criterion.limit()
+    }
 
     #[inline(always)]
     fn reads_thresholds(&self) -> bool {
@@ -72,12 +91,14 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     }
 
     #[inline(always)]
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut Self::Sums) {
-        let (force, [freed]) = sums;
-        let (broken, energy) = break_bonds::<A, L, Self, D>(&self.laws, self.criterion, group);
-        if broken != 0 {
-            *freed += energy;
-        }
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        force: &mut [Lanes; D],
+        [freed]: &mut [Lanes; 1],
+    ) {
+        break_bonds::<S, L, Self, D>(simd, &self.laws, self.criterion, group, freed);
         let [own, far] = &self.laws;
         let [here, there] = &group.points;
         if L::Memory::COUNT > 0 {
@@ -86,13 +107,15 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
                 far.memory(&group.bond, there, &group.memory[1]),
             ];
         }
-        let pull = own.force(&group.bond, here, &group.memory[0]);
-        let push = far.force(&group.bond, there, &group.memory[1]);
-        let total = match group.weights {
-            Weights::One => pull.plus(push),
-            Weights::Same(weight) => pull.plus(push).times(weight),
-            Weights::Each([own, far]) => pull.times(own).plus(push.times(far)),
-        };
-        total.add::<A>(&group.bond, group.volume, group.intact, force);
+        let (bond, weights) = (&group.bond, group.weights);
+        let total = L::bond_force(
+            simd,
+            &self.laws,
+            bond,
+            &group.points,
+            &group.memory,
+            weights,
+        );
+        total.add(simd, bond, group.volume, group.intact, force);
     }
 }

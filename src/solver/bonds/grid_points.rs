@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::families::{Adjacent, Grid, Offset, Which};
 use crate::lanes::numbers::eight;
-use crate::lanes::{Arithmetic, Lanes, Numbers};
-use crate::material::bond::{Reference, deform};
+use crate::lanes::{Lanes, Numbers, Simd};
+use crate::material::bond::{Reference, Weights, deform};
 
-use super::kernel::{Group, Kernel, Weights};
+use super::kernel::{Group, Kernel};
 use super::list_points::load_memory;
 
 /// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
@@ -66,6 +66,7 @@ pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     numbers: <K::Point as Numbers>::Columns<'a>,
     thresholds: &'a [f64],
     with_thresholds: bool,
+    limit: f64,
     /// Of the own and the far ends, m³.
     volumes: [Lanes; 2],
 }
@@ -106,6 +107,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             numbers,
             thresholds: &values.thresholds,
             with_thresholds,
+            limit: kernel.limit(),
             volumes: volumes.map(Lanes::splat),
         }
     }
@@ -116,6 +118,18 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     unsafe fn numbers(&self, place: usize) -> K::Point {
         // SAFETY: `new` has checked the length.
         K::Point::each(|k| unsafe { eight(K::Point::column(&self.numbers, k), place) })
+    }
+
+    /// # Safety
+    /// As for [`Self::numbers`].
+    #[inline(always)]
+    unsafe fn far_numbers(&self, place: usize) -> K::Point {
+        if K::READS_FAR {
+            // SAFETY: passed on to the caller.
+            unsafe { self.numbers(place) }
+        } else {
+            K::Point::splat(0.0)
+        }
     }
 
     /// # Safety
@@ -151,8 +165,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// The vector must be one of the grid, the offset one of its.
     #[inline(always)]
-    pub unsafe fn load<A: Arithmetic>(
+    pub unsafe fn load<S: Simd>(
         &self,
+        simd: S,
         here: &Here<K::Point, D>,
         vector: &mut Adjacent<'_>,
         o: usize,
@@ -163,19 +178,18 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         let (displacement, numbers, threshold) = unsafe {
             let component = |d| eight(self.displacement[d], far);
             let displacement: [Lanes; D] = std::array::from_fn(component);
-            (displacement, self.numbers(far), self.thresholds(far))
+            (displacement, self.far_numbers(far), self.thresholds(far))
         };
         let eta = std::array::from_fn(|d| displacement[d] - here.displacement[d]);
         let reference = Reference {
             along: std::array::from_fn(|d| Lanes::splat(offset.reference[d])),
-            square: Lanes::splat(offset.square),
             length: Lanes::splat(offset.length),
             inverse: Lanes::splat(offset.inverse),
             inverse_square: Lanes::splat(offset.inverse_square),
         };
-        let memory = vector.groups.numbers(o);
+        let intact = vector.groups.intact[o];
         Group {
-            bond: deform::<A, D>(&reference, eta, K::LINEAR),
+            bond: deform(simd, &reference, eta, intact, self.limit, K::WANTED),
             own_volume: self.volumes[0],
             volume: self.volumes[1],
             weights: match vector.weighted {
@@ -185,8 +199,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             },
             points: [here.numbers, numbers],
             thresholds: [here.threshold, threshold],
-            memory: load_memory::<K::Memory>(memory),
-            intact: vector.groups.intact[o],
+            memory: load_memory::<K::Memory>(&mut vector.groups, o),
+            intact,
             whole: 0,
             breakable: vector.groups.breakable.map_or(u8::MAX, |bits| bits[o]),
         }

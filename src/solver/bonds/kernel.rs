@@ -3,39 +3,9 @@
 //! A kernel sees eight bonds at a time and adds to eight sums. It is written once for any dimension,
 //! law and storage: the bonds may be those of one point or those of eight.
 
-use crate::lanes::{Arithmetic, Lanes, Numbers};
+use crate::lanes::{Lanes, Numbers, Simd};
 use crate::material::Bond;
-
-/// The influence and the share of the volume that a bond has in the sums of its two ends.
-#[derive(Debug, Clone, Copy)]
-pub enum Weights {
-    /// 1.
-    One,
-    /// The same at both ends.
-    Same(Lanes),
-    /// Those of the own and of the far end.
-    Each([Lanes; 2]),
-}
-
-impl Weights {
-    /// That of the own end.
-    #[inline(always)]
-    pub fn own(self) -> Lanes {
-        match self {
-            Self::One => Lanes::splat(1.0),
-            Self::Same(own) | Self::Each([own, _]) => own,
-        }
-    }
-
-    /// That of the far end.
-    #[inline(always)]
-    pub fn far(self) -> Lanes {
-        match self {
-            Self::One => Lanes::splat(1.0),
-            Self::Same(far) | Self::Each([_, far]) => far,
-        }
-    }
-}
+use crate::material::bond::{NEAR, Wanted, Weights};
 
 /// Eight bonds: what is read of both ends, and what is kept of the bonds.
 pub struct Group<K: Kernel<D> + ?Sized, const D: usize> {
@@ -96,6 +66,10 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Eight sums of each quantity; each is added to a column of numbers of the points.
     type Sums: Numbers;
 
+    /// As [`Self::Sums`], of quantities to which few bonds add: these may be pointed to, and a loop need
+    /// not keep them in registers.
+    type Rare: Numbers;
+
     /// The numbers of the ends that it reads.
     type Point: Numbers;
 
@@ -111,8 +85,17 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether it wants to know of broken bonds.
     const WHOLE: bool = false;
 
-    /// Whether it takes what is linear in η.
-    const LINEAR: bool;
+    /// Whether it reads the numbers of the far ends; else they are 0.
+    const READS_FAR: bool = true;
+
+    /// What it wants to know of deformed bonds.
+    const WANTED: Wanted;
+
+    /// The |x| beyond which bonds are marked, see [`Bond::marked`].
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        NEAR
+    }
 
     /// Whether it reads the thresholds of the ends.
     #[inline(always)]
@@ -133,5 +116,11 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     }
 
     /// Adds eight bonds; may break them and change what they keep.
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut Self::Sums);
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        sums: &mut Self::Sums,
+        rare: &mut Self::Rare,
+    );
 }

@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::families::Row;
+use crate::families::{Groups, Row};
 use crate::lanes::numbers::gather;
-use crate::lanes::{Arithmetic, Lanes, Numbers, WIDTH};
-use crate::material::bond::{Reference, deform};
+use crate::lanes::{Lanes, Numbers, Simd, WIDTH};
+use crate::material::bond::{Reference, Weights, deform};
 use crate::solver::model::Model;
 
-use super::kernel::{Group, Kernel, Weights};
+use super::kernel::{Group, Kernel};
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
@@ -61,6 +61,7 @@ pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     numbers: <K::Point as Numbers>::Columns<'a>,
     thresholds: &'a [f64],
     with_thresholds: bool,
+    limit: f64,
 }
 
 impl<K: Kernel<D>, const D: usize> Clone for ListPoints<'_, K, D> {
@@ -107,6 +108,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             numbers,
             thresholds,
             with_thresholds,
+            limit: kernel.limit(),
         }
     }
 
@@ -116,6 +118,18 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     unsafe fn numbers(&self, indices: &[u32; 8]) -> K::Point {
         // SAFETY: `new` has checked the length.
         K::Point::each(|k| unsafe { gather(K::Point::column(&self.numbers, k), indices) })
+    }
+
+    /// # Safety
+    /// The indices must be below the reach.
+    #[inline(always)]
+    unsafe fn far_numbers(&self, indices: &[u32; 8]) -> K::Point {
+        if K::READS_FAR {
+            // SAFETY: passed on to the caller.
+            unsafe { self.numbers(indices) }
+        } else {
+            K::Point::splat(0.0)
+        }
     }
 
     /// # Safety
@@ -160,8 +174,9 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// # Safety
     /// The row must be one of a list with this reach.
     #[inline(always)]
-    pub unsafe fn load<A: Arithmetic>(
+    pub unsafe fn load<S: Simd>(
         &self,
+        simd: S,
         here: &Here<K::Point, D>,
         row: &mut Row<'_>,
         group: usize,
@@ -170,27 +185,27 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         debug_assert!(neighbours.iter().all(|n| (*n as usize) < self.nodes.len()));
         // SAFETY: `new` has checked the length.
         let node = |k: usize| unsafe { &self.nodes.get_unchecked(neighbours[k] as usize).0 };
-        let columns = A::transpose(std::array::from_fn(node));
+        let columns = simd.transpose(std::array::from_fn(node));
         let along: [Lanes; D] = std::array::from_fn(|d| columns[d] - here.reference[d]);
         let eta = std::array::from_fn(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
         let mut square = along[0] * along[0];
         for xi in &along[1..] {
-            square = A::multiply_add(*xi, *xi, square);
+            square = simd.multiply_add(*xi, *xi, square);
         }
-        let inverse = A::inverse_sqrt(square);
+        let length = square.sqrt();
+        let inverse = Lanes::splat(1.0) / length;
         let reference = Reference {
             along,
-            square,
-            length: square * inverse,
+            length,
             inverse,
             inverse_square: inverse * inverse,
         };
         // SAFETY: as above.
         let (numbers, threshold) =
-            unsafe { (self.numbers(neighbours), self.thresholds(neighbours)) };
-        let memory = row.groups.numbers(group);
+            unsafe { (self.far_numbers(neighbours), self.thresholds(neighbours)) };
+        let intact = row.groups.intact[group];
         Group {
-            bond: deform::<A, D>(&reference, eta, K::LINEAR),
+            bond: deform(simd, &reference, eta, intact, self.limit, K::WANTED),
             own_volume: here.volume,
             volume: columns[VOLUME],
             weights: match row.weights {
@@ -200,17 +215,21 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             },
             points: [here.numbers, numbers],
             thresholds: [here.threshold, threshold],
-            memory: load_memory::<K::Memory>(memory),
+            memory: load_memory::<K::Memory>(&mut row.groups, group),
             whole: if K::WHOLE { row.whole(group) } else { 0 },
-            intact: row.groups.intact[group],
+            intact,
             breakable: row.groups.breakable.map_or(u8::MAX, |bits| bits[group]),
         }
     }
 }
 
-/// What bonds keep for their own and their far ends.
+/// What bonds of a group keep for their own and their far ends.
 #[inline(always)]
-pub fn load_memory<M: Numbers>(all: &[Lanes]) -> [M; 2] {
+pub fn load_memory<M: Numbers>(groups: &mut Groups<'_>, group: usize) -> [M; 2] {
+    if M::COUNT == 0 {
+        return [M::splat(0.0); 2];
+    }
+    let all = groups.numbers(group);
     [M::each(|k| all[k]), M::each(|k| all[M::COUNT + k])]
 }
 

@@ -1,9 +1,19 @@
 //! What is summed over bonds at set-up and for output: volume, energy, stiffness, stress, dilatation.
 
-use crate::lanes::{Arithmetic, Lanes, Numbers};
+use crate::lanes::{Lanes, Numbers, Simd};
+use crate::material::bond::Wanted;
 use crate::material::{ForceState, Law};
 
 use super::kernel::{Group, Kernel};
+
+/// All of the bonds: these loops are not those of every step.
+const fn wanted(linear: bool) -> Wanted {
+    Wanted {
+        linear,
+        stretch: true,
+        shortening: true,
+    }
+}
 
 /// Sums what the intact bonds of a point hold: strain energy density (J/m³) that belongs to single
 /// bonds, volume of the neighbours in the point's own family (m³), and the number of neighbours,
@@ -17,23 +27,29 @@ pub struct Stored<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Sums = [Lanes; 4];
+    type Rare = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
-    const HOT: bool = L::HOT;
     const WHOLE: bool = L::Memory::COUNT > 0;
-    const LINEAR: bool = L::LINEAR;
+    const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 4]) {
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        sums: &mut [Lanes; 4],
+        _: &mut [Lanes; 0],
+    ) {
         let (family, own) = (group.family(), &group.points[0]);
         let memory = self.law.memory(&group.bond, own, &group.memory[0]);
         let energy = self.law.bond_energy(&group.bond, own, &memory);
-        sums[0] += A::select(group.own_share(energy), family, 0.0);
-        sums[1] += A::select(group.volume, family, 0.0);
-        sums[2] += A::select(Lanes::splat(1.0), group.intact, 0.0);
+        sums[0] += simd.keep(group.own_share(energy), family);
+        sums[1] += simd.keep(group.volume, family);
+        sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
         if L::Memory::COUNT > 0 {
             let dissipated = self.law.dissipated(group.bond.length, &group.memory[0]);
-            sums[3] += A::select(group.own_share(dissipated), group.whole, 0.0);
+            sums[3] += simd.keep(group.own_share(dissipated), group.whole);
         }
     }
 }
@@ -44,13 +60,20 @@ pub struct FamilyVolume;
 
 impl<const D: usize> Kernel<D> for FamilyVolume {
     type Sums = [Lanes; 1];
+    type Rare = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
-    const LINEAR: bool = true;
+    const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, [sum]: &mut [Lanes; 1]) {
-        *sum += A::select(group.volume, group.family(), 0.0);
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        [sum]: &mut [Lanes; 1],
+        _: &mut [Lanes; 0],
+    ) {
+        *sum += simd.keep(group.volume, group.family());
     }
 }
 
@@ -59,14 +82,15 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 
 
 /// Adds the entries of a symmetric tensor of the intact bonds.
 #[inline(always)]
-fn add_tensor<A: Arithmetic, const D: usize>(
+fn add_tensor<S: Simd, const D: usize>(
+    simd: S,
     sums: &mut [Lanes; 6],
     intact: u8,
     entry: impl Fn(usize, usize) -> Lanes,
 ) {
     for (sum, (a, b)) in sums.iter_mut().zip(PAIRS) {
         if a < D && b < D {
-            *sum += A::select(entry(a, b), intact, 0.0);
+            *sum += simd.keep(entry(a, b), intact);
         }
     }
 }
@@ -81,18 +105,25 @@ pub struct Stiffness<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     type Sums = [Lanes; 6];
+    type Rare = [Lanes; 0];
     type Point = L::Point;
     type Memory = [Lanes; 0];
-    const LINEAR: bool = L::LINEAR;
+    const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 6]) {
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        sums: &mut [Lanes; 6],
+        _: &mut [Lanes; 0],
+    ) {
         let length = group.bond.length;
         let own = self.laws[0].stiffness(length, &group.points[0]) * group.weights.own();
         let far = self.laws[1].stiffness(length, &group.points[1]) * group.weights.far();
         let weight = (own + far) * group.volume / (length * length);
         let xi = &group.bond.reference;
-        add_tensor::<A, D>(sums, group.intact, |a, b| weight * xi[a] * xi[b]);
+        add_tensor::<S, D>(simd, sums, group.intact, |a, b| weight * xi[a] * xi[b]);
     }
 }
 
@@ -109,17 +140,26 @@ pub struct Stress<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     type Sums = [Lanes; 6];
+    type Rare = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
-    const LINEAR: bool = L::LINEAR;
+    const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 6]) {
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        sums: &mut [Lanes; 6],
+        _: &mut [Lanes; 0],
+    ) {
         let own = &group.points[0];
         let memory = self.law.memory(&group.bond, own, &group.memory[0]);
         let force = self.law.force(&group.bond, own, &memory);
         let force = force.times(group.weights.own()).times(group.volume);
-        add_tensor::<A, D>(sums, group.intact, |a, b| force.dyad(&group.bond, a, b));
+        add_tensor::<S, D>(simd, sums, group.intact, |a, b| {
+            force.dyad(&group.bond, a, b)
+        });
     }
 }
 
@@ -130,17 +170,24 @@ pub struct Dilatation<const LINEAR: bool>;
 
 impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
     type Sums = [Lanes; 2];
+    type Rare = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const WHOLE: bool = true;
-    const LINEAR: bool = LINEAR;
+    const WANTED: Wanted = wanted(LINEAR);
 
     #[inline(always)]
-    fn add<A: Arithmetic>(&self, group: &mut Group<Self, D>, sums: &mut [Lanes; 2]) {
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        sums: &mut [Lanes; 2],
+        _: &mut [Lanes; 0],
+    ) {
         let length = group.bond.length;
         let weight = length * length * group.volume * group.weights.own();
         let growth = weight * group.bond.stretch;
-        sums[0] += A::select(weight, group.whole, 0.0);
-        sums[1] += A::select(growth, group.intact, 0.0);
+        sums[0] += simd.keep(weight, group.whole);
+        sums[1] += simd.keep(growth, group.intact);
     }
 }

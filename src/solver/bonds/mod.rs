@@ -29,6 +29,7 @@ use crate::damage::Criterion;
 use crate::error::Result;
 use crate::families::{BlockBonds, Grid, Which};
 use crate::lanes::{Instructions, Lanes, Numbers};
+use crate::material::bond::stretch_of;
 use crate::material::{Law, PairLaw, with_pair};
 
 use super::model::Model;
@@ -318,7 +319,8 @@ impl<const D: usize> Forces<D> {
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         self.halo.pack(displacement.iter().map(Vec::as_slice));
         self.halo.exchange(comm, &mut |_| {});
-        self.halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
+        self.halo
+            .unpack(displacement.iter_mut().map(Vec::as_mut_slice));
     }
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
@@ -482,7 +484,7 @@ impl<const D: usize> Forces<D> {
                 // Taken out while it is written.
                 let mut thresholds = [std::mem::take(&mut self.thresholds)];
                 self.for_each_interaction(|interaction, source| {
-                    let results = <[Lanes; 1]>::columns_mut(&mut thresholds);
+                    let results = <([Lanes; 1], [Lanes; 0])>::columns_mut(&mut thresholds);
                     let bonds = &mut interaction.bonds;
                     sweep(bonds, points.clone(), results, &SmallestStretch, source);
                 });
@@ -525,7 +527,7 @@ impl<const D: usize> Forces<D> {
                     *value = match blocks[usize::from(*block)].damage {
                         // A point without intact bonds has no smallest stretch.
                         Some(law) if value.is_infinite() => law.critical,
-                        Some(law) => law.threshold(*value),
+                        Some(law) => law.threshold(stretch_of(*value)),
                         None => f64::INFINITY,
                     };
                 });
@@ -657,8 +659,8 @@ fn sum_stage<L: Law<D>, const D: usize>(
     let half = sums.len() / 2;
     let (left, lost) = sums.split_at_mut(half);
     let results = (
-        (L::Sum::columns_mut(left), L::Sum::columns_mut(lost)),
-        [freed],
+        L::Sum::columns_mut(left),
+        (L::Sum::columns_mut(lost), [freed]),
     );
     // No law has more stages, and no loop is compiled for those that a law does not have.
     match number {
@@ -678,7 +680,8 @@ fn sweep_all<K: Kernel<D>, const D: usize>(
     source: Source<'_, D>,
 ) {
     let owned = sums.first().map_or(0, Vec::len);
-    sweep(bonds, 0..owned, K::Sums::columns_mut(sums), kernel, source);
+    let results = <(K::Sums, K::Rare)>::columns_mut(sums);
+    sweep(bonds, 0..owned, results, kernel, source);
 }
 
 /// Where each point's bytes start, and how many there are in all.

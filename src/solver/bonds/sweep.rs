@@ -6,7 +6,10 @@
 use std::ops::Range;
 
 use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
-use crate::lanes::{Arithmetic, Instructions, Lanes, Numbers, WIDTH, arithmetic};
+use crate::lanes::simd::Portable;
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::simd::{Avx2, Avx512};
+use crate::lanes::{Instructions, Lanes, Numbers, Simd, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
 use super::kernel::{Combine, Kernel};
@@ -31,7 +34,8 @@ pub struct Source<'a, const D: usize> {
 }
 
 /// The columns of numbers of the points that a kernel adds to.
-type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as Numbers>::ColumnsMut<'a>;
+type Results<'a, K, const D: usize> =
+    <(<K as Kernel<D>>::Sums, <K as Kernel<D>>::Rare) as Numbers>::ColumnsMut<'a>;
 
 /// Part of the bonds of two blocks.
 trait Part: Sized + Send {
@@ -50,8 +54,9 @@ trait Runner<P: Part>: Sync {
     type Sums: Numbers;
 
     /// Goes through a part; `base` is the local index of the first entry of the results.
-    fn run<A: Arithmetic>(
+    fn run<S: Simd>(
         &self,
+        simd: S,
         part: P,
         base: usize,
         results: <Self::Sums as Numbers>::ColumnsMut<'_>,
@@ -146,40 +151,49 @@ fn run<P: Part, R: Runner<P>>(
     runner: &R,
     instructions: Instructions,
 ) {
-    #[cfg(target_arch = "x86_64")]
-    if R::HOT {
-        match instructions {
-            // SAFETY: the machine has the instructions.
-            Instructions::Avx512 => return unsafe { run_avx512(part, base, results, runner) },
-            // SAFETY: as above.
-            Instructions::Avx2 => return unsafe { run_avx2(part, base, results, runner) },
-            Instructions::Baseline => {}
+    match instructions {
+        // Without AVX-512 it is not much slower, and has the same bits.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512(simd) if R::HOT => {
+            // SAFETY: the machine has the instructions, as `simd` shows.
+            unsafe { run_avx512(simd, part, base, results, runner) }
         }
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512(simd) => {
+            // SAFETY: as above; AVX-512 has all of AVX2.
+            unsafe { run_avx2(simd.avx2(), part, base, results, runner) }
+        }
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2(simd) => {
+            // SAFETY: as above.
+            unsafe { run_avx2(simd, part, base, results, runner) }
+        }
+        Instructions::Baseline => runner.run(Portable, part, base, results),
     }
-    let _ = instructions;
-    runner.run::<arithmetic::Plain>(part, base, results);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,bmi2,fma")]
 fn run_avx512<P: Part, R: Runner<P>>(
+    simd: Avx512,
     part: P,
     base: usize,
     results: <R::Sums as Numbers>::ColumnsMut<'_>,
     runner: &R,
 ) {
-    runner.run::<arithmetic::Wide>(part, base, results);
+    runner.run(simd, part, base, results);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi2,fma")]
 fn run_avx2<P: Part, R: Runner<P>>(
+    simd: Avx2,
     part: P,
     base: usize,
     results: <R::Sums as Numbers>::ColumnsMut<'_>,
     runner: &R,
 ) {
-    runner.run::<arithmetic::Fused>(part, base, results);
+    runner.run(simd, part, base, results);
 }
 
 impl Part for Rows<'_> {
@@ -224,27 +238,29 @@ struct OverRows<'a, K: Kernel<D>, const D: usize> {
 }
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
-    type Sums = K::Sums;
+    type Sums = (K::Sums, K::Rare);
     const HOT: bool = K::HOT;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(
+    fn run<S: Simd>(
         &self,
+        simd: S,
         mut rows: Rows<'b>,
         base: usize,
-        mut results: <K::Sums as Numbers>::ColumnsMut<'_>,
+        mut results: Results<'_, K, D>,
     ) {
         let (kernel, points) = (*self.kernel, self.points);
         for k in 0..rows.len() {
             let mut row: Row<'_> = rows.row(k);
             let mut sums = kernel.start();
+            let mut rare = K::Rare::splat(0.0);
             // SAFETY: the rows are those of the list whose reach `points` was made for.
             let here = unsafe { points.here(row.point) };
             for group in 0..row.neighbours.len() {
                 // SAFETY: as above.
-                let mut bonds = unsafe { points.load::<A>(&here, &mut row, group) };
+                let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };
                 let before = bonds.intact;
-                kernel.add::<A>(&mut bonds, &mut sums);
+                kernel.add(simd, &mut bonds, &mut sums, &mut rare);
                 if bonds.intact != before {
                     row.groups.intact[group] = bonds.intact;
                 }
@@ -252,13 +268,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                     store_memory(row.groups.numbers(group), &bonds.memory, bonds.intact);
                 }
             }
-            for quantity in 0..K::Sums::COUNT {
+            let sums = (sums, rare);
+            for quantity in 0..<(K::Sums, K::Rare)>::COUNT {
                 let lanes = sums.get(quantity);
                 let value = match K::COMBINE {
                     Combine::Add => lanes.sum(),
                     Combine::Smallest => lanes.smallest(),
                 };
-                let column = K::Sums::column_mut(&mut results, quantity);
+                let column = <(K::Sums, K::Rare)>::column_mut(&mut results, quantity);
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
         }
@@ -273,15 +290,16 @@ struct OverVectors<'a, K: Kernel<D>, const D: usize> {
 }
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K, D> {
-    type Sums = K::Sums;
+    type Sums = (K::Sums, K::Rare);
     const HOT: bool = K::HOT;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(
+    fn run<S: Simd>(
         &self,
+        simd: S,
         mut vectors: Vectors<'b>,
         base: usize,
-        mut results: <K::Sums as Numbers>::ColumnsMut<'_>,
+        mut results: Results<'_, K, D>,
     ) {
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
@@ -289,16 +307,17 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
             let mut vector: Adjacent<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
             let mut sums = kernel.start();
+            let mut rare = K::Rare::splat(0.0);
             // SAFETY: the vectors are those of the grid that `points` was made for.
             let here = unsafe { points.here(vector.place) };
             for o in 0..vector.offsets.len() {
                 // SAFETY: as above.
-                let mut bonds = unsafe { points.load::<A>(&here, &mut vector, o) };
+                let mut bonds = unsafe { points.load(simd, &here, &mut vector, o) };
                 if K::WHOLE {
                     bonds.whole = whole.map_or(0, |bits| bits[o]);
                 }
                 let before = bonds.intact;
-                kernel.add::<A>(&mut bonds, &mut sums);
+                kernel.add(simd, &mut bonds, &mut sums, &mut rare);
                 if bonds.intact != before {
                     vector.groups.intact[o] = bonds.intact;
                 }
@@ -307,8 +326,9 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                 }
             }
             let first = vector.point - base;
-            for quantity in 0..K::Sums::COUNT {
-                let column = K::Sums::column_mut(&mut results, quantity);
+            let sums = (sums, rare);
+            for quantity in 0..<(K::Sums, K::Rare)>::COUNT {
+                let column = <(K::Sums, K::Rare)>::column_mut(&mut results, quantity);
                 let lanes: Lanes = sums.get(quantity);
                 for lane in 0..WIDTH {
                     if vector.members >> lane & 1 == 1 {

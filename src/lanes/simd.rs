@@ -1,0 +1,498 @@
+//! The operations that a compiler does not find by itself, or that machines carry out differently.
+//!
+//! All others on [`Lanes`] are plain loops over eight numbers, which the compiler turns into vector
+//! instructions. Every operation here is correctly rounded or moves numbers only, so that all kinds
+//! but [`Portable`] on a machine without fused multiplication and addition give the same bits.
+
+use super::Lanes;
+
+/// Proof that the machine has a set of instructions, and the operations that depend on it.
+pub trait Simd: Copy + Send + Sync + 'static {
+    /// a b + c, rounded once.
+    fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
+
+    /// A bit for each lane of `a` that is at least as large as that of `b`.
+    #[inline(always)]
+    fn at_least(self, a: Lanes, b: Lanes) -> u8 {
+        let mut bits = 0;
+        for k in 0..8 {
+            bits |= u8::from(a.0[k] >= b.0[k]) << k;
+        }
+        bits
+    }
+
+    /// The lanes whose bit is set; those of `otherwise` in the others.
+    #[inline(always)]
+    fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
+        let mut result = otherwise;
+        for k in 0..8 {
+            if bits >> k & 1 == 1 {
+                result.0[k] = a.0[k];
+            }
+        }
+        result
+    }
+
+    /// The lanes whose bit is set; 0 in the others.
+    #[inline(always)]
+    fn keep(self, a: Lanes, bits: u8) -> Lanes {
+        self.select(a, bits, Lanes::splat(0.0))
+    }
+
+    /// Does what is rarely needed, out of line: there it takes no registers from a loop, nor keeps the
+    /// compiler from working on whole vectors.
+    fn aside<R>(self, work: impl FnOnce() -> R) -> R;
+
+    /// The same, as one vector to the compiler, which else goes through the lanes one by one where
+    /// they come from several places.
+    #[inline(always)]
+    fn whole(self, a: Lanes) -> Lanes {
+        a
+    }
+
+    /// The transpose of eight rows of eight numbers: lane k of result j is number j of row k.
+    #[inline(always)]
+    fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
+        std::array::from_fn(|column| Lanes(std::array::from_fn(|row| rows[row][column])))
+    }
+}
+
+/// What every machine has. Fused where all machines of the kind have it (64-bit ARM).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Portable;
+
+impl Portable {
+    /// Whether products and sums are rounded once.
+    pub const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+}
+
+impl Simd for Portable {
+    #[inline(always)]
+    fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+        if !Self::FUSED {
+            return a * b + c;
+        }
+        let mut result = a;
+        for k in 0..8 {
+            result.0[k] = a.0[k].mul_add(b.0[k], c.0[k]);
+        }
+        result
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn aside<R>(self, work: impl FnOnce() -> R) -> R {
+        work()
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::*;
+
+    use super::{Lanes, Simd};
+
+    /// AVX2 with fused multiplication and addition. Only [`Avx2::detect`] makes it.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub struct Avx2(());
+
+    /// AVX-512. Only [`Avx512::detect`] makes it.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub struct Avx512(());
+
+    impl Avx2 {
+        /// If this machine has it.
+        pub fn detect() -> Option<Self> {
+            let has = is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("fma");
+            has.then_some(Self(()))
+        }
+    }
+
+    impl Avx512 {
+        /// If this machine has it.
+        pub fn detect() -> Option<Self> {
+            let has = Avx2::detect().is_some()
+                && is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512bw");
+            has.then_some(Self(()))
+        }
+
+        /// AVX2, which every machine with AVX-512 has.
+        pub fn avx2(self) -> Avx2 {
+            Avx2(())
+        }
+    }
+
+    impl Simd for Avx2 {
+        #[inline(always)]
+        fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+            // SAFETY: the machine has AVX2 and FMA, as `self` shows.
+            unsafe { multiply_add_avx2(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn at_least(self, a: Lanes, b: Lanes) -> u8 {
+            // SAFETY: the machine has AVX2, as `self` shows.
+            unsafe { at_least_avx2(a, b) }
+        }
+
+        #[inline(always)]
+        fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
+            // SAFETY: as above.
+            unsafe { select_avx2(a, bits, otherwise) }
+        }
+
+        #[inline(always)]
+        fn keep(self, a: Lanes, bits: u8) -> Lanes {
+            // SAFETY: as above.
+            unsafe { keep_avx2(a, bits) }
+        }
+
+        #[inline(always)]
+        fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
+            // SAFETY: as above.
+            unsafe { transpose_avx2(rows) }
+        }
+
+        #[inline(always)]
+        fn aside<R>(self, work: impl FnOnce() -> R) -> R {
+            // SAFETY: as above.
+            unsafe { aside_avx2(work) }
+        }
+
+        #[inline(always)]
+        fn whole(self, a: Lanes) -> Lanes {
+            // SAFETY: as above.
+            unsafe { joined(halves(a).map(|half| opaque_half(half))) }
+        }
+    }
+
+    impl Simd for Avx512 {
+        #[inline(always)]
+        fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+            // SAFETY: the machine has AVX-512, as `self` shows.
+            unsafe { multiply_add_avx512(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn at_least(self, a: Lanes, b: Lanes) -> u8 {
+            // SAFETY: the machine has AVX-512, as `self` shows.
+            unsafe { at_least_avx512(a, b) }
+        }
+
+        #[inline(always)]
+        fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
+            // SAFETY: as above.
+            unsafe { select_avx512(a, bits, otherwise) }
+        }
+
+        #[inline(always)]
+        fn keep(self, a: Lanes, bits: u8) -> Lanes {
+            // SAFETY: as above.
+            unsafe { keep_avx512(a, bits) }
+        }
+
+        #[inline(always)]
+        fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
+            // SAFETY: as above.
+            unsafe { transpose_avx512(rows) }
+        }
+
+        #[inline(always)]
+        fn aside<R>(self, work: impl FnOnce() -> R) -> R {
+            // SAFETY: as above.
+            unsafe { aside_avx512(work) }
+        }
+
+        #[inline(always)]
+        fn whole(self, a: Lanes) -> Lanes {
+            // SAFETY: as above.
+            unsafe { lanes(opaque(vector(a))) }
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    #[target_feature(enable = "avx2,bmi2,fma")]
+    fn aside_avx2<R>(work: impl FnOnce() -> R) -> R {
+        work()
+    }
+
+    #[cold]
+    #[inline(never)]
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,bmi2,fma")]
+    fn aside_avx512<R>(work: impl FnOnce() -> R) -> R {
+        work()
+    }
+
+    /// The halves of eight numbers.
+    #[inline(always)]
+    fn halves(a: Lanes) -> [__m256d; 2] {
+        // SAFETY: eight numbers either way.
+        unsafe { std::mem::transmute(a) }
+    }
+
+    #[inline(always)]
+    fn joined(halves: [__m256d; 2]) -> Lanes {
+        // SAFETY: eight numbers either way.
+        unsafe { std::mem::transmute(halves) }
+    }
+
+    #[inline(always)]
+    fn vector(a: Lanes) -> __m512d {
+        // SAFETY: eight numbers either way.
+        unsafe { std::mem::transmute(a) }
+    }
+
+    #[inline(always)]
+    fn lanes(a: __m512d) -> Lanes {
+        // SAFETY: eight numbers either way.
+        unsafe { std::mem::transmute(a) }
+    }
+
+    /// For each four bits the numbers with all bits set where they are.
+    static MASKS: [[u64; 4]; 16] = {
+        let mut masks = [[0; 4]; 16];
+        let mut bits = 0;
+        while bits < 16 {
+            let mut k = 0;
+            while k < 4 {
+                if bits >> k & 1 == 1 {
+                    masks[bits][k] = u64::MAX;
+                }
+                k += 1;
+            }
+            bits += 1;
+        }
+        masks
+    };
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn masks(bits: u8) -> [__m256d; 2] {
+        // SAFETY: each row has four numbers of 64 bits.
+        let mask = |row: u8| unsafe { _mm256_loadu_pd(MASKS[row as usize].as_ptr().cast()) };
+        [mask(bits & 15), mask(bits >> 4)]
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn multiply_add_avx2(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+        let (a, b, c) = (halves(a), halves(b), halves(c));
+        joined([
+            _mm256_fmadd_pd(a[0], b[0], c[0]),
+            _mm256_fmadd_pd(a[1], b[1], c[1]),
+        ])
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn multiply_add_avx512(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+        lanes(_mm512_fmadd_pd(vector(a), vector(b), vector(c)))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn at_least_avx2(a: Lanes, b: Lanes) -> u8 {
+        let (a, b) = (halves(a), halves(b));
+        let bits = |k: usize| _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GE_OQ>(a[k], b[k]));
+        (bits(0) | bits(1) << 4) as u8
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn select_avx2(a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
+        let (a, b, masks) = (halves(a), halves(otherwise), masks(bits));
+        joined([
+            _mm256_blendv_pd(b[0], a[0], masks[0]),
+            _mm256_blendv_pd(b[1], a[1], masks[1]),
+        ])
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn keep_avx2(a: Lanes, bits: u8) -> Lanes {
+        let (a, masks) = (halves(a), masks(bits));
+        joined([_mm256_and_pd(a[0], masks[0]), _mm256_and_pd(a[1], masks[1])])
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn transpose_avx2(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
+        // Four blocks of four by four.
+        let block = |first: usize, column: usize| -> [__m256d; 4] {
+            let load = |k: usize| {
+                let row: &[f64; 4] = rows[first + k][column..column + 4]
+                    .try_into()
+                    .expect("four");
+                // SAFETY: four numbers.
+                unsafe { _mm256_loadu_pd(row.as_ptr()) }
+            };
+            let (a, b, c, d) = (load(0), load(1), load(2), load(3));
+            let (ab_even, ab_odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+            let (cd_even, cd_odd) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+            [
+                _mm256_permute2f128_pd::<0x20>(ab_even, cd_even),
+                _mm256_permute2f128_pd::<0x20>(ab_odd, cd_odd),
+                _mm256_permute2f128_pd::<0x31>(ab_even, cd_even),
+                _mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd),
+            ]
+        };
+        let (a, b, c, d) = (block(0, 0), block(4, 0), block(0, 4), block(4, 4));
+        [
+            joined([a[0], b[0]]),
+            joined([a[1], b[1]]),
+            joined([a[2], b[2]]),
+            joined([a[3], b[3]]),
+            joined([c[0], d[0]]),
+            joined([c[1], d[1]]),
+            joined([c[2], d[2]]),
+            joined([c[3], d[3]]),
+        ]
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn at_least_avx512(a: Lanes, b: Lanes) -> u8 {
+        _mm512_cmp_pd_mask::<_CMP_GE_OQ>(vector(a), vector(b))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn select_avx512(a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
+        lanes(_mm512_mask_blend_pd(bits, vector(otherwise), vector(a)))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn keep_avx512(a: Lanes, bits: u8) -> Lanes {
+        lanes(_mm512_maskz_mov_pd(bits, vector(a)))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn transpose_avx512(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
+        // SAFETY: each row has eight numbers.
+        let r = rows.map(|row| unsafe { _mm512_loadu_pd(row.as_ptr()) });
+        // Pairs of rows, then of pairs, then of fours.
+        let low = |a, b| _mm512_unpacklo_pd(a, b);
+        let high = |a, b| _mm512_unpackhi_pd(a, b);
+        let p = [
+            low(r[0], r[1]),
+            high(r[0], r[1]),
+            low(r[2], r[3]),
+            high(r[2], r[3]),
+            low(r[4], r[5]),
+            high(r[4], r[5]),
+            low(r[6], r[7]),
+            high(r[6], r[7]),
+        ];
+        // Columns 0, 4 | 2, 6 of rows 0–3 lie in 128-bit parts 0, 2 | 1, 3.
+        let even = |a, b| _mm512_shuffle_f64x2::<0b10_00_10_00>(a, b);
+        let odd = |a, b| _mm512_shuffle_f64x2::<0b11_01_11_01>(a, b);
+        let a = even(p[0], p[2]);
+        let b = even(p[4], p[6]);
+        let c = odd(p[0], p[2]);
+        let d = odd(p[4], p[6]);
+        let e = even(p[1], p[3]);
+        let f = even(p[5], p[7]);
+        let g = odd(p[1], p[3]);
+        let h = odd(p[5], p[7]);
+        let columns = [
+            even(a, b),
+            even(e, f),
+            even(c, d),
+            even(g, h),
+            odd(a, b),
+            odd(e, f),
+            odd(c, d),
+            odd(g, h),
+        ];
+        columns.map(|column| lanes(opaque(column)))
+    }
+
+    /// Keeps the compiler from merging what comes before with what follows, which it then does not carry
+    /// out in whole vectors any more.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn opaque_half(mut a: __m256d) -> __m256d {
+        // SAFETY: does nothing.
+        unsafe {
+            std::arch::asm!("/* {0} */", inout(ymm_reg) a, options(pure, nomem, nostack, preserves_flags));
+        }
+        a
+    }
+
+    /// As [`opaque_half`].
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn opaque(mut a: __m512d) -> __m512d {
+        // SAFETY: does nothing.
+        unsafe {
+            std::arch::asm!("/* {0} */", inout(zmm_reg) a, options(pure, nomem, nostack, preserves_flags));
+        }
+        a
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(simd: impl Simd) {
+        let a = Lanes([1e-30, 3.7e-9, 0.25, 0.999, 1.0, 2.0, 1e7, f64::NAN]);
+        let rows: [[f64; 8]; 8] =
+            std::array::from_fn(|row| std::array::from_fn(|column| (10 * row + column) as f64));
+        let columns = simd.transpose(rows.each_ref());
+        for (j, column) in columns.iter().enumerate() {
+            for (k, value) in column.0.iter().enumerate() {
+                assert_eq!(*value, (10 * k + j) as f64);
+            }
+        }
+        assert_eq!(simd.at_least(a, Lanes::splat(0.999)), 0b0111_1000);
+        let chosen = simd.select(a, 0b0100_0010, Lanes::splat(5.0));
+        assert_eq!(chosen.0, [5.0, 3.7e-9, 5.0, 5.0, 5.0, 5.0, 1e7, 5.0]);
+        assert_eq!(
+            simd.keep(a, 0b0000_0100).0,
+            [0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0]
+        );
+    }
+
+    #[test]
+    fn every_kind_moves_numbers_alike() {
+        check(Portable);
+        #[cfg(target_arch = "x86_64")]
+        {
+            Avx2::detect().into_iter().for_each(check);
+            Avx512::detect().into_iter().for_each(check);
+        }
+    }
+
+    /// Of a kind that is fused.
+    fn rounds_once(simd: impl Simd) {
+        // (1 + e)² − 1 − 2e = e², which two roundings lose.
+        let a = Lanes::splat(1.0 + f64::EPSILON);
+        let c = Lanes::splat(-1.0 - 2.0 * f64::EPSILON);
+        let e = f64::EPSILON;
+        assert_eq!(simd.multiply_add(a, a, c).0, [e * e; 8]);
+    }
+
+    #[test]
+    fn fused_kinds_round_once() {
+        if Portable::FUSED {
+            rounds_once(Portable);
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            Avx2::detect().into_iter().for_each(rounds_once);
+            Avx512::detect().into_iter().for_each(rounds_once);
+        }
+    }
+}
