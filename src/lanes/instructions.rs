@@ -22,7 +22,8 @@ pub enum Instructions {
 /// come to the same bits.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
-const ALL: [Instructions; 3] = [
+/// All of them, the least first.
+pub const ALL: [Instructions; 3] = [
     Instructions::Baseline,
     Instructions::Avx2,
     Instructions::Avx512,
@@ -74,8 +75,9 @@ impl Instructions {
         }
     }
 
+    /// The best that this machine has.
     #[cfg(target_arch = "x86_64")]
-    fn of_this_machine() -> Self {
+    pub fn of_this_machine() -> Self {
         let avx2 = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("fma");
@@ -90,8 +92,9 @@ impl Instructions {
         }
     }
 
+    /// The best that this machine has.
     #[cfg(not(target_arch = "x86_64"))]
-    fn of_this_machine() -> Self {
+    pub fn of_this_machine() -> Self {
         Self::Baseline
     }
 }

@@ -39,8 +39,8 @@ pub use watch::Reason;
 
 use std::path::PathBuf;
 
-use crate::comm::mpi::World;
-use crate::comm::{Communicator, agree};
+use crate::comm::mpi::{self, World};
+use crate::comm::{self, Communicator, agree};
 use crate::deck::Plan;
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
@@ -303,7 +303,9 @@ impl<'a> Job<'a> {
                 self.options.deck.clone().unwrap_or_default(),
             ),
             ("deck_path", source.path.display().to_string()),
-            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("version", crate::version()),
+            ("mpi", self.text_of_rank_0(&mpi::library())),
+            ("hdf5", output::library()),
             ("ranks", self.comm.size().to_string()),
             (
                 "threads",
