@@ -491,9 +491,7 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
         });
         let far_left =
             (0..simulation.model.owned()).filter(|k| simulation.model.position(*k)[0] < 7.0);
-        let forces: Vec<f64> = far_left
-            .map(|k| force(&simulation, k)[1].abs())
-            .collect();
+        let forces: Vec<f64> = far_left.map(|k| force(&simulation, k)[1].abs()).collect();
         assert!(forces.iter().all(|force| *force == 0.0));
         assert!(largest_force(&simulation) > 0.0);
     });

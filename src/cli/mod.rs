@@ -338,7 +338,8 @@ fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if speaks {
-                tell!("error: {error}");
+                let label = if error.is_stop() { "" } else { "error: " };
+                tell!("{label}{error}");
             }
             ExitCode::from(error.exit_code())
         }

@@ -5,8 +5,8 @@ use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
     Action, Body, CheckpointRule, Condition, CriticalStretch, FamilyRule, History, Initial,
-    Interface, InterfaceRule, Interval, Law, Material, Output, Plan, Places, PointSource, Quadrature,
-    Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
+    Interface, InterfaceRule, Interval, Law, Material, Output, Places, Plan, PointSource,
+    Quadrature, Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
 };
 use super::source::Source;
 use crate::dimension::Dimension;

@@ -318,7 +318,8 @@ impl<const D: usize> Forces<D> {
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         self.halo.pack(displacement.iter().map(Vec::as_slice));
         self.halo.exchange(comm, &mut |_| {});
-        self.halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
+        self.halo
+            .unpack(displacement.iter_mut().map(Vec::as_mut_slice));
     }
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
