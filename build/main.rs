@@ -1,5 +1,6 @@
-//! Before the crate is compiled: are its MPI and that of HDF5 the same?
+//! Before the crate is compiled: are its MPI and that of HDF5 the same, and which commit is it?
 
+mod commit;
 mod one_mpi;
 
 fn main() {
@@ -10,11 +11,11 @@ fn main() {
         "CRAY_MPICH_DIR",
         "HDF5_DIR",
         "PKG_CONFIG_PATH",
-        "PATH",
     ] {
         println!("cargo::rerun-if-env-changed={name}");
     }
     println!("cargo::rustc-check-cfg=cfg(open_mpi)");
+    commit::tell();
     match one_mpi::check() {
         Ok(mpi) => {
             if mpi.is_open_mpi {

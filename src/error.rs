@@ -9,6 +9,9 @@ pub enum ErrorKind {
     Input,
     /// The run itself failed (disc, memory, a value that is not finite): exit code 1.
     Run,
+    /// A signal has ended the run before its first step: exit code 75, that of sysexits.h for "try
+    /// again".
+    Stopped,
 }
 
 /// An error with a message that names the file, the place and what would be right.
@@ -59,11 +62,26 @@ impl Error {
         }
     }
 
-    /// The process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments.
+    /// A run that a signal has ended before its first step.
+    pub fn stopped(message: impl Into<String>) -> Self {
+        Self {
+            kind: ErrorKind::Stopped,
+            message: message.into(),
+        }
+    }
+
+    /// Whether it is no fault but the end that a signal asked for.
+    pub fn is_stop(&self) -> bool {
+        self.kind == ErrorKind::Stopped
+    }
+
+    /// The process's exit code: 1 for a failed run, 2 for a wrong deck or wrong arguments, 75 for a run
+    /// that can be started again.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Run => 1,
             ErrorKind::Input => 2,
+            ErrorKind::Stopped => 75,
         }
     }
 }

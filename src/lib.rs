@@ -16,3 +16,11 @@ pub mod run;
 pub mod solver;
 
 pub use run::run;
+
+/// Version and, in a release build from a checkout, commit.
+pub fn version() -> String {
+    match option_env!("FISSURE_COMMIT") {
+        Some(commit) => format!("{} (commit {commit})", env!("CARGO_PKG_VERSION")),
+        None => env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}

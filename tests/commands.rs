@@ -71,6 +71,22 @@ fn from_an_example_deck_to_pictures() {
 }
 
 #[test]
+fn the_version_says_what_the_program_is_made_of() {
+    for ranks in [1, 2] {
+        let printed = succeed(fissure(ranks).arg("--version"));
+        let lines: Vec<&str> = printed.lines().collect();
+        let version = concat!("fissure ", env!("CARGO_PKG_VERSION"));
+        assert!(lines[0].starts_with(version), "{printed}");
+        for (line, name) in lines[1..].iter().zip(["MPI", "HDF5", "instructions"]) {
+            let (found, value) = line.trim().split_once("  ").unwrap();
+            assert_eq!(found, name, "{printed}");
+            assert!(!value.trim().is_empty(), "{printed}");
+        }
+        assert_eq!(lines.len(), 4, "{printed}");
+    }
+}
+
+#[test]
 fn no_result_and_no_deck() {
     let folder = Folder::new("nothing");
     let file = folder.write("notes.txt", "no deck and no result");

@@ -202,6 +202,68 @@ fn a_signal_to_any_rank_stops_all_and_nothing_is_lost() {
 }
 
 #[test]
+fn a_signal_during_the_set_up_ends_it() {
+    let folder = Folder::new("set-up");
+    // Seconds of set-up, whatever the machine.
+    let coarse = "spacing = 1e-3, horizon = 3e-3";
+    let plate = plate("1e-5", "").replace(coarse, "spacing = 4e-5, horizon = 1.2e-4");
+    assert!(!plate.contains(coarse));
+    let deck = folder.write("deck.toml", &plate);
+    for ranks in [1, 2] {
+        let out = folder.join(format!("out{ranks}"));
+        let mut command = run(ranks, &deck, &out, &[]);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // The folder is taken before the points are made.
+        while !out.join(".lock").exists() {
+            std::thread::sleep(Duration::from_millis(5));
+            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+        }
+        send("-TERM", *rank_processes(&child, ranks).last().unwrap());
+        let output = wait(child);
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(STOPPED), "{printed}");
+        let told = printed.matches("stopped by a signal before the first step");
+        assert_eq!(told.count(), 1, "{printed}");
+        assert!(!result(&out).exists());
+    }
+}
+
+#[test]
+fn signals_are_listened_to_before_mpi_has_started() {
+    // A rank waits in the start of MPI for one that never comes.
+    let script = "$0 run no_deck.toml & rank=$!
+        for k in $(seq 300); do
+            caught=$(awk '/^SigCgt/ { print $2 }' /proc/$rank/status)
+            if (( 0x$caught & 0x800 )); then
+                kill -USR2 $rank; sleep 0.2; kill -0 $rank && echo still there; break
+            fi
+            sleep 0.01
+        done
+        kill -KILL $rank";
+    let mut command = fissure(2);
+    let arguments: Vec<_> = command.get_args().map(ToOwned::to_owned).collect();
+    let (binary, options) = arguments.split_last().unwrap();
+    let environment: Vec<_> = (command.get_envs())
+        .filter_map(|(name, value)| Some((name.to_owned(), value?.to_owned())))
+        .collect();
+    let mut command = Command::new(command.get_program());
+    let one = options.iter().map(|word| match word.to_str() {
+        Some("2") => "1".into(),
+        _ => word.clone(),
+    });
+    command.args(one).args(["bash", "-c", script]).arg(binary);
+    command
+        .args([":", "-n", "1", "sleep", "5"])
+        .envs(environment);
+    let printed = text(&finish(&mut command));
+    assert!(printed.contains("still there"), "{printed}");
+}
+
+#[test]
 fn a_checkpoint_is_written_on_request_and_a_second_signal_ends_at_once() {
     let folder = Folder::new("request");
     let deck = folder.write("deck.toml", &plate("1e-2", ""));

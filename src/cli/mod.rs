@@ -13,6 +13,7 @@ mod plot;
 mod progress;
 mod run;
 mod summary;
+mod version;
 mod wall_time;
 
 /// Prints a line. A reader that has closed the output must not end a run.
@@ -37,6 +38,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
 use fissure::comm::mpi::World;
 use fissure::error::{Error, Result};
@@ -295,6 +297,12 @@ pub fn main() -> ExitCode {
     let speaks = rank.unwrap_or(0) == 0;
     let line = match CommandLine::try_parse() {
         Ok(line) => line,
+        Err(error) if error.kind() == ErrorKind::DisplayVersion => {
+            if speaks {
+                version::print();
+            }
+            return ExitCode::SUCCESS;
+        }
         Err(error) => {
             // A rank that fails first has the launcher kill rank 0 before it has spoken; within
             // MPI they leave together.
@@ -330,7 +338,8 @@ fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if speaks {
-                tell!("error: {error}");
+                let label = if error.is_stop() { "" } else { "error: " };
+                tell!("{label}{error}");
             }
             ExitCode::from(error.exit_code())
         }

@@ -22,8 +22,11 @@ const STOPPED: u8 = 75;
 /// Runs a deck on all ranks and ends MPI.
 pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
     let started = Instant::now();
+    // Before MPI, whose start takes a while: until then a signal ends the process.
+    let signals = Signals::listen();
     launch::on_all_ranks(|world| {
-        let outcome = run_deck(world, arguments, verbosity, started)?;
+        let signals = agree(world, signals)?;
+        let outcome = run_deck(world, arguments, verbosity, (started, signals))?;
         Ok(match outcome.stopped {
             Some(_) => ExitCode::from(STOPPED),
             None => ExitCode::SUCCESS,
@@ -35,9 +38,8 @@ fn run_deck(
     world: &World,
     arguments: &RunArguments,
     verbosity: Verbosity,
-    started: Instant,
+    (started, signals): (Instant, Signals),
 ) -> Result<Outcome> {
-    let signals = agree(world, Signals::listen())?;
     let deck = agree(world, deck::read(&arguments.deck, &arguments.set))?;
     let plan = agree(world, deck.plan())?;
     let explained = agree(world, deck.explain())?;

@@ -118,10 +118,10 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
         Ok(_) => Vec::new(),
     };
     comm.broadcast(first[0] as usize, &mut packed);
-    let kind = if packed[0] == 2 {
-        ErrorKind::Input
-    } else {
-        ErrorKind::Run
+    let kind = match packed[0] {
+        2 => ErrorKind::Input,
+        75 => ErrorKind::Stopped,
+        _ => ErrorKind::Run,
     };
     Err(Error {
         kind,

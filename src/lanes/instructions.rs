@@ -28,7 +28,7 @@ pub enum Instructions {
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
 /// Names of the sets in the order of what they can.
-const NAMES: [&str; 3] = ["baseline", "AVX2", "AVX-512"];
+pub const NAMES: [&str; 3] = ["baseline", "AVX2", "AVX-512"];
 
 impl Instructions {
     /// The best that all ranks have, or the most that [`VARIABLE`] allows; collective.
@@ -45,6 +45,11 @@ impl Instructions {
         let mut level = [own.level() as f64];
         comm::min(comm, &mut level);
         Ok(Self::up_to(level[0] as usize))
+    }
+
+    /// The best that this machine has.
+    pub fn of_this_machine() -> Self {
+        Self::up_to(NAMES.len() - 1)
     }
 
     /// The best of this machine up to a level.

@@ -24,3 +24,9 @@ pub use read::{Number, ResultReader, StoredColumn, StoredField};
 pub use seal::mix;
 pub use transfer::initialise;
 pub use vtkhdf::{Contents, Piece, ResultFile};
+
+/// Version of the HDF5 library.
+pub fn library() -> String {
+    let (major, minor, micro) = hdf5_metno::library_version();
+    format!("{major}.{minor}.{micro}")
+}

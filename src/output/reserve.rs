@@ -62,6 +62,7 @@ impl Reservation {
     }
 }
 
+#[cfg(target_os = "linux")]
 fn allocate(file: &File, from: u64, length: u64) -> io::Result<()> {
     let (from, length) = (from as libc::off_t, length as libc::off_t);
     loop {
@@ -77,6 +78,16 @@ fn allocate(file: &File, from: u64, length: u64) -> io::Result<()> {
     }
 }
 
+/// Elsewhere no call promises space and leaves the length as it is.
+#[cfg(not(target_os = "linux"))]
+fn allocate(_: &File, _: u64, _: u64) -> io::Result<()> {
+    Err(io::Error::from_raw_os_error(libc::EOPNOTSUPP))
+}
+
+#[allow(
+    clippy::unnecessary_cast,
+    reason = "the numbers are narrower on other systems"
+)]
 fn compare(file: &File, additional: u64) -> io::Result<()> {
     // SAFETY: the structure is plain numbers, for which zeros are valid.
     let mut disc: libc::statvfs = unsafe { std::mem::zeroed() };
@@ -84,7 +95,7 @@ fn compare(file: &File, additional: u64) -> io::Result<()> {
     if unsafe { libc::fstatvfs(file.as_raw_fd(), &mut disc) } != 0 {
         return Err(io::Error::last_os_error());
     }
-    if disc.f_bavail * disc.f_frsize < additional {
+    if (disc.f_bavail as u64).saturating_mul(disc.f_frsize as u64) < additional {
         return Err(io::Error::from_raw_os_error(libc::ENOSPC));
     }
     Ok(())

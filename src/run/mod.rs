@@ -39,8 +39,8 @@ pub use watch::Reason;
 
 use std::path::PathBuf;
 
-use crate::comm::mpi::World;
-use crate::comm::{Communicator, agree};
+use crate::comm::mpi::{self, World};
+use crate::comm::{self, Communicator, agree};
 use crate::deck::Plan;
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
@@ -87,7 +87,7 @@ pub fn start_mpi() -> Result<World> {
 /// global pool. Collective; without MPI there must be one rank.
 ///
 /// # Errors
-/// When the plan cannot be run, the folder holds what must not be replaced, the checkpoint to go on from
+/// When the plan cannot be run, a signal has come before the first step, the folder holds what must not be replaced, the checkpoint to go on from
 /// is none of this plan, the disc is full, or the motion of a point is not finite; the same on all ranks.
 pub fn run(
     plan: &Plan,
@@ -143,12 +143,15 @@ struct Job<'a> {
 impl<'a> Job<'a> {
     fn run<const D: usize>(&mut self) -> Result<Outcome> {
         self.observer.message(&Message::Started);
-        let mut simulation = Simulation::<D>::new(self.plan, self.comm)?;
+        self.look_before_the_first_step()?;
+        let mut look = || self.look_before_the_first_step();
+        let mut simulation = Simulation::<D>::set_up(self.plan, self.comm, &mut look)?;
         simulation.check()?;
         self.observer.message(&Message::SetUp {
             step: simulation.clock.step(),
             stable_step: simulation.stable_step,
         });
+        self.look_before_the_first_step()?;
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(&mut simulation)?,
             Existing::Refuse | Existing::Replace => self.begin_run(&mut simulation)?,
@@ -178,6 +181,24 @@ impl<'a> Job<'a> {
             summary: Summary::new(&simulation, steps, checkpoints.written, spent),
             no_collective_cause,
         })
+    }
+
+    /// Whether a signal has come that stops the run while nothing is computed yet. Collective.
+    ///
+    /// # Errors
+    /// It has.
+    fn look_before_the_first_step(&self) -> Result<()> {
+        let stop = self.options.signals.as_ref().is_some_and(Signals::stop);
+        if comm::total(self.comm, u64::from(stop)) == 0 {
+            return Ok(());
+        }
+        let then = match self.options.existing {
+            Existing::Continue => "the checkpoint is as it was, --restart continues",
+            Existing::Refuse | Existing::Replace => "nothing is computed yet, start it again",
+        };
+        Err(Error::stopped(format!(
+            "stopped by a signal before the first step; {then}"
+        )))
     }
 
     /// The time loop.
@@ -303,7 +324,9 @@ impl<'a> Job<'a> {
                 self.options.deck.clone().unwrap_or_default(),
             ),
             ("deck_path", source.path.display().to_string()),
-            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("version", crate::version()),
+            ("mpi", self.text_of_rank_0(&mpi::library())),
+            ("hdf5", output::library()),
             ("ranks", self.comm.size().to_string()),
             (
                 "threads",

@@ -76,19 +76,35 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// When the points cannot be made, a set that is acted on is empty, or no stable step exists; the
     /// same on all ranks.
     pub fn new(plan: &'a Plan, comm: &'a dyn Communicator) -> Result<Self> {
+        Self::set_up(plan, comm, &mut || Ok(()))
+    }
+
+    /// As [`Self::new`], with a look at `between` after each stage: an error of its ends the set-up. It
+    /// must be the same on all ranks.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and those of `between`.
+    pub fn set_up(
+        plan: &'a Plan,
+        comm: &'a dyn Communicator,
+        between: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<Self> {
         let start = Instant::now();
         let cutoffs = cutoffs(plan);
         size::is_feasible(plan, &cutoffs, comm.size())?;
         let (pieces, total) = points::generate(plan, comm)?;
+        between()?;
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // Bonds at the limit must find their ghosts however their length is rounded.
         let mut domain = distribute(comm, pieces, total, longest * (1.0 + SLACK))?;
+        between()?;
         let frames = grids(plan, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
         let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
         let found = families::find(&domain, &frames, bodies, &cutoffs, dimension)
             .map_err(|fault| fault.error(plan));
         let (bonds, grids) = agree(comm, found)?;
+        between()?;
         let model = Model::new(plan, &domain);
         let bodies = plan.bodies.iter();
         let blocks: Vec<_> = bodies.map(|body| block_laws(plan, body)).collect();
@@ -97,6 +113,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         drop(domain);
         let interactions = assign(plan, &model, &blocks, bonds);
         let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
+        between()?;
         let stable = stable_step(comm, &model, &forces.stiffness(&model));
         let clock = choose_step(plan, stable)?;
         let family_volume = forces.family_volume(&model);
