@@ -83,6 +83,11 @@ impl Instructions {
         NAMES[self.level()]
     }
 
+    /// How a product and a sum are rounded, in a word: "fused", once, or "unfused", twice.
+    pub fn rounding(self) -> &'static str {
+        if self.are_fused() { "fused" } else { "unfused" }
+    }
+
     /// Whether products and sums are rounded once, so that results have the bits of all other
     /// machines that do so.
     pub fn are_fused(self) -> bool {

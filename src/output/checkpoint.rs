@@ -43,8 +43,8 @@ pub struct Header {
     pub start: (f64, u64),
     /// The deck with every default filled in.
     pub deck: String,
-    /// The vector instructions that the run used.
-    pub instructions: String,
+    /// How the run rounded a product and a sum, see [`crate::lanes::Instructions::rounding`].
+    pub rounding: String,
 }
 
 /// The two checkpoints of a folder.
@@ -167,8 +167,8 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let mut file = CollectiveFile::open(path, comm)?;
     let numbers = file.integers_attribute("/", "numbers")?;
     let deck = file.text_attribute("/", "deck")?;
-    let instructions = match numbers.first() {
-        Some(&VERSION) => file.text_attribute("/", "instructions")?,
+    let rounding = match numbers.first() {
+        Some(&VERSION) => file.text_attribute("/", "rounding")?,
         _ => String::new(),
     };
     file.close()?;
@@ -192,7 +192,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             rows: rows as u64,
             start: (f64::from_bits(energy as u64), intact as u64),
             deck,
-            instructions,
+            rounding,
         }),
         _ => Err(Error::input(format!(
             "{} was written by another version of Fissure",
@@ -247,7 +247,7 @@ fn write_file(
     ];
     file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
-    file.set_attribute("/", "instructions", Attribute::Text(&header.instructions))?;
+    file.set_attribute("/", "rounding", Attribute::Text(&header.rounding))?;
     let points = Rows::Fixed(header.points);
     let (start, total) = crate::comm::scan(comm, saved.bonds.len() as u64);
     let values = file.create_dataset::<f64>("/values", points, Some(saved.width))?;

@@ -73,7 +73,7 @@ impl CheckpointWriter {
             rows: recorder.file.history_rows(),
             start: recorder.observer.start().unwrap_or_default(),
             deck: self.physics.clone(),
-            instructions: simulation.forces.instructions().name().to_owned(),
+            rounding: simulation.forces.instructions().rounding().to_owned(),
         };
         let saved = simulation.save(&recorder.order);
         self.checkpoints

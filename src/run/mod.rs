@@ -151,6 +151,11 @@ impl<'a> Job<'a> {
             step: simulation.clock.step(),
             stable_step: simulation.stable_step,
         });
+        if !simulation.forces.instructions().are_fused() {
+            let message = "the vector instructions of this processor do not round a product and a sum once, \
+                           so results differ in the last digits from those of other machines";
+            self.observer.message(&Message::Warning(message.to_owned()));
+        }
         self.look_before_the_first_step()?;
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(&mut simulation)?,

@@ -41,12 +41,12 @@ pub fn restart<const D: usize>(
             lines.join("\n  ")
         )));
     }
-    let instructions = simulation.forces.instructions().name();
-    if header.instructions != instructions {
+    let rounding = simulation.forces.instructions().rounding();
+    if header.rounding != rounding {
         warn(format!(
-            "the run used {} instructions until now, and goes on with {instructions}: it will end \
+            "the run had {} multiply-adds until now, and goes on with {rounding} ones: it will end \
              with other last digits than without the stop; see FISSURE_INSTRUCTIONS",
-            header.instructions
+            header.rounding
         ));
     }
     let fingerprint = fingerprint(simulation);
