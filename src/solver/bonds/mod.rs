@@ -318,7 +318,8 @@ impl<const D: usize> Forces<D> {
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         self.halo.pack(displacement.iter().map(Vec::as_slice));
         self.halo.exchange(comm, &mut |_| {});
-        self.halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
+        self.halo
+            .unpack(displacement.iter_mut().map(Vec::as_mut_slice));
     }
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
@@ -620,8 +621,11 @@ impl<const D: usize> Forces<D> {
     /// [evaluation](Self::evaluate).
     pub fn dilatation(&mut self, model: &Model<D>) -> [Vec<f64>; 2] {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
+            fn is_linear<L: Law<D>, const D: usize>(_: &[L; 2]) -> bool {
+                L::LINEAR
+            }
             let bonds = &mut interaction.bonds;
-            if matches!(interaction.laws, PairLaw::LinearMicroelastic(_)) {
+            if with_pair!(&interaction.laws, laws => is_linear::<_, D>(laws)) {
                 sweep_all(bonds, sums, &measures::Dilatation::<true>, source);
             } else {
                 sweep_all(bonds, sums, &measures::Dilatation::<false>, source);
