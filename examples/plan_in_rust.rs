@@ -47,7 +47,7 @@ pub fn plate(end: f64) -> Result<Plan> {
     let mut plan = Plan::new(dimension, 3.0 * SPACING, end);
     plan.title = "A plate built in Rust".to_owned();
     let glass = Material::new(
-        Law::Pmb { corrected: false },
+        Law::named("pmb")?,
         2440.0,
         Isotropic {
             youngs_modulus: 72e9,

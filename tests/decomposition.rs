@@ -160,10 +160,10 @@ fn scattered_points() -> String {
     text
 }
 
-fn same_everywhere(name: &str, deck: &str, must_break: bool) {
+fn same_everywhere(name: &str, text: &str, must_break: bool) {
     let folder = Folder::new(name);
     folder.write("points.csv", &scattered_points());
-    let deck = folder.write("deck.toml", deck);
+    let deck = folder.write("deck.toml", text);
     let mut expected = BTreeMap::new();
     for ranks in 1..=4 {
         for threads in ["1", "2"] {
@@ -174,9 +174,15 @@ fn same_everywhere(name: &str, deck: &str, must_break: bool) {
             assert!(printed.contains("all writes were collective"), "{printed}");
             let found = datasets(&out.join("result.vtkhdf"));
             if expected.is_empty() {
-                let broken = &found["history broken_bonds"];
-                let last = f64::from_bits(*broken.last().unwrap());
-                assert_eq!(last > 0.0, must_break, "{last} bonds broke");
+                let last = |column: &str| {
+                    let bits = found[&format!("history {column}")].last();
+                    f64::from_bits(*bits.unwrap())
+                };
+                let broken = last("broken_bonds");
+                assert_eq!(broken > 0.0, must_break, "{broken} bonds broke");
+                if text.contains("yield_stretch") {
+                    assert!(last("dissipated_energy") > 0.0, "no bond has yielded");
+                }
                 expected = found;
                 continue;
             }
@@ -225,8 +231,20 @@ fn blocks_of_the_normalised_law() {
 }
 
 #[test]
+fn blocks_of_a_law_whose_bonds_remember() {
+    let law = "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.01 }";
+    let deck = with_one_law(law);
+    same_everywhere("plastic", &deck, true);
+    let deck = deck.replace("[grid]", "[grid]\nfamily = 'list'");
+    same_everywhere("plastic-listed", &deck, true);
+}
+
+#[test]
 fn scattered_points_from_a_file() {
     same_everywhere("block", BLOCK, true);
+    let law = "[material.rubber.elastic_plastic_pmb]\nyield_stretch = 0.02";
+    let deck = BLOCK.replace("[material.rubber.pmb]", law);
+    same_everywhere("plastic-block", &deck, true);
 }
 
 #[test]

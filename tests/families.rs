@@ -165,6 +165,14 @@ fn normalised_bonds() {
     compare::<2>(&deck(PLANE, "normalised_pmb", "", grid, "0.25"));
 }
 
+#[test]
+fn bonds_that_remember() {
+    let keys = ", yield_stretch = 0.01";
+    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
+    compare::<3>(&deck(SOLID, "elastic_plastic_pmb", keys, grid, "0"));
+    compare::<2>(&deck(PLANE, "elastic_plastic_pmb", keys, grid, "0.25"));
+}
+
 /// A plate from a file, regular but for what `place` does to it, written with few digits.
 fn plate_from_file(place: impl Fn(f64) -> f64) -> String {
     let mut text = String::from("x y volume block\n");

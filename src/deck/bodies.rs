@@ -68,16 +68,9 @@ pub fn bodies(
                 (scope.length(number, &key)?, number.span())
             }
         };
-        let unbreakable = matches!(
-            materials[material].law,
-            plan::Law::Proportional { .. } | plan::Law::LinearMicroelastic { .. }
-        );
-        if let (Some(name), true) = (&body.damage, unbreakable) {
-            let message = format!(
-                "{key} damage: bonds of the law `{}` never break; take `pmb` for a body that can",
-                materials[material].law.name()
-            );
-            return Err(scope.error(name.span(), message));
+        let fault = materials[material].law.damage_fault();
+        if let (Some(name), Some(fault)) = (&body.damage, fault) {
+            return Err(scope.error(name.span(), format!("{key} damage: {fault}")));
         }
         Ok(plan::Body {
             name: name.to_owned(),

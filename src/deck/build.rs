@@ -1,6 +1,6 @@
 //! Plans made in Rust, without a deck.
 
-use super::expression::Expression;
+use super::expression::{Expression, Variable};
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
@@ -8,9 +8,11 @@ use super::plan::{
     Interface, InterfaceRule, Interval, Law, Material, Output, Places, Plan, PointSource,
     Quadrature, Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
 };
+use super::resolve::ALL_VARIABLES;
 use super::source::Source;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
+use crate::error::{Error, Result};
 
 /// Share of the stable step that is taken if nothing else is said.
 const DEFAULT_SAFETY: f64 = 0.8;
@@ -162,8 +164,20 @@ impl Expression {
     ///
     /// # Errors
     /// When the text is none.
-    pub fn of(text: &str) -> crate::error::Result<Self> {
-        let parsed = Self::parse(text, &|_| None, &[], &super::resolve::ALL_VARIABLES);
-        parsed.map_err(|error| crate::error::Error::input(format!("`{text}`: {error}")))
+    pub fn of(text: &str) -> Result<Self> {
+        Self::with(text, &ALL_VARIABLES)
+    }
+
+    /// An expression of a length `r` (m), without parameters.
+    ///
+    /// # Errors
+    /// When the text is none.
+    pub fn of_length(text: &str) -> Result<Self> {
+        Self::with(text, &[Variable::R])
+    }
+
+    fn with(text: &str, variables: &[Variable]) -> Result<Self> {
+        let parsed = Self::parse(text, &|_| None, &[], variables);
+        parsed.map_err(|error| Error::input(format!("`{text}`: {error}")))
     }
 }

@@ -1,10 +1,11 @@
 //! A deck with every default filled in.
 
-use super::grammar::{Deck, Grid};
-use super::number::{Edges, Number, default_number};
+use super::grammar::{DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, common_keys};
+use super::number::{Edges, Number, Written, default_number};
 use super::plan::{CheckpointRule, Interval, Plan};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
+use crate::material::{Kind, declarations};
 use serde_spanned::Spanned;
 
 /// The deck as TOML with every default written out.
@@ -39,43 +40,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
     }
     for material in deck.material.values_mut() {
-        use super::grammar::{Form, Influence, Material, SurfaceCorrection};
-        let any_ratio = matches!(material.get_ref(), Material::Ordinary(_));
-        let corrected = matches!(
-            material.get_ref(),
-            Material::Pmb(_) | Material::Proportional(_) | Material::LinearMicroelastic(_)
-        );
-        let normalised = matches!(material.get_ref(), Material::NormalisedPmb(_));
-        let elastic = material.get_mut().elastic_mut();
-        elastic.damping = elastic.damping.take().or(number(0.0));
-        fn unless_given<T>(key: &mut Option<Spanned<T>>, value: T) {
-            key.get_or_insert_with(|| Spanned::new(0..0, value));
-        }
-        if corrected {
-            unless_given(&mut elastic.surface_correction, SurfaceCorrection::None);
-        }
-        if normalised {
-            unless_given(&mut elastic.form, Form::Energy);
-        }
-        if any_ratio {
-            unless_given(&mut elastic.influence, Influence::Constant);
-        }
-        let own = plan.dimension.bond_based_poisson_ratio();
-        let without_ratio = [
-            &elastic.youngs_modulus,
-            &elastic.bulk_modulus,
-            &elastic.shear_modulus,
-            &elastic.lame_lambda,
-        ];
-        if without_ratio
-            .iter()
-            .filter(|constant| constant.is_some())
-            .count()
-            == 1
-            && !any_ratio
-        {
-            elastic.poisson_ratio = elastic.poisson_ratio.take().or(number(own));
-        }
+        fill_material(material.get_mut(), plan.dimension);
     }
     for condition in deck.condition.values_mut().map(|table| table.get_mut()) {
         if condition.traction.is_some() || condition.pressure.is_some() {
@@ -116,6 +81,39 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         let threshold = history.damage_threshold.clone();
         tip.threshold = tip.threshold.take().or(threshold);
     }
+}
+
+/// Puts the keys of a law in the order of the grammar, with those that are not given.
+fn fill_material(material: &mut Material, dimension: Dimension) {
+    let Some(law) = declarations().find(|law| law.name == material.law.get_ref()) else {
+        return;
+    };
+    let table = material.table.get_mut();
+    let has_ratio = law.any_poisson_ratio || {
+        let constants = ELASTIC_CONSTANTS.iter();
+        constants
+            .filter(|(name, _)| table.contains_key(*name))
+            .count()
+            > 1
+    };
+    let default = |name: &str| match name {
+        "poisson_ratio" if !has_ratio => Some(default_number(dimension.bond_based_poisson_ratio())),
+        DAMPING => Some(default_number(0.0)),
+        _ => match &law.key(name)?.kind {
+            Kind::Number { default, .. } => default.map(default_number),
+            Kind::Word(words) => {
+                let word = Written::Text(words.first()?.word.to_owned());
+                Some(Spanned::new(0..0, word))
+            }
+            Kind::OfLength => None,
+        },
+    };
+    let names = common_keys().chain(law.keys.iter().map(|key| key.name));
+    let filled = names.filter_map(|name| {
+        let value = table.get(name).cloned().or_else(|| default(name))?;
+        Some((Spanned::new(0..0, name.to_owned()), value))
+    });
+    *table = filled.collect();
 }
 
 /// The grid's spacing, if one number holds for all directions.

@@ -4,13 +4,16 @@
 //! Unknown keys are errors. Choices are tables named by the choice (`[material.glass.pmb]`), which
 //! keeps the place of an error.
 
+use std::fmt;
 use std::num::NonZeroU64;
 
 use indexmap::IndexMap;
-use serde::{Deserialize, Serialize};
+use serde::de::{EnumAccess, VariantAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_spanned::Spanned;
 
 use super::number::{Edges, Number, Vector, default_number};
+use crate::elastic::Constant;
 
 /// A string with its place in the deck.
 pub type Text = Spanned<String>;
@@ -41,7 +44,7 @@ pub struct Deck {
     /// The bonds between blocks.
     #[serde(default)]
     pub interface: Interface,
-    /// Materials by name.
+    /// Materials by name: `[material.NAME.LAW]`.
     pub material: Tables<Material>,
     /// Damage laws by name.
     #[serde(default)]
@@ -210,107 +213,67 @@ pub enum Rule {
     Own,
 }
 
-/// A material law.
-#[derive(Debug, Clone, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Material {
-    /// Prototype microelastic (brittle) material, f = c s e.
-    Pmb(Spanned<Elastic>),
-    /// The same without failure.
-    Proportional(Spanned<Elastic>),
-    /// The same with a micromodulus for each point, from its own neighbours.
-    NormalisedPmb(Spanned<Elastic>),
-    /// f = λ(|ξ|) ξ⊗ξ η.
-    LinearMicroelastic(Spanned<Elastic>),
-    /// Ordinary state-based (linear peridynamic solid), any Poisson ratio.
-    Ordinary(Spanned<Elastic>),
+/// A material: its law, and the table of the law.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// Name of the law.
+    pub law: Text,
+    /// Density and damping, one or two elastic constants, and the keys that the law
+    /// [declares](crate::material::Declaration::keys).
+    pub table: Spanned<LawTable>,
 }
 
-impl Material {
-    /// What stands in the table.
-    pub fn elastic_mut(&mut self) -> &mut Elastic {
-        match self {
-            Self::Pmb(elastic)
-            | Self::Proportional(elastic)
-            | Self::NormalisedPmb(elastic)
-            | Self::LinearMicroelastic(elastic)
-            | Self::Ordinary(elastic) => elastic.get_mut(),
+/// The keys and values of a law. A value is a number, an expression or a word.
+pub type LawTable = IndexMap<Text, Number>;
+
+/// Density ρ in kg/m³.
+pub const DENSITY: &str = "density";
+
+/// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
+pub const DAMPING: &str = "damping";
+
+/// The elastic constants: moduli in Pa, and Poisson's ratio.
+pub const ELASTIC_CONSTANTS: [(&str, Constant); 5] = [
+    ("youngs_modulus", Constant::Young),
+    ("bulk_modulus", Constant::Bulk),
+    ("shear_modulus", Constant::Shear),
+    ("lame_lambda", Constant::Lame),
+    ("poisson_ratio", Constant::Poisson),
+];
+
+/// The keys of every law's table.
+pub fn common_keys() -> impl Iterator<Item = &'static str> + Clone {
+    let constants = ELASTIC_CONSTANTS.into_iter().map(|(name, _)| name);
+    [DENSITY].into_iter().chain(constants).chain([DAMPING])
+}
+
+/// As an enumeration of laws would be, whose names are looked at later.
+impl<'de> Deserialize<'de> for Material {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct MaterialVisitor;
+
+        impl<'de> Visitor<'de> for MaterialVisitor {
+            type Value = Material;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("a table")
+            }
+
+            fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<Material, A::Error> {
+                let (law, table) = data.variant()?;
+                let table = table.newtype_variant()?;
+                Ok(Material { law, table })
+            }
         }
+
+        deserializer.deserialize_enum("Material", &[], MaterialVisitor)
     }
 }
 
-/// Density, elastic constants, and what only some laws have.
-#[derive(Debug, Clone, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Elastic {
-    /// Density ρ in kg/m³.
-    pub density: Number,
-    /// Young's modulus E in Pa.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub youngs_modulus: Option<Number>,
-    /// Bulk modulus K in Pa.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bulk_modulus: Option<Number>,
-    /// Shear modulus G in Pa.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shear_modulus: Option<Number>,
-    /// Lamé's first parameter λ in Pa.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lame_lambda: Option<Number>,
-    /// Poisson's ratio ν.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub poisson_ratio: Option<Number>,
-    /// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub damping: Option<Number>,
-    /// `"energy"` corrects the micromodulus by the strain energy of each point's own family, `"none"`
-    /// does not; for `pmb`, `proportional` and `linear_microelastic`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub surface_correction: Option<Spanned<SurfaceCorrection>>,
-    /// `"energy"` or `"diehl2016"`; for `normalised_pmb`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<Spanned<Form>>,
-    /// `"constant"`, `"linear"`, `"gaussian"` or `"inverse"`; for `ordinary`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub influence: Option<Spanned<Influence>>,
-    /// λ in N/m⁹, an expression of the bond's length r in m; for `linear_microelastic`, c/r³ if not
-    /// given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lambda: Option<Number>,
-}
-
-/// What corrects the micromodulus near surfaces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SurfaceCorrection {
-    /// Nothing.
-    None,
-    /// Strain energy.
-    Energy,
-}
-
-/// How a point's micromodulus follows from its neighbours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Form {
-    /// w = c s²|ξ|/2.
-    Energy,
-    /// w = c s²/2, as printed by Diehl & Schweitzer 2016.
-    Diehl2016,
-}
-
-/// Influence functions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Influence {
-    /// 1.
-    Constant,
-    /// 1 − r/δ.
-    Linear,
-    /// exp(−(2r/δ)²).
-    Gaussian,
-    /// δ/r.
-    Inverse,
+impl Serialize for Material {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map([(&self.law, &self.table)])
+    }
 }
 
 /// A damage law.

@@ -88,20 +88,19 @@ fn pair(
 
 /// An error if the laws of two bodies exert forces in different directions on their bonds.
 fn no_two_directions(scope: &Scope, bodies: &[plan::Body]) -> Result<()> {
-    let linear =
-        |body: &&plan::Body| matches!(body.material.law, plan::Law::LinearMicroelastic { .. });
-    let name = |body: &plan::Body| body.material.law.name();
-    let Some(body) = bodies.iter().find(linear) else {
+    let law = |body: &plan::Body| body.material.law.declaration;
+    let Some(linear) = bodies.iter().find(|body| law(body).linear) else {
         return Ok(());
     };
-    match bodies.iter().find(|other| name(other) != name(body)) {
+    match bodies.iter().find(|other| !law(other).linear) {
         None => Ok(()),
         Some(other) => {
             let message = format!(
-                "[body.{}] material: the forces of `{}` and of `linear_microelastic` have different \
-                 directions, so that no bond can have both",
+                "[body.{}] material: the forces of `{}` and of `{}` have different directions, so \
+                 that no bond can have both",
                 other.name,
-                name(other),
+                law(other).name,
+                law(linear).name,
             );
             Err(scope.error(other.span.clone(), message))
         }
@@ -117,28 +116,25 @@ fn suits(
     bodies: &[plan::Body],
 ) -> Result<()> {
     let pair = pair.map(|body| &bodies[body]);
-    let [first, second] = pair.map(|body| body.material.law.name());
-    let has_micromodulus = |body: &plan::Body| match &body.material.law {
-        plan::Law::Ordinary(_) => false,
-        plan::Law::LinearMicroelastic { lambda, .. } => lambda.is_none(),
-        _ => true,
+    let [first, second] = pair.map(|body| body.material.law.declaration.name);
+    let has_micromodulus = |body: &plan::Body| {
+        let law = &body.material.law;
+        !law.declaration.any_poisson_ratio && law.key_of_length().is_none()
     };
     if *rule.get_ref() == Rule::Own || first == second && pair.into_iter().all(has_micromodulus) {
         return Ok(());
     }
-    let lambda = |body: &plan::Body| match body.material.law {
-        plan::Law::LinearMicroelastic {
-            lambda: Some(_), ..
-        } => " with a `lambda`",
-        _ => "",
+    let with_key = |body: &plan::Body| {
+        let key = body.material.law.key_of_length();
+        key.map_or(String::new(), |key| format!(" with a `{key}`"))
     };
     let message = format!(
         "{key}: one micromodulus for both ends needs the same bond-based law in both bodies, but \
          [body.{}] is `{first}`{} and [body.{}] is `{second}`{}; take `own`",
         pair[0].name,
-        lambda(pair[0]),
+        with_key(pair[0]),
         pair[1].name,
-        lambda(pair[1]),
+        with_key(pair[1]),
     );
     Err(scope.error(rule.span(), message))
 }

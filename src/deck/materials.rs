@@ -1,230 +1,232 @@
 //! Materials and damage laws of a deck, validated.
 
+use std::ops::Range;
+
 use serde_spanned::Spanned;
 
 use super::expression::Variable;
-use super::grammar;
-use super::number::Number;
+use super::grammar::{self, DAMPING, DENSITY, ELASTIC_CONSTANTS, LawTable, common_keys};
+use super::law;
+use super::number::{Number, Written};
 use super::plan;
 use super::resolve::Scope;
 use super::sets::find_sets;
+use super::source::suggestion;
 use crate::dimension::Dimension;
 use crate::elastic::{Constant, Isotropic};
 use crate::error::Result;
-use crate::material::Influence;
-
-/// The keys of an elastic constant that are given, with their numbers, in the order of the deck.
-fn given(elastic: &grammar::Elastic) -> Vec<(&'static str, Constant, &Number)> {
-    let mut given: Vec<_> = [
-        ("youngs_modulus", Constant::Young, &elastic.youngs_modulus),
-        ("bulk_modulus", Constant::Bulk, &elastic.bulk_modulus),
-        ("shear_modulus", Constant::Shear, &elastic.shear_modulus),
-        ("lame_lambda", Constant::Lame, &elastic.lame_lambda),
-        ("poisson_ratio", Constant::Poisson, &elastic.poisson_ratio),
-    ]
-    .into_iter()
-    .filter_map(|(key, constant, number)| Some((key, constant, number.as_ref()?)))
-    .collect();
-    given.sort_by_key(|(_, _, number)| number.span().start);
-    given
-}
-
-/// The table of a material, and the name of its law.
-fn table(material: &grammar::Material) -> (&Spanned<grammar::Elastic>, &'static str) {
-    match material {
-        grammar::Material::Pmb(table) => (table, "pmb"),
-        grammar::Material::Proportional(table) => (table, "proportional"),
-        grammar::Material::NormalisedPmb(table) => (table, "normalised_pmb"),
-        grammar::Material::LinearMicroelastic(table) => (table, "linear_microelastic"),
-        grammar::Material::Ordinary(table) => (table, "ordinary"),
-    }
-}
+use crate::material::{Declaration, Key, Kind, Value, declarations};
 
 /// Validates a material.
 ///
 /// # Errors
-/// On wrong constants, too few or too many, those of a solid that the law cannot be, and on keys that
-/// belong to another law.
+/// On an unknown law or key, wrong constants, too few or too many, and those of a solid that the law
+/// cannot be.
 pub fn material(
     scope: &Scope,
     dimension: Dimension,
     name: &str,
     material: &Spanned<grammar::Material>,
 ) -> Result<plan::Material> {
-    let (spanned, law_name) = table(material.get_ref());
-    let table = spanned.get_ref();
-    let key = format!("[material.{name}.{law_name}]");
-    let law = law(scope, dimension, material, &key)?;
+    let grammar::Material { law, table } = material.get_ref();
+    let declaration = law::find(law.get_ref())
+        .map_err(|message| scope.error(law.span(), format!("[material.{name}]: {message}")))?;
+    let section = Section {
+        scope,
+        key: format!("[material.{name}.{}]", declaration.name),
+        declaration,
+        table: table.get_ref(),
+        place: table.span(),
+    };
+    section.keys_are_known()?;
+    let Some(density) = section.table.get(DENSITY) else {
+        return Err(section.error(None, format!("needs `{DENSITY}`")));
+    };
     Ok(plan::Material {
-        density: scope.positive(&table.density, &format!("{key} density"))?,
-        elastic: elastic(scope, dimension, spanned, &law, &key)?,
-        damping: match &table.damping {
+        law: section.law(dimension)?,
+        density: scope.positive(density, &section.key_of(DENSITY))?,
+        elastic: section.elastic(dimension)?,
+        damping: match section.table.get(DAMPING) {
             None => 0.0,
             Some(number) => {
-                let key = format!("{key} damping");
+                let key = section.key_of(DAMPING);
                 scope.within(number, &key, 0.0..f64::INFINITY, "at least 0")?
             }
         },
-        law,
     })
 }
 
-/// The law, with the keys that only it has.
-fn law(
-    scope: &Scope,
-    dimension: Dimension,
-    material: &Spanned<grammar::Material>,
-    key: &str,
-) -> Result<plan::Law> {
-    let (spanned, law_name) = table(material.get_ref());
-    let table = spanned.get_ref();
-    let plain = ["pmb", "proportional", "linear_microelastic"];
-    let correction = table.surface_correction.as_ref();
-    let own_keys: [(&str, Option<_>, &[&str]); 4] = [
-        ("surface_correction", correction.map(Spanned::span), &plain),
-        (
-            "form",
-            table.form.as_ref().map(Spanned::span),
-            &["normalised_pmb"],
-        ),
-        (
-            "influence",
-            table.influence.as_ref().map(Spanned::span),
-            &["ordinary"],
-        ),
-        (
-            "lambda",
-            table.lambda.as_ref().map(Spanned::span),
-            &["linear_microelastic"],
-        ),
-    ];
-    for (name, place, laws) in own_keys {
-        if let (Some(place), false) = (place, laws.contains(&law_name)) {
-            let message = format!("{key} {name}: only `{}` has this key", laws.join("` and `"));
-            return Err(scope.error(place, message));
-        }
+/// The table of a law.
+struct Section<'a> {
+    scope: &'a Scope<'a>,
+    /// Its header, for errors.
+    key: String,
+    declaration: &'static Declaration,
+    table: &'a LawTable,
+    place: Range<usize>,
+}
+
+impl Section<'_> {
+    /// One of its keys, for errors.
+    fn key_of(&self, name: &str) -> String {
+        format!("{} {name}", self.key)
     }
-    let corrected = correction
-        .is_some_and(|correction| *correction.get_ref() == grammar::SurfaceCorrection::Energy);
-    let line = matches!(dimension, Dimension::Line { .. });
-    Ok(match material.get_ref() {
-        grammar::Material::Pmb(_) => plan::Law::Pmb { corrected },
-        grammar::Material::Proportional(_) => plan::Law::Proportional { corrected },
-        grammar::Material::NormalisedPmb(_) => {
-            let Some(form) = &table.form else {
-                return Ok(plan::Law::NormalisedPmb(plan::NormalisedForm::Energy));
-            };
-            plan::Law::NormalisedPmb(match form.get_ref() {
-                grammar::Form::Energy => plan::NormalisedForm::Energy,
-                grammar::Form::Diehl2016 if line => {
-                    let message = format!(
-                        "{key} form: the paper has no constant for 1-D; `energy` serves there"
-                    );
-                    return Err(scope.error(form.span(), message));
-                }
-                grammar::Form::Diehl2016 => plan::NormalisedForm::Diehl2016,
-            })
-        }
-        grammar::Material::LinearMicroelastic(_) => {
-            let parse = |number| scope.expression(number, &format!("{key} lambda"), &[Variable::R]);
-            plan::Law::LinearMicroelastic {
-                lambda: table.lambda.as_ref().map(parse).transpose()?,
-                corrected,
+
+    /// An error at the value of a key, or else at the whole table.
+    fn error(&self, name: Option<&str>, message: impl AsRef<str>) -> crate::error::Error {
+        let number = name.and_then(|name| self.table.get(name));
+        let place = number.map_or(self.place.clone(), Spanned::span);
+        let key = name.map_or(self.key.clone(), |name| self.key_of(name));
+        let message = message.as_ref();
+        self.scope.error(place, format!("{key}: {message}"))
+    }
+
+    fn keys_are_known(&self) -> Result<()> {
+        let own = self.declaration.keys.iter().map(|key| key.name);
+        let known = common_keys().chain(own);
+        let unknown = |key: &&grammar::Text| known.clone().all(|known| known != key.get_ref());
+        let Some(key) = self.table.keys().find(unknown) else {
+            return Ok(());
+        };
+        let name = key.get_ref().as_str();
+        let have = || declarations().filter(|law| law.key(name).is_some());
+        let message = match have().count() {
+            0 => {
+                let message = format!("unknown key `{name}`{}", suggestion(name, known));
+                let message = format!("{}: {message}", self.key);
+                return Err(self.scope.error(key.span(), message));
+            }
+            1 => format!("only {} has this key", law::names(have(), "and")),
+            _ => format!("only {} have this key", law::names(have(), "and")),
+        };
+        Err(self.error(Some(name), message))
+    }
+
+    /// The law with the values of its own keys.
+    fn law(&self, dimension: Dimension) -> Result<plan::Law> {
+        let mut law = plan::Law::of(self.declaration);
+        for key in self.declaration.keys {
+            if let Some(written) = self.table.get(key.name) {
+                law.values.set(key.name, self.value(key, written)?);
             }
         }
-        grammar::Material::Ordinary(_) if line => {
-            let message =
-                format!("{key}: `ordinary` has no 1-D form; `pmb` is the same there for ν = 0.25");
-            return Err(scope.error(spanned.span(), message));
+        match law.fault(dimension) {
+            None => Ok(law),
+            Some(fault) => Err(self.error(fault.key, fault.message)),
         }
-        grammar::Material::Ordinary(_) => {
-            let influence = table
-                .influence
-                .as_ref()
-                .map(|influence| *influence.get_ref());
-            plan::Law::Ordinary(match influence {
-                None | Some(grammar::Influence::Constant) => Influence::Constant,
-                Some(grammar::Influence::Linear) => Influence::Linear,
-                Some(grammar::Influence::Gaussian) => Influence::Gaussian,
-                Some(grammar::Influence::Inverse) => Influence::Inverse,
-            })
-        }
-    })
-}
+    }
 
-/// The elastic constants; those of a bond-based law have its own Poisson ratio.
-fn elastic(
-    scope: &Scope,
-    dimension: Dimension,
-    spanned: &Spanned<grammar::Elastic>,
-    law: &plan::Law,
-    key: &str,
-) -> Result<Isotropic> {
-    let bond_based = !matches!(law, plan::Law::Ordinary(_));
-    let own = dimension.bond_based_poisson_ratio();
-    let value = |key_name: &str, constant, number: &Number| {
-        let key = format!("{key} {key_name}");
-        match constant {
-            Constant::Poisson => scope.within(number, &key, -1.0..0.5, "between -1 and 0.5"),
-            Constant::Lame => scope.number(number, &key),
-            Constant::Young | Constant::Bulk | Constant::Shear => scope.positive(number, &key),
-        }
-    };
-    let constants = given(spanned.get_ref());
-    let pair = match constants[..] {
-        [(key_name, constant, number)] if constant != Constant::Poisson && bond_based => [
-            (constant, value(key_name, constant, number)?),
-            (Constant::Poisson, own),
-        ],
-        [a, b] => [(a.1, value(a.0, a.1, a.2)?), (b.1, value(b.0, b.1, b.2)?)],
-        _ => {
-            let names = "`youngs_modulus`, `bulk_modulus`, `shear_modulus`, `lame_lambda` and \
-                         `poisson_ratio`";
-            let message = match bond_based {
-                true => format!(
-                    "{key}: give one or two of {names}; with one (not the last), Poisson's ratio \
-                     is the law's own"
-                ),
-                false => format!("{key}: give two of {names}"),
-            };
-            let third = constants.get(2).map(|third| third.2.span());
-            return Err(scope.error(third.unwrap_or(spanned.span()), message));
-        }
-    };
-    let place = constants
-        .last()
-        .map_or(spanned.span(), |last| last.2.span());
-    let Some(found) = Isotropic::from_two(pair[0], pair[1]) else {
-        let names: Vec<&str> = constants.iter().map(|constant| constant.0).collect();
-        let message = format!(
-            "{key}: no solid has this {}; a stable one has moduli above 0 and a Poisson's ratio \
-             between -1 and 0.5",
-            names.join(" and ")
-        );
-        return Err(scope.error(place, message));
-    };
-    if !bond_based {
-        return Ok(found);
-    }
-    // A ratio given as 0.33 or 0.333 means 1/3.
-    if (found.poisson_ratio - own).abs() > 0.005 {
-        let other = match dimension {
-            Dimension::Line { .. } => "",
-            _ => ", or take the law `ordinary`, which has any",
+    fn value(&self, key: &Key, written: &Number) -> Result<Value> {
+        let value = match (&key.kind, written.get_ref()) {
+            (Kind::Word(_), Written::Text(word)) => word.as_str().into(),
+            (Kind::Word(_) | Kind::Number { .. }, _) => {
+                self.scope.number(written, &self.key_of(key.name))?.into()
+            }
+            (Kind::OfLength, _) => {
+                let name = self.key_of(key.name);
+                self.scope
+                    .expression(written, &name, &[Variable::R])?
+                    .into()
+            }
         };
-        let message = format!(
-            "{key}: Poisson's ratio is {:.4}, but a bond-based law in {} always has {:.4}; leave \
-             the second constant out to accept that{other}",
-            found.poisson_ratio,
-            dimension.name(),
-            own,
-        );
-        return Err(scope.error(place, message));
+        law::check(key, &value).map_err(|message| self.error(Some(key.name), message))?;
+        Ok(value)
     }
-    Ok(Isotropic {
-        youngs_modulus: found.youngs_modulus,
-        poisson_ratio: own,
-    })
+
+    /// The elastic constants; those of a bond-based law have its own Poisson ratio.
+    fn elastic(&self, dimension: Dimension) -> Result<Isotropic> {
+        let bond_based = !self.declaration.any_poisson_ratio;
+        let own = dimension.bond_based_poisson_ratio();
+        let given = self.elastic_constants();
+        let value = |(name, constant): (&str, Constant)| {
+            let (key, number) = (self.key_of(name), &self.table[name]);
+            let value = match constant {
+                Constant::Poisson => {
+                    self.scope
+                        .within(number, &key, -1.0..0.5, "between -1 and 0.5")
+                }
+                Constant::Lame => self.scope.number(number, &key),
+                Constant::Young | Constant::Bulk | Constant::Shear => {
+                    self.scope.positive(number, &key)
+                }
+            };
+            Ok((constant, value?))
+        };
+        let pair = match given[..] {
+            [only] if only.1 != Constant::Poisson && bond_based => {
+                [value(only)?, (Constant::Poisson, own)]
+            }
+            [first, second] => [value(first)?, value(second)?],
+            _ => return Err(self.wrong_number_of_constants(&given)),
+        };
+        let last = given.last().map(|(name, _)| *name);
+        // What is wrong with the constants stands at the last one, but names none of them alone.
+        let error = |message: String| {
+            let place = last.map_or(self.place.clone(), |name| self.table[name].span());
+            self.scope.error(place, format!("{}: {message}", self.key))
+        };
+        let Some(found) = Isotropic::from_two(pair[0], pair[1]) else {
+            let names: Vec<&str> = given.iter().map(|(name, _)| *name).collect();
+            return Err(error(format!(
+                "no solid has this {}; a stable one has moduli above 0 and a Poisson's ratio \
+                 between -1 and 0.5",
+                names.join(" and ")
+            )));
+        };
+        if !bond_based {
+            return Ok(found);
+        }
+        // A ratio given as 0.33 or 0.333 means 1/3.
+        if (found.poisson_ratio - own).abs() > 0.005 {
+            let others = declarations().filter(|law| {
+                law.any_poisson_ratio && plan::Law::of(law).fault(dimension).is_none()
+            });
+            let other = match others.clone().count() {
+                0 => String::new(),
+                _ => format!(
+                    ", or take the law {}, which has any",
+                    law::names(others, "or")
+                ),
+            };
+            return Err(error(format!(
+                "Poisson's ratio is {:.4}, but a bond-based law in {} always has {:.4}; leave the \
+                 second constant out to accept that{other}",
+                found.poisson_ratio,
+                dimension.name(),
+                own,
+            )));
+        }
+        Ok(Isotropic {
+            youngs_modulus: found.youngs_modulus,
+            poisson_ratio: own,
+        })
+    }
+
+    /// The elastic constants that are given, in the order of the deck.
+    fn elastic_constants(&self) -> Vec<(&'static str, Constant)> {
+        let mut given: Vec<_> = ELASTIC_CONSTANTS
+            .into_iter()
+            .filter(|(name, _)| self.table.contains_key(*name))
+            .collect();
+        given.sort_by_key(|(name, _)| self.table[*name].span().start);
+        given
+    }
+
+    fn wrong_number_of_constants(&self, given: &[(&str, Constant)]) -> crate::error::Error {
+        let names = "`youngs_modulus`, `bulk_modulus`, `shear_modulus`, `lame_lambda` and \
+                     `poisson_ratio`";
+        let message = match self.declaration.any_poisson_ratio {
+            true => format!("{}: give two of {names}", self.key),
+            false => format!(
+                "{}: give one or two of {names}; with one (not the last), Poisson's ratio is the \
+                 law's own",
+                self.key
+            ),
+        };
+        let third = given.get(2).map(|(name, _)| self.table[*name].span());
+        self.scope
+            .error(third.unwrap_or(self.place.clone()), message)
+    }
 }
 
 /// Validates a damage law.

@@ -9,6 +9,7 @@ pub mod expression;
 pub mod grammar;
 mod history;
 mod interface;
+mod law;
 mod materials;
 mod number;
 mod outputs;

@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use super::expression::Expression;
+pub use super::law::Law;
 use super::source::Source;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::material::Influence;
 
 /// Everything that a run needs to know.
 #[derive(Debug, Clone)]
@@ -87,7 +87,7 @@ pub struct Body {
 /// A material: density, elastic constants and the law that uses them.
 #[derive(Debug, Clone)]
 pub struct Material {
-    /// Which law.
+    /// The law.
     pub law: Law,
     /// kg/m³.
     pub density: f64,
@@ -95,54 +95,6 @@ pub struct Material {
     pub elastic: Isotropic,
     /// Viscous damping r, 1/s: a force density −r ρ u̇.
     pub damping: f64,
-}
-
-/// The material laws.
-#[derive(Debug, Clone)]
-pub enum Law {
-    /// Prototype microelastic.
-    Pmb {
-        /// Whether the strain energy of each point's own family corrects the micromodulus.
-        corrected: bool,
-    },
-    /// Prototype microelastic that cannot break.
-    Proportional {
-        /// As for the prototype microelastic.
-        corrected: bool,
-    },
-    /// With a micromodulus for each point.
-    NormalisedPmb(NormalisedForm),
-    /// Linear in the displacements.
-    LinearMicroelastic {
-        /// λ(r), N/m⁹; c/r³ if there is none.
-        lambda: Option<Expression>,
-        /// As for the prototype microelastic.
-        corrected: bool,
-    },
-    /// Ordinary state-based.
-    Ordinary(Influence),
-}
-
-impl Law {
-    /// Its name in decks.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Pmb { .. } => "pmb",
-            Self::Proportional { .. } => "proportional",
-            Self::NormalisedPmb(_) => "normalised_pmb",
-            Self::LinearMicroelastic { .. } => "linear_microelastic",
-            Self::Ordinary(_) => "ordinary",
-        }
-    }
-}
-
-/// How a point's micromodulus follows from its neighbours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NormalisedForm {
-    /// w = c s²|ξ|/2 holds the classical energy.
-    Energy,
-    /// Diehl & Schweitzer 2016, eq. 15–17, as printed.
-    Diehl2016,
 }
 
 /// What volumes near the edge of a family count.

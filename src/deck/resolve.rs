@@ -3,6 +3,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use indexmap::IndexMap;
+use nalgebra::Vector3;
 use serde_spanned::Spanned;
 
 use super::expression::{Expression, Variable};
@@ -173,10 +174,10 @@ impl<'a> Scope<'a> {
 
     /// A vector of unit length.
     pub fn direction(&self, vector: &Vector, key: &str) -> Result<[f64; 3]> {
-        let values = self.vector(vector, key)?;
-        let length = values.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let values = Vector3::from(self.vector(vector, key)?);
+        let length = values.dot(&values).sqrt();
         if length > 0.0 {
-            Ok(values.map(|value| value / length))
+            Ok((values / length).into())
         } else {
             Err(self.error(vector.span(), format!("{key}: must not be zero")))
         }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector3;
 use serde_spanned::Spanned;
 
 use super::grammar;
@@ -191,12 +192,7 @@ pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Resu
             let corner = scope.vector(corner, &format!("{key} corner"))?;
             let a = scope.vector(edge_a, &format!("{key} edge_a"))?;
             let b = scope.vector(edge_b, &format!("{key} edge_b"))?;
-            let cross = [
-                a[1] * b[2] - a[2] * b[1],
-                a[2] * b[0] - a[0] * b[2],
-                a[0] * b[1] - a[1] * b[0],
-            ];
-            if cross == [0.0; 3] {
+            if Vector3::from(a).cross(&Vector3::from(b)) == Vector3::zeros() {
                 let message = format!("{key} edge_b: must be neither 0 nor along `edge_a`");
                 return Err(scope.error(edge_b.span(), message));
             }

@@ -7,9 +7,11 @@ use serde::de::IntoDeserializer;
 use serde::de::value::{Error as NameError, StrDeserializer};
 use toml::de::{DeTable, DeValue};
 
-use super::grammar::{Crack, Damage, DimensionName, Material, Shape};
+use super::grammar::{Crack, Damage, DimensionName, Shape};
+use super::law;
 use super::source::{Source, suggestion};
 use crate::error::Error;
+use crate::material::declarations;
 
 /// The error that the deck deserves for what the TOML reader found.
 pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
@@ -103,7 +105,7 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
     if message.starts_with("wanted exactly 1 element") {
         let section = place.path.first().map_or("", String::as_str);
         let kinds = match section {
-            "material" => kinds::<Material>(),
+            "material" => declarations().map(|law| law.name.to_owned()).collect(),
             "damage" => kinds::<Damage>(),
             "crack" => kinds::<Crack>(),
             _ => kinds::<Shape>(),
@@ -119,7 +121,8 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
     match (message.split_once(", expected "), place.value) {
         (Some((_, expected)), Some(value)) if wrong_value => {
             let written = source.text.get(span.clone()).unwrap_or_default();
-            let words = format!("must be {}, is {}", wanted(expected), given(value, written));
+            let wanted = wanted_of_law(&place.path).unwrap_or_else(|| wanted(expected).to_owned());
+            let words = format!("must be {wanted}, is {}", given(value, written));
             error(&place.path, words)
         }
         _ => error(&place.path, message.to_owned()),
@@ -242,6 +245,15 @@ fn wanted(expected: &str) -> &str {
         _ if expected.starts_with("struct ") => "a table",
         _ => expected,
     }
+}
+
+/// What the key of a law must be, if the path leads to one.
+fn wanted_of_law(path: &[String]) -> Option<String> {
+    let [section, _, name, key] = path else {
+        return None;
+    };
+    let law = declarations().find(|law| section == "material" && law.name == name);
+    law?.key(key).map(law::wanted)
 }
 
 /// What stands in the deck, in the words of its user.

@@ -1,77 +1,8 @@
-//! The list of all laws, and laws that are one of several: for what is done once a point, and for the
-//! bonds between blocks of different laws.
+//! Laws that are one of several: for what is done once a point, and for the bonds between blocks of
+//! different laws.
 
-use super::{
-    Bond, Described, ElasticPlasticPmb, ForceState, Law, LinearMicroelastic, Normalised, Ordinary,
-    Pmb,
-};
+use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, with_law};
 use crate::lanes::{Lanes, Numbers};
-
-/// Makes the enums of laws, and the macros that run code for whichever law it is, from the list of
-/// laws. `$` stands first because the macros that are made need it.
-macro_rules! register {
-    ($d:tt $($(#[$doc:meta])* $law:ident),+ $(,)?) => {
-        /// One of the laws.
-        #[derive(Debug, Clone, Copy, PartialEq)]
-        pub enum AnyLaw {
-            $($(#[$doc])* $law($law),)+
-        }
-
-        /// The laws of the own and of the far end of bonds.
-        #[derive(Debug, Clone, Copy)]
-        pub enum PairLaw {
-            $($(#[$doc])* $law([$law; 2]),)+
-            /// Different laws at the two ends.
-            Mixed([AnyLaw; 2]),
-        }
-
-        impl PairLaw {
-            /// From the laws of the own and of the far end.
-            pub fn new(here: AnyLaw, there: AnyLaw) -> Self {
-                match (here, there) {
-                    $((AnyLaw::$law(here), AnyLaw::$law(there)) => Self::$law([here, there]),)+
-                    _ => Self::Mixed([here, there]),
-                }
-            }
-        }
-
-        /// Runs code for whichever law an [`AnyLaw`] is; compiled for each.
-        macro_rules! with_law {
-            ($d any:expr, $d law_name:ident => $d body:expr) => {
-                match $d any {
-                    $($crate::material::AnyLaw::$law($d law_name) => $d body,)+
-                }
-            };
-        }
-
-        /// Runs code for whichever laws a [`PairLaw`] has; compiled for each.
-        macro_rules! with_pair {
-            ($d pair:expr, $d laws:ident => $d body:expr) => {
-                match $d pair {
-                    $($crate::material::PairLaw::$law($d laws) => $d body,)+
-                    $crate::material::PairLaw::Mixed($d laws) => $d body,
-                }
-            };
-        }
-
-        const COUNTS: &[Counts] = &[$(Counts::of::<$law, 3>()),+];
-    };
-}
-
-register! {
-    $
-    /// Prototype or proportional microelastic.
-    Pmb,
-    /// Prototype microelastic up to a yield stretch.
-    ElasticPlasticPmb,
-    /// With a micromodulus for each point.
-    Normalised,
-    /// Linear microelastic.
-    LinearMicroelastic,
-    /// Ordinary state-based.
-    Ordinary,
-}
-pub(crate) use {with_law, with_pair};
 
 /// How many numbers of each kind the points and bonds of a law have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,7 +24,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    const fn of<L: Law<D>, const D: usize>() -> Self {
+    pub(super) const fn of<L: Law<D>, const D: usize>() -> Self {
         Self {
             constants: L::CONSTANTS,
             point: L::Point::COUNT,
@@ -177,7 +108,6 @@ impl<const D: usize> Law<D> for AnyLaw {
     const STAGES: usize = MOST.stages;
     const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;
-    const SCALED: bool = true;
 
     #[inline(always)]
     fn whole_share(&self, length: Lanes) -> Self::WholeSum {
@@ -225,13 +155,5 @@ impl<const D: usize> Law<D> for AnyLaw {
     #[inline(always)]
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes {
         with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
-    }
-
-    #[inline(always)]
-    fn toughness_scale(&self, here: &Self::Point, other: &Self, there: &Self::Point) -> Lanes {
-        if let (Self::Normalised(law), Self::Normalised(other)) = (self, other) {
-            return Law::<D>::toughness_scale(law, &first(here), other, &first(there));
-        }
-        Lanes::splat(1.0)
     }
 }

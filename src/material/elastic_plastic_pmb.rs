@@ -5,7 +5,8 @@
 //! which unloading returns on a line of the same slope. The bond's elastic energy is c (s − s_p)² |ξ|/2;
 //! to let s_p grow by Δs_p takes c s_y |Δs_p| |ξ|, which is dissipated.
 
-use super::{Along, Bond, Described, Law, Pmb};
+use super::declaration::bond_based_critical_stretch;
+use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
 use crate::lanes::Lanes;
 
 /// The law with its constants.
@@ -15,6 +16,45 @@ pub struct ElasticPlasticPmb {
     pub elastic: Pmb,
     /// s_y.
     pub yield_stretch: f64,
+}
+
+const YIELD_STRETCH: Key = Key {
+    name: "yield_stretch",
+    meaning: "the stretch s_y, pulled or pushed, at which a bond yields",
+    kind: Kind::POSITIVE,
+};
+
+impl Declared for ElasticPlasticPmb {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[YIELD_STRETCH],
+        conservative: false,
+        critical_stretch: Some(critical_stretch),
+        examples: &["yield_stretch = 0.02"],
+        ..Declaration::new(
+            "elastic_plastic_pmb",
+            "f = c (s − s_p) e, where the plastic stretch s_p of a bond keeps |s − s_p| ≤ s_y",
+            build,
+        )
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    Built::plain(ElasticPlasticPmb {
+        elastic: Pmb::of(given),
+        yield_stretch: given.values.number(YIELD_STRETCH.name),
+    })
+}
+
+/// To pull a bond to s0 > s_y takes c s_y (s0 − s_y/2) |ξ|, with s0 = s_e²/(2 s_y) + s_y/2 as much as
+/// the c s_e² |ξ|/2 of an elastic bond that breaks at s_e.
+fn critical_stretch(given: &Given, energy: f64) -> f64 {
+    let elastic = bond_based_critical_stretch(given, energy);
+    let limit = given.values.number(YIELD_STRETCH.name);
+    if elastic <= limit {
+        elastic
+    } else {
+        0.5 * (elastic * elastic / limit + limit)
+    }
 }
 
 impl Described for ElasticPlasticPmb {

@@ -5,7 +5,10 @@
 //! influence λ |ξ|³. Forces act along ξ, also after large motions, so a rotated body is not free of
 //! forces.
 
-use super::{Along, Bond, Described, Law};
+use std::sync::Arc;
+
+use super::pmb::SURFACE_CORRECTION;
+use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
 use crate::lanes::Lanes;
 
 /// The law with its constants.
@@ -16,6 +19,42 @@ pub struct LinearMicroelastic {
     /// Classical energy density at unit isotropic stretch W₁ (J/m³) that the sum over each point's
     /// own family is scaled to; `None` to scale nothing.
     pub corrected_to: Option<f64>,
+}
+
+const LAMBDA: Key = Key {
+    name: "lambda",
+    meaning: "λ in N/m⁹, an expression of the bond's length `r` in m; c/r³ if not given",
+    kind: Kind::OfLength,
+};
+
+impl Declared for LinearMicroelastic {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[LAMBDA, SURFACE_CORRECTION],
+        linear: true,
+        examples: &[
+            "",
+            "lambda = '0.01*exp(-r)'",
+            "surface_correction = 'energy'",
+        ],
+        ..Declaration::new("linear_microelastic", "f = λ(r) ξ⊗ξ η", build)
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    let lambda = given.values.of_length(LAMBDA.name);
+    let plain = Pmb::of(given).micromodulus;
+    let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
+    let corrected = given.values.word(SURFACE_CORRECTION.name) == "energy";
+    let law = LinearMicroelastic {
+        micromodulus: lambda.map_or(plain, |_| 1.0),
+        corrected_to: corrected.then_some(energy),
+    };
+    match lambda.map(Arc::clone) {
+        None => Built::plain(law),
+        Some(lambda) => {
+            Built::with_influence(law, move |length| lambda.at(length) * length.powi(3))
+        }
+    }
 }
 
 impl Described for LinearMicroelastic {

@@ -8,6 +8,7 @@
 
 mod any;
 pub mod bond;
+mod declaration;
 mod elastic_plastic_pmb;
 mod force_state;
 mod influence;
@@ -15,17 +16,25 @@ mod linear_microelastic;
 mod normalised;
 mod ordinary;
 mod pmb;
+mod registration;
 
-pub use any::{AnyLaw, Counts, MOST, PairLaw};
-pub(crate) use any::{with_law, with_pair};
+pub use any::{Counts, MOST};
 pub use bond::Bond;
-pub use elastic_plastic_pmb::ElasticPlasticPmb;
+pub use declaration::{
+    Built, Declaration, Declared, Given, Key, Kind, OfLength, Value, Values, Word,
+};
 pub use force_state::{Along, ForceState};
 pub use influence::Influence;
-pub use linear_microelastic::LinearMicroelastic;
-pub use normalised::Normalised;
-pub use ordinary::Ordinary;
-pub use pmb::Pmb;
+
+// Every law, by its file and type, in the order of the table of laws.
+registration::register! {
+    $
+    pmb::Pmb,
+    elastic_plastic_pmb::ElasticPlasticPmb,
+    normalised::Normalised,
+    linear_microelastic::LinearMicroelastic,
+    ordinary::Ordinary,
+}
 
 use crate::lanes::{Lanes, Numbers, Simd};
 use bond::Weights;

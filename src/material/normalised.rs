@@ -8,7 +8,14 @@
 //!
 //! With the influence 1/|ξ| it is Diehl & Schweitzer's eq. 15: w = c̄_i s²/2, c̄_i = 4 W₁ / Σ Ṽ.
 
-use super::{Along, Bond, Described, Law};
+use std::f64::consts::PI;
+
+use super::declaration::bond_based_critical_stretch;
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law, Pmb,
+    Word,
+};
+use crate::dimension::Dimension;
 use crate::lanes::Lanes;
 
 /// The law with its constants.
@@ -19,6 +26,82 @@ pub struct Normalised {
     /// The micromodulus that the damage law's critical stretch belongs to, N/m⁶; `None` if that
     /// stretch holds for all bonds.
     pub reference: Option<f64>,
+}
+
+const FORM: Key = Key {
+    name: "form",
+    meaning: "whose energy is the classical one: w = c s²|ξ|/2, or c s²/2 as printed by Diehl & \
+              Schweitzer (2016)",
+    kind: Kind::Word(&[
+        Word::new("energy"),
+        Word {
+            word: "diehl2016",
+            no_line: Some("the paper has no constant for 1-D; `energy` serves there"),
+        },
+    ]),
+};
+
+impl Declared for Normalised {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[FORM],
+        critical_stretch: Some(critical_stretch),
+        examples: &["", "form = 'diehl2016'"],
+        ..Declaration::new(
+            "normalised_pmb",
+            "a micromodulus for each point, from its own neighbours",
+            build,
+        )
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    if as_printed(given) {
+        let law = Normalised {
+            energy: 2.25 * given.elastic.bulk_modulus(),
+            reference: given.tough.then(|| printed_micromodulus(given)),
+        };
+        let horizon = given.horizon;
+        Built::with_influence(law, move |length| Influence::Inverse.at(length, horizon))
+    } else {
+        Built::plain(Normalised::classical(given))
+    }
+}
+
+fn as_printed(given: &Given) -> bool {
+    given.values.word(FORM.name) == "diehl2016"
+}
+
+/// The constant of Diehl & Schweitzer 2016, eq. 15, for a family of the whole horizon: 9K/Σ V, divided
+/// by the horizon, which stands in the influence.
+fn printed_micromodulus(given: &Given) -> f64 {
+    let volume = match given.dimension {
+        Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),
+        _ => PI * given.horizon.powi(2) * given.dimension.section(),
+    };
+    9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
+}
+
+/// As printed: eq. 16–17 in the plane; in space the sum over the bonds across a plane.
+fn critical_stretch(given: &Given, energy: f64) -> f64 {
+    if !as_printed(given) {
+        return bond_based_critical_stretch(given, energy);
+    }
+    let horizon = given.horizon;
+    let c = printed_micromodulus(given) * horizon;
+    match given.dimension {
+        Dimension::Space => (8.0 * energy / (PI * c * horizon.powi(4))).sqrt(),
+        dimension => (1.5 * energy / (c * dimension.section() * horizon.powi(3))).sqrt(),
+    }
+}
+
+impl Normalised {
+    /// To the classical energy density of the solid that bond-based laws can be.
+    pub(super) fn classical(given: &Given) -> Self {
+        Self {
+            energy: Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus),
+            reference: given.tough.then(|| Pmb::of(given).micromodulus),
+        }
+    }
 }
 
 impl Described for Normalised {

@@ -17,7 +17,10 @@
 //! the whole family, θ sums over intact bonds.
 
 use super::bond::Weights;
-use super::{Along, Bond, Described, Law};
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law, Word,
+};
+use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::lanes::{Lanes, Simd};
@@ -48,6 +51,11 @@ impl Ordinary {
         })
     }
 
+    /// From what a body has, in the plane or in space.
+    fn of(given: &Given) -> Self {
+        Self::new(given.dimension, given.elastic).expect("the law declares that it has no 1-D form")
+    }
+
     /// d.
     pub fn dimension(&self) -> f64 {
         self.dimension
@@ -76,6 +84,55 @@ fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
         }
         Dimension::Space => Some(elastic.bulk_modulus()),
     }
+}
+
+const INFLUENCE: Key = Key {
+    name: "influence",
+    meaning: "ω of bonds of length r and a horizon δ: 1, 1 − r/δ, exp(−4r²/δ²) or δ/r",
+    kind: Kind::Word(&[
+        Word::new("constant"),
+        Word::new("linear"),
+        Word::new("gaussian"),
+        Word::new("inverse"),
+    ]),
+};
+
+impl Declared for Ordinary {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[INFLUENCE],
+        any_poisson_ratio: true,
+        no_line: Some("`ordinary` has no 1-D form; `pmb` is the same there for ν = 0.25"),
+        critical_stretch: Some(critical_stretch),
+        examples: &[
+            "poisson_ratio = 0.4",
+            "poisson_ratio = 0.1, influence = 'linear'",
+            "poisson_ratio = 0.25, influence = 'gaussian'",
+            "poisson_ratio = -0.3, influence = 'inverse'",
+        ],
+        ..Declaration::new("ordinary", "state-based, of the family's dilatation", build)
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    let (law, horizon) = (Ordinary::of(given), given.horizon);
+    match influence(given) {
+        Influence::Constant => Built::plain(law),
+        influence => Built::with_influence(law, move |length| influence.at(length, horizon)),
+    }
+}
+
+fn influence(given: &Given) -> Influence {
+    match given.values.word(INFLUENCE.name) {
+        "linear" => Influence::Linear,
+        "gaussian" => Influence::Gaussian,
+        "inverse" => Influence::Inverse,
+        _ => Influence::Constant,
+    }
+}
+
+fn critical_stretch(given: &Given, energy: f64) -> f64 {
+    let law = Ordinary::of(given);
+    CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
 
 impl Described for Ordinary {

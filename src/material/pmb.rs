@@ -7,7 +7,10 @@
 use std::f64::consts::PI;
 
 use super::bond::Weights;
-use super::{Along, Bond, Described, Law};
+use super::declaration::bond_based_critical_stretch;
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised, Word,
+};
 use crate::dimension::Dimension;
 use crate::lanes::{Lanes, Simd};
 
@@ -35,6 +38,11 @@ impl Pmb {
         }
     }
 
+    /// From what a body has.
+    pub fn of(given: &Given) -> Self {
+        Self::new(given.dimension, given.elastic.youngs_modulus, given.horizon)
+    }
+
     /// Classical energy density at unit isotropic stretch W₁ (J/m³) of the solid that the law can be:
     /// 3-D 9K/2 = 3E, plane stress E/(1−ν), plane strain E/((1+ν)(1−2ν)), 1-D (λ + 2G)/2.
     pub fn isotropic_energy(dimension: Dimension, youngs_modulus: f64) -> f64 {
@@ -45,6 +53,36 @@ impl Pmb {
                 Dimension::PlaneStrain { .. } => 1.6,
                 Dimension::Line { .. } => 0.6,
             }
+    }
+}
+
+/// What corrects the micromodulus near surfaces.
+pub(super) const SURFACE_CORRECTION: Key = Key {
+    name: "surface_correction",
+    meaning: "what scales the micromodulus of each point: its own family's strain energy, or nothing",
+    kind: Kind::Word(&[Word::new("none"), Word::new("energy")]),
+};
+
+impl Declared for Pmb {
+    const DECLARATIONS: &'static [Declaration] = &[
+        Declaration {
+            keys: &[SURFACE_CORRECTION],
+            critical_stretch: Some(bond_based_critical_stretch),
+            examples: &["", "surface_correction = 'energy'"],
+            ..Declaration::new("pmb", "prototype microelastic, f = c s e", build)
+        },
+        Declaration {
+            keys: &[SURFACE_CORRECTION],
+            ..Declaration::new("proportional", "the same, which cannot break", build)
+        },
+    ];
+}
+
+fn build(given: &Given) -> Built {
+    if given.values.word(SURFACE_CORRECTION.name) == "energy" {
+        Built::plain(Normalised::classical(given))
+    } else {
+        Built::plain(Pmb::of(given))
     }
 }
 

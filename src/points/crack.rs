@@ -1,6 +1,10 @@
 //! Which bonds cross a pre-crack.
 
+use nalgebra::Vector3;
+
 use crate::deck::plan::Crack;
+
+type Vector = Vector3<f64>;
 
 /// Slack at the rim of a crack, as a share of its size, so that a bond through the rim does not
 /// depend on rounding: it counts as cut.
@@ -10,69 +14,57 @@ const RIM: f64 = 1e-9;
 /// plane counts to its positive side. Both ends must ask in the same order (lower id first), so that
 /// they come to the same answer to the bit.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
+    let bond = [from, to].map(Vector::from);
+    let inside = -RIM..=1.0 + RIM;
     match crack {
-        Crack::Segment { from: a, to: b } => {
-            let edge = difference(*b, *a);
-            let normal = [-edge[1], edge[0], 0.0];
-            piercing(*a, normal, from, to).is_some_and(|hit| {
-                let along = dot(difference(hit, *a), edge) / dot(edge, edge);
-                (-RIM..=1.0 + RIM).contains(&along)
+        Crack::Segment { from, to } => {
+            let start = Vector::from(*from);
+            let edge = Vector::from(*to) - start;
+            let normal = Vector::new(-edge.y, edge.x, 0.0);
+            piercing(start, normal, bond).is_some_and(|hit| {
+                let along = (hit - start).dot(&edge) / edge.dot(&edge);
+                inside.contains(&along)
             })
         }
         Crack::Rectangle {
             corner,
             edge_a,
             edge_b,
-        } => piercing(*corner, cross(*edge_a, *edge_b), from, to).is_some_and(|hit| {
-            let offset = difference(hit, *corner);
-            let (aa, ab, bb) = (
-                dot(*edge_a, *edge_a),
-                dot(*edge_a, *edge_b),
-                dot(*edge_b, *edge_b),
-            );
-            let (oa, ob) = (dot(offset, *edge_a), dot(offset, *edge_b));
-            let determinant = aa * bb - ab * ab;
-            let along_a = (oa * bb - ob * ab) / determinant;
-            let along_b = (ob * aa - oa * ab) / determinant;
-            let inside = -RIM..=1.0 + RIM;
-            inside.contains(&along_a) && inside.contains(&along_b)
-        }),
+        } => {
+            let [corner, a, b] = [*corner, *edge_a, *edge_b].map(Vector::from);
+            piercing(corner, a.cross(&b), bond).is_some_and(|hit| {
+                let offset = hit - corner;
+                let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
+                let (oa, ob) = (offset.dot(&a), offset.dot(&b));
+                let determinant = aa * bb - ab * ab;
+                let along_a = (oa * bb - ob * ab) / determinant;
+                let along_b = (ob * aa - oa * ab) / determinant;
+                inside.contains(&along_a) && inside.contains(&along_b)
+            })
+        }
         Crack::Disc {
             centre,
             normal,
             radius,
-        } => piercing(*centre, *normal, from, to).is_some_and(|hit| {
-            let offset = difference(hit, *centre);
-            dot(offset, offset) <= (radius * (1.0 + RIM)).powi(2)
-        }),
+        } => {
+            let centre = Vector::from(*centre);
+            piercing(centre, Vector::from(*normal), bond).is_some_and(|hit| {
+                let offset = hit - centre;
+                offset.dot(&offset) <= (radius * (1.0 + RIM)).powi(2)
+            })
+        }
     }
 }
 
 /// Where the segment between two positions goes through a plane, if its ends lie on different sides.
-fn piercing(origin: [f64; 3], normal: [f64; 3], from: [f64; 3], to: [f64; 3]) -> Option<[f64; 3]> {
-    let height_from = dot(difference(from, origin), normal);
-    let height_to = dot(difference(to, origin), normal);
+fn piercing(origin: Vector, normal: Vector, [from, to]: [Vector; 2]) -> Option<Vector> {
+    let height_from = (from - origin).dot(&normal);
+    let height_to = (to - origin).dot(&normal);
     if (height_from >= 0.0) == (height_to >= 0.0) {
         return None;
     }
     let share = height_from / (height_from - height_to);
-    Some(std::array::from_fn(|k| from[k] + share * (to[k] - from[k])))
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    Some(from + share * (to - from))
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ pub mod shape;
 pub use lattice::LatticeBody;
 
 use bytemuck::{Pod, Zeroable};
+use nalgebra::Vector3;
 
 use crate::comm::{Communicator, agree};
 use crate::deck::plan::{Plan, PointSource, Selector};
@@ -52,8 +53,8 @@ impl Point {
 
 /// Squared distance of two positions, m².
 pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    let difference = Vector3::from(b) - Vector3::from(a);
+    difference.dot(&difference)
 }
 
 /// This rank's piece of the points: a contiguous range of ids, and the total over all ranks.

@@ -1,5 +1,7 @@
 //! Which positions lie within a shape.
 
+use nalgebra::{Vector2, Vector3};
+
 use crate::deck::plan::Shape;
 
 /// A box that holds the shape: its lower and upper corner, m. Unbounded directions give ±∞.
@@ -51,11 +53,11 @@ pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
             super::distance_squared(*centre, position) <= (radius + tolerance).powi(2)
         }
         Shape::Cylinder { from, to, radius } => {
-            let axis: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
-            let offset: [f64; 3] = std::array::from_fn(|k| position[k] - from[k]);
-            let length = dot(axis, axis).sqrt();
-            let along = dot(offset, axis) / length;
-            let across = dot(offset, offset) - along * along;
+            let [from, to, position] = [*from, *to, position].map(Vector3::from);
+            let (axis, offset) = (to - from, position - from);
+            let length = axis.dot(&axis).sqrt();
+            let along = offset.dot(&axis) / length;
+            let across = offset.dot(&offset) - along * along;
             along >= -tolerance
                 && along <= length + tolerance
                 && across <= (radius + tolerance).powi(2)
@@ -80,10 +82,6 @@ pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Even-odd rule; positions closer to an edge than |tolerance| are in for a positive tolerance and
 /// out for a negative one.
 fn in_polygon(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool {
@@ -105,16 +103,17 @@ fn in_polygon(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool
 }
 
 fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
-    let (edge, offset) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-    let length_squared = edge[0] * edge[0] + edge[1] * edge[1];
-    let along = (edge[0] * offset[0] + edge[1] * offset[1]) / length_squared;
+    let [a, b, p] = [a, b, p].map(Vector2::from);
+    let (edge, offset) = (b - a, p - a);
+    let along = edge.dot(&offset) / edge.dot(&edge);
     // A repeated corner has no length: its distance is that to the corner.
     let along = if along.is_nan() {
         0.0
     } else {
         along.clamp(0.0, 1.0)
     };
-    (offset[0] - along * edge[0]).hypot(offset[1] - along * edge[1])
+    let across = offset - along * edge;
+    across.x.hypot(across.y)
 }
 
 #[cfg(test)]

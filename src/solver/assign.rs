@@ -2,14 +2,12 @@
 
 use crate::damage::{Criterion, CriticalStretch};
 use crate::deck::plan::{
-    Body, InterfaceRule, Law, NormalisedForm, Plan, PointSource, Toughness, VolumeCorrection,
+    self, Body, InterfaceRule, Plan, PointSource, Toughness, VolumeCorrection,
 };
-use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
+use crate::error::{Error, Result};
 use crate::families::{BlockBonds, CellShare};
-use crate::material::{
-    AnyLaw, ElasticPlasticPmb, Influence, LinearMicroelastic, Normalised, Ordinary, PairLaw, Pmb,
-};
+use crate::material::{Built, Given, PairLaw};
 use crate::points::distance_squared;
 
 use super::bonds::{BlockLaws, Interaction};
@@ -39,80 +37,43 @@ fn constants(plan: &Plan, here: &Body, there: &Body) -> Constants {
     }
 }
 
-/// The constant of Diehl & Schweitzer 2016, eq. 15, for a family of the whole horizon: 9K/Σ V, divided
-/// by the horizon, which stands in the influence.
-fn diehl_reference(dimension: Dimension, constants: Constants) -> f64 {
-    let volume = match dimension {
-        Dimension::Space => 4.0 / 3.0 * std::f64::consts::PI * constants.horizon.powi(3),
-        _ => std::f64::consts::PI * constants.horizon.powi(2) * dimension.section(),
-    };
-    9.0 * constants.elastic.bulk_modulus() / (volume * constants.horizon)
+/// An error if a body has a law that cannot be made, or damage and a law whose bonds never break.
+///
+/// # Errors
+/// For plans made in Rust; what a deck says is checked where it is read.
+pub fn laws_are_possible(plan: &Plan) -> Result<()> {
+    for body in &plan.bodies {
+        let law = &body.material.law;
+        let fault = law.fault(plan.dimension).map(|fault| fault.message);
+        let fault = fault.or_else(|| law.damage_fault().filter(|_| body.damage.is_some()));
+        if let Some(fault) = fault {
+            let name = law.declaration.name;
+            return Err(Error::input(format!(
+                "[body.{}] law `{name}`: {fault}",
+                body.name
+            )));
+        }
+    }
+    Ok(())
 }
 
-fn ordinary(dimension: Dimension, elastic: Isotropic) -> Ordinary {
-    Ordinary::new(dimension, elastic).expect("the deck has no ordinary law in 1-D")
+/// What the law of a body is made from.
+fn given<'a>(plan: &Plan, body: &'a Body, constants: Constants) -> Given<'a> {
+    // A critical stretch that the plan gives itself holds for all bonds.
+    let itself =
+        |damage: &plan::CriticalStretch| matches!(damage.toughness, Toughness::CriticalStretch(_));
+    Given {
+        dimension: plan.dimension,
+        elastic: constants.elastic,
+        horizon: constants.horizon,
+        values: &body.material.law.values,
+        tough: body.damage.as_ref().is_some_and(|damage| !itself(damage)),
+    }
 }
 
 /// The law of a body with these constants.
-fn law(plan: &Plan, body: &Body, constants: Constants) -> AnyLaw {
-    let (dimension, modulus) = (plan.dimension, constants.elastic.youngs_modulus);
-    let plain = Pmb::new(dimension, modulus, constants.horizon);
-    let energy = Pmb::isotropic_energy(dimension, modulus);
-    // A critical stretch that the deck gives itself holds for all bonds.
-    let calibrated = body
-        .damage
-        .as_ref()
-        .is_some_and(|damage| !matches!(damage.toughness, Toughness::CriticalStretch(_)));
-    let normalised = |energy, reference| {
-        AnyLaw::Normalised(Normalised {
-            energy,
-            reference: calibrated.then_some(reference),
-        })
-    };
-    match &body.material.law {
-        Law::Pmb { corrected: false } | Law::Proportional { corrected: false } => {
-            AnyLaw::Pmb(plain)
-        }
-        Law::Pmb { corrected: true }
-        | Law::Proportional { corrected: true }
-        | Law::NormalisedPmb(NormalisedForm::Energy) => normalised(energy, plain.micromodulus),
-        Law::NormalisedPmb(NormalisedForm::Diehl2016) => normalised(
-            2.25 * constants.elastic.bulk_modulus(),
-            diehl_reference(dimension, constants),
-        ),
-        Law::LinearMicroelastic { lambda, corrected } => {
-            AnyLaw::LinearMicroelastic(LinearMicroelastic {
-                micromodulus: lambda.as_ref().map_or(plain.micromodulus, |_| 1.0),
-                corrected_to: corrected.then_some(energy),
-            })
-        }
-        Law::Ordinary(_) => AnyLaw::Ordinary(ordinary(dimension, constants.elastic)),
-    }
-}
-
-/// What bonds of this length (m) are multiplied by in all sums of a body's points.
-fn influence(body: &Body, horizon: f64, length: f64) -> f64 {
-    match &body.material.law {
-        Law::Ordinary(influence) => influence.at(length, horizon),
-        Law::NormalisedPmb(NormalisedForm::Diehl2016) => Influence::Inverse.at(length, horizon),
-        Law::LinearMicroelastic {
-            lambda: Some(lambda),
-            ..
-        } => lambda.evaluate([length, 0.0, 0.0], 0.0) * length.powi(3),
-        _ => 1.0,
-    }
-}
-
-/// Whether [`influence`] is 1 for all lengths.
-fn has_no_influence(body: &Body) -> bool {
-    matches!(
-        body.material.law,
-        Law::Pmb { .. }
-            | Law::Proportional { .. }
-            | Law::NormalisedPmb(NormalisedForm::Energy)
-            | Law::LinearMicroelastic { lambda: None, .. }
-            | Law::Ordinary(Influence::Constant)
-    )
+fn build(plan: &Plan, body: &Body, constants: Constants) -> Built {
+    (body.material.law.declaration.build)(&given(plan, body, constants))
 }
 
 /// The share of a body's cells in the families of a horizon.
@@ -149,7 +110,7 @@ pub fn cutoffs(plan: &Plan) -> Vec<f64> {
 pub fn block_laws(plan: &Plan, body: &Body) -> BlockLaws {
     let constants = constants(plan, body, body);
     BlockLaws {
-        law: law(plan, body, constants),
+        law: build(plan, body, constants).law,
         damage: damage(plan, body, constants),
     }
 }
@@ -157,24 +118,9 @@ pub fn block_laws(plan: &Plan, body: &Body) -> BlockLaws {
 /// The damage law of a block.
 fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<CriticalStretch> {
     let damage = body.damage.as_ref()?;
-    let (dimension, Constants { elastic, horizon }) = (plan.dimension, constants);
-    let from_energy = |energy: f64| match &body.material.law {
-        Law::Ordinary(influence) => {
-            let law = ordinary(dimension, elastic);
-            CriticalStretch::from_energy_ordinary(&law, *influence, energy, horizon)
-        }
-        // Eq. 16–17 as printed in the plane; in space the sum over the bonds across a plane.
-        Law::NormalisedPmb(NormalisedForm::Diehl2016) => {
-            let c = diehl_reference(dimension, constants) * horizon;
-            match dimension {
-                Dimension::Space => {
-                    (8.0 * energy / (std::f64::consts::PI * c * horizon.powi(4))).sqrt()
-                }
-                _ => (1.5 * energy / (c * dimension.section() * horizon.powi(3))).sqrt(),
-            }
-        }
-        _ => CriticalStretch::from_energy(dimension, elastic, energy, horizon),
-    };
+    let (dimension, elastic) = (plan.dimension, constants.elastic);
+    let of_energy = body.material.law.declaration.critical_stretch?;
+    let from_energy = |energy: f64| of_energy(&given(plan, body, constants), energy);
     let critical = match damage.toughness {
         Toughness::CriticalStretch(stretch) => stretch,
         Toughness::FractureEnergy(energy) => from_energy(energy),
@@ -210,50 +156,63 @@ pub fn assign<const D: usize>(
             Some(smallest) => Criterion::Stretch(smallest),
         };
         let [here, there] = ends.map(|block| &plan.bodies[block]);
-        let [own, far] = [(here, there), (there, here)]
-            .map(|(body, other)| (body, other, constants(plan, body, other)));
-        weigh(plan, model, &mut bonds, [own, far]);
+        let ends = [(here, there), (there, here)].map(|(body, other)| {
+            let constants = constants(plan, body, other);
+            let horizon = constants.horizon;
+            End {
+                built: build(plan, body, constants),
+                horizon,
+                share: cell_share(plan, other, horizon),
+            }
+        });
+        weigh(plan, model, &mut bonds, &ends);
+        let [own, far] = ends.map(|end| end.built.law);
         Interaction {
             bonds,
-            laws: PairLaw::new(law(plan, own.0, own.2), law(plan, far.0, far.2)),
+            laws: PairLaw::new(own, far),
             criterion,
         }
     };
     all.into_iter().map(give).collect()
 }
 
-/// Sets the weights of the bonds between two blocks, unless they are all 1. An end is its body, the other body and the
-/// constants there.
-fn weigh<const D: usize>(
-    plan: &Plan,
-    model: &Model<D>,
-    bonds: &mut BlockBonds,
-    ends: [(&Body, &Body, Constants); 2],
-) {
-    let [own, far] = &ends;
-    let same_horizon = own.2.horizon == far.2.horizon;
+/// An end of the bonds between two blocks.
+struct End {
+    built: Built,
+    /// m.
+    horizon: f64,
+    /// The share of the other body's cells in its families.
+    share: CellShare,
+}
+
+impl End {
+    /// What the volume of the far end counts, ξ away (m).
+    fn weight(&self, offset: [f64; 3]) -> f64 {
+        let share = self.share.at(offset);
+        match &self.built.influence {
+            None => share,
+            Some(influence) => share * influence(distance_squared([0.0; 3], offset).sqrt()),
+        }
+    }
+}
+
+/// Sets the weights of the bonds between two blocks, unless they are all 1.
+fn weigh<const D: usize>(plan: &Plan, model: &Model<D>, bonds: &mut BlockBonds, ends: &[End; 2]) {
     let plain = plan.volume_correction == VolumeCorrection::None
-        && same_horizon
-        && has_no_influence(own.0)
-        && has_no_influence(far.0);
+        && ends[0].horizon == ends[1].horizon
+        && ends.iter().all(|end| end.built.influence.is_none());
     if plain {
         return;
     }
     // The far end of bonds within a block has the same weights.
     let [here, there] = bonds.blocks();
     let count = if here == there { 1 } else { 2 };
-    for (end, (body, other, constants)) in ends.iter().enumerate().take(count) {
-        let horizon = constants.horizon;
-        let share = cell_share(plan, other, horizon);
-        let weight = |offset: [f64; 3]| {
-            let length = distance_squared([0.0; 3], offset).sqrt();
-            share.at(offset) * influence(body, horizon, length)
-        };
+    for (k, end) in ends.iter().enumerate().take(count) {
         match bonds {
-            BlockBonds::Lattice(lattice) => lattice.weigh(end, weight),
-            BlockBonds::List(list) => list.weigh(end, |here, there| {
+            BlockBonds::Lattice(lattice) => lattice.weigh(k, |offset| end.weight(offset)),
+            BlockBonds::List(list) => list.weigh(k, |here, there| {
                 let [a, b] = [here, there].map(|point| model.position(point));
-                weight(std::array::from_fn(|k| b[k] - a[k]))
+                end.weight(std::array::from_fn(|k| b[k] - a[k]))
             }),
         }
     }

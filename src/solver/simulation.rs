@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::partition::distribute;
 use crate::{families, points};
 
-use super::assign::{assign, block_laws, cutoffs};
+use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, Evolution, ForceTimes, Forces};
 use super::conditions::{Conditions, apply_initials, members};
 use super::grids::grids;
@@ -90,6 +90,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
         let start = Instant::now();
+        laws_are_possible(plan)?;
         let cutoffs = cutoffs(plan);
         size::is_feasible(plan, &cutoffs, comm.size())?;
         let (pieces, total) = points::generate(plan, comm)?;

@@ -622,8 +622,11 @@ impl<const D: usize> Forces<D> {
     /// [evaluation](Self::evaluate).
     pub fn dilatation(&mut self, model: &Model<D>) -> [Vec<f64>; 2] {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
+            fn is_linear<L: Law<D>, const D: usize>(_: &[L; 2]) -> bool {
+                L::LINEAR
+            }
             let bonds = &mut interaction.bonds;
-            if matches!(interaction.laws, PairLaw::LinearMicroelastic(_)) {
+            if with_pair!(&interaction.laws, laws => is_linear::<_, D>(laws)) {
                 sweep_all(bonds, sums, &measures::Dilatation::<true>, source);
             } else {
                 sweep_all(bonds, sums, &measures::Dilatation::<false>, source);

@@ -1,6 +1,8 @@
 //! How far something has come in one direction: the farthest of some points above a threshold, and from
 //! there to where the threshold is crossed.
 
+use nalgebra::Vector3;
+
 use crate::comm::{self, Communicator, total};
 use crate::deck::plan::Line;
 use crate::points::distance_squared;
@@ -35,11 +37,13 @@ impl Course {
         among: impl Iterator<Item = u32>,
     ) -> Self {
         let tolerance = TOLERANCE * simulation.plan.horizon;
+        let from = Vector3::from(line.from);
         let along = |point: u32| {
-            let offset = from_start(line, simulation.model.position(point as usize));
-            let along = (0..3).map(|d| offset[d] * line.direction[d]).sum::<f64>();
-            let foot = line.direction.map(|entry| along * entry);
-            let beside = distance_squared(foot, offset).sqrt();
+            let place = Vector3::from(simulation.model.position(point as usize));
+            let (offset, direction) = (place - from, Vector3::from(line.direction));
+            let along = offset.dot(&direction);
+            let beside = offset - along * direction;
+            let beside = beside.dot(&beside).sqrt();
             let counts =
                 along >= -tolerance && along <= end + tolerance && beside <= radius + tolerance;
             counts.then_some((point, along))
@@ -118,10 +122,6 @@ impl Course {
             position: std::array::from_fn(|d| place[d] + further * self.line.direction[d]),
         })
     }
-}
-
-fn from_start(line: Line, position: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|d| position[d] - line.from[d])
 }
 
 /// The largest of some values; of none, the smallest number there is.

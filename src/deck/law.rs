@@ -1,0 +1,231 @@
+//! The law of a material: which one, and the values of its own keys.
+
+use super::expression::Expression;
+use super::number::shown;
+use super::source::suggestion;
+use crate::dimension::Dimension;
+use crate::error::{Error, Result};
+use crate::material::{Declaration, Key, Kind, OfLength, Value, Values, declarations};
+
+/// A law with the values of its own keys.
+#[derive(Debug, Clone)]
+pub struct Law {
+    /// The law.
+    pub declaration: &'static Declaration,
+    /// What its keys are.
+    pub values: Values,
+}
+
+/// What is wrong with a law.
+pub struct Fault {
+    /// The key that is to blame, if it is one that stands there.
+    pub key: Option<&'static str>,
+    /// What is wrong, and what would be right.
+    pub message: String,
+}
+
+impl Law {
+    /// The law of this name, with the defaults of its keys.
+    ///
+    /// # Errors
+    /// When there is no such law.
+    pub fn named(name: &str) -> Result<Self> {
+        find(name).map(Self::of).map_err(Error::input)
+    }
+
+    /// A law with the defaults of its keys.
+    pub fn of(declaration: &'static Declaration) -> Self {
+        Self {
+            declaration,
+            values: Values::defaults(declaration.keys),
+        }
+    }
+
+    /// Gives one of its keys a value: a number, a word, or an [expression](Expression::of_length) of a
+    /// bond's length.
+    ///
+    /// # Errors
+    /// When the law has no such key, or the key cannot be that.
+    pub fn with(mut self, key: &str, value: impl Into<Value>) -> Result<Self> {
+        let (name, value) = (self.declaration.name, value.into());
+        let Some(declared) = self.declaration.key(key) else {
+            let known = self.declaration.keys.iter().map(|key| key.name);
+            return Err(Error::input(format!(
+                "law `{name}`: unknown key `{key}`{}",
+                suggestion(key, known)
+            )));
+        };
+        let value = match (&declared.kind, value) {
+            (Kind::OfLength, Value::Number(same)) => Expression::constant(same).into(),
+            (_, value) => value,
+        };
+        check(declared, &value)
+            .map_err(|message| Error::input(format!("law `{name}`, {key}: {message}")))?;
+        self.values.set(declared.name, value);
+        Ok(self)
+    }
+
+    /// Whether it can be used: all keys are given that must be, and it is there in this dimension.
+    pub fn fault(&self, dimension: Dimension) -> Option<Fault> {
+        for key in self.declaration.keys {
+            let required = matches!(key.kind, Kind::Number { .. });
+            if required && self.values.get(key.name).is_none() {
+                return Some(Fault {
+                    key: None,
+                    message: format!("needs `{}`: {}", key.name, key.meaning),
+                });
+            }
+        }
+        if !matches!(dimension, Dimension::Line { .. }) {
+            return None;
+        }
+        let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
+            (Kind::Word(words), Some(Value::Word(given))) => {
+                let word = words.iter().find(|word| word.word == given)?;
+                Some((Some(key.name), word.no_line?))
+            }
+            _ => None,
+        };
+        let whole = self.declaration.no_line.map(|why| (None, why));
+        let (key, why) = whole.or_else(|| self.declaration.keys.iter().find_map(word))?;
+        Some(Fault {
+            key,
+            message: why.to_owned(),
+        })
+    }
+
+    /// Why bodies of the law can have no damage, if they cannot.
+    pub fn damage_fault(&self) -> Option<String> {
+        if self.declaration.critical_stretch.is_some() {
+            return None;
+        }
+        let others = declarations().filter(|law| law.critical_stretch.is_some());
+        Some(format!(
+            "bonds of the law `{}` never break; take {} for a body that can",
+            self.declaration.name,
+            names(others, "or"),
+        ))
+    }
+
+    /// The key that is an expression of the bond's length, if the law has one that is given.
+    pub fn key_of_length(&self) -> Option<&'static str> {
+        let mut names = self.declaration.keys.iter().map(|key| key.name);
+        names.find(|name| self.values.of_length(name).is_some())
+    }
+}
+
+/// The declaration of the law of this name, or an error that names those that are there.
+pub fn find(name: &str) -> std::result::Result<&'static Declaration, String> {
+    let mut all = declarations();
+    all.find(|law| law.name == name)
+        .ok_or_else(|| unknown(name, declarations().map(|law| law.name)))
+}
+
+/// Whether a key can have this value, or else what it must be.
+pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
+    match (&key.kind, value) {
+        (Kind::Number { range, words, .. }, Value::Number(number)) => {
+            let fits = range.contains(number);
+            let error = || format!("must be {words}, is {}", shown(*number));
+            if fits { Ok(()) } else { Err(error()) }
+        }
+        (Kind::Word(words), Value::Word(given)) => {
+            let known = words.iter().map(|word| word.word);
+            let fits = known.clone().any(|word| word == given);
+            let error = || unknown(given, known);
+            if fits { Ok(()) } else { Err(error()) }
+        }
+        (Kind::OfLength, Value::OfLength(_)) => Ok(()),
+        (_, Value::Number(number)) => {
+            Err(format!("must be {}, is {}", wanted(key), shown(*number)))
+        }
+        _ => Err(format!("must be {}", wanted(key))),
+    }
+}
+
+/// What a key must be, in the words of a deck's user.
+pub fn wanted(key: &Key) -> String {
+    match &key.kind {
+        Kind::Number { .. } | Kind::OfLength => "a number or an expression in quotes".to_owned(),
+        Kind::Word(words) => {
+            let words = words.iter().map(|word| format!("\"{}\"", word.word));
+            listed(words, "or")
+        }
+    }
+}
+
+fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    format!("unknown name `{name}`{}", suggestion(name, known))
+}
+
+/// The names of laws in backticks: `a`, `b` and `c`.
+pub fn names(laws: impl IntoIterator<Item = &'static Declaration>, and: &str) -> String {
+    listed(laws.into_iter().map(|law| format!("`{}`", law.name)), and)
+}
+
+/// `a, b and c`.
+fn listed(items: impl IntoIterator<Item = String>, and: &str) -> String {
+    let items: Vec<String> = items.into_iter().collect();
+    match items.split_last() {
+        Some((last, others)) if !others.is_empty() => {
+            format!("{} {and} {last}", others.join(", "))
+        }
+        _ => items.concat(),
+    }
+}
+
+impl OfLength for Expression {
+    fn at(&self, length: f64) -> f64 {
+        self.evaluate([length, 0.0, 0.0], 0.0)
+    }
+}
+
+impl From<Expression> for Value {
+    fn from(expression: Expression) -> Self {
+        Self::OfLength(std::sync::Arc::new(expression))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_law_takes_its_own_keys_only() {
+        let error = |law: Result<Law>| law.map(|_| ()).unwrap_err().message;
+        let law = |name| Law::named(name).unwrap();
+        assert!(error(Law::named("bmp")).starts_with("unknown name `bmp`"));
+        assert_eq!(
+            error(law("elastic_plastic_pmb").with("yield_strech", 0.1)),
+            "law `elastic_plastic_pmb`: unknown key `yield_strech`; did you mean `yield_stretch`? \
+             (known: yield_stretch)"
+        );
+        assert_eq!(
+            error(law("elastic_plastic_pmb").with("yield_stretch", -0.1)),
+            "law `elastic_plastic_pmb`, yield_stretch: must be above 0, is -0.1"
+        );
+        assert_eq!(
+            error(law("pmb").with("surface_correction", 0.1)),
+            "law `pmb`, surface_correction: must be \"none\" or \"energy\", is 0.1"
+        );
+        assert_eq!(
+            error(law("normalised_pmb").with("form", "energi")),
+            "law `normalised_pmb`, form: unknown name `energi`; did you mean `energy`? (known: \
+             energy, diehl2016)"
+        );
+    }
+
+    #[test]
+    fn a_law_is_at_fault_without_its_keys_and_in_a_dimension_that_it_has_not() {
+        let (line, space) = (Dimension::Line { cross_section: 1.0 }, Dimension::Space);
+        let law = Law::named("elastic_plastic_pmb").unwrap();
+        assert!(law.fault(space).is_some());
+        let law = law.with("yield_stretch", 0.1).unwrap();
+        assert!(law.fault(space).is_none() && law.fault(line).is_none());
+        let law = Law::named("normalised_pmb").unwrap();
+        let law = law.with("form", "diehl2016").unwrap();
+        assert!(law.fault(space).is_none());
+        assert_eq!(law.fault(line).unwrap().key, Some("form"));
+        assert!(Law::named("ordinary").unwrap().fault(line).is_some());
+    }
+}

@@ -1,0 +1,267 @@
+//! What a law declares of itself, as data. The deck's grammar, the table of laws in the README and the
+//! tests of what every law must do follow from it.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::AnyLaw;
+use crate::damage::CriticalStretch;
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
+
+/// A law under its name in decks.
+pub struct Declaration {
+    /// Its name in decks.
+    pub name: &'static str,
+    /// What its forces are, in a line.
+    pub force: &'static str,
+    /// The keys that it has beside density, elastic constants and damping.
+    pub keys: &'static [Key],
+    /// Whether Poisson's ratio is free, so that it takes two elastic constants; else the ratio is
+    /// that of [bond-based laws](Dimension::bond_based_poisson_ratio).
+    pub any_poisson_ratio: bool,
+    /// Why there is no 1-D form and what serves there; `None` if there is one.
+    pub no_line: Option<&'static str>,
+    /// Whether forces act along ξ and are linear in the displacements, so that they know no rotation.
+    pub linear: bool,
+    /// Whether forces are the slope of the strain energy after any motion, as they are not where bonds
+    /// yield.
+    pub conservative: bool,
+    /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break.
+    pub critical_stretch: Option<fn(&Given, f64) -> f64>,
+    /// Makes the law.
+    pub build: fn(&Given) -> Built,
+    /// What the tests try it with: keys beside density and Young's modulus.
+    pub examples: &'static [&'static str],
+}
+
+impl Declaration {
+    /// A law without keys, in every dimension, with the Poisson ratio of bond-based laws and forces
+    /// along Y, the slope of an energy, whose bonds never break.
+    pub const fn new(name: &'static str, force: &'static str, build: fn(&Given) -> Built) -> Self {
+        Self {
+            name,
+            force,
+            keys: &[],
+            any_poisson_ratio: false,
+            no_line: None,
+            linear: false,
+            conservative: true,
+            critical_stretch: None,
+            build,
+            examples: &[""],
+        }
+    }
+
+    /// The key of this name, if the law has it.
+    pub fn key(&self, name: &str) -> Option<&'static Key> {
+        self.keys.iter().find(|key| key.name == name)
+    }
+}
+
+impl fmt::Debug for Declaration {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name)
+    }
+}
+
+/// A law that decks can name, perhaps under several names.
+pub trait Declared {
+    /// One for each name.
+    const DECLARATIONS: &'static [Declaration];
+}
+
+/// A key of a law's table in decks.
+#[derive(Debug)]
+pub struct Key {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is, with its unit.
+    pub meaning: &'static str,
+    /// What may stand there.
+    pub kind: Kind,
+}
+
+/// What a key may be.
+#[derive(Debug)]
+pub enum Kind {
+    /// A number.
+    Number {
+        /// Where it must lie.
+        range: Range<f64>,
+        /// The range in words that follow "must be".
+        words: &'static str,
+        /// Its value if it is not given; `None` if it must be.
+        default: Option<f64>,
+    },
+    /// One of these words; the first if it is not given.
+    Word(&'static [Word]),
+    /// An expression of the bond's length r (m), which may be left out.
+    OfLength,
+}
+
+impl Kind {
+    /// A number above 0 that must be given.
+    pub const POSITIVE: Self = Self::Number {
+        range: f64::MIN_POSITIVE..f64::INFINITY,
+        words: "above 0",
+        default: None,
+    };
+}
+
+/// A word that may stand for a key.
+#[derive(Debug)]
+pub struct Word {
+    /// As it stands in decks.
+    pub word: &'static str,
+    /// Why there is no 1-D form with it and what serves there; `None` if there is one.
+    pub no_line: Option<&'static str>,
+}
+
+impl Word {
+    /// A word for every dimension.
+    pub const fn new(word: &'static str) -> Self {
+        let no_line = None;
+        Self { word, no_line }
+    }
+}
+
+/// The value of a key.
+#[derive(Debug, Clone)]
+pub enum Value {
+    /// A number.
+    Number(f64),
+    /// A word.
+    Word(String),
+    /// A function of a bond's length.
+    OfLength(Arc<dyn OfLength>),
+}
+
+/// A function of a bond's length.
+pub trait OfLength: fmt::Debug + Send + Sync {
+    /// Its value for a length (m).
+    fn at(&self, length: f64) -> f64;
+}
+
+impl From<f64> for Value {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(word: &str) -> Self {
+        Self::Word(word.to_owned())
+    }
+}
+
+/// The values of a law's own keys.
+#[derive(Debug, Clone, Default)]
+pub struct Values(Vec<(&'static str, Value)>);
+
+impl Values {
+    /// The defaults of these keys.
+    pub fn defaults(keys: &[Key]) -> Self {
+        let default = |key: &Key| match &key.kind {
+            Kind::Number { default, .. } => default.map(Value::Number),
+            Kind::Word(words) => words.first().map(|first| first.word.into()),
+            Kind::OfLength => None,
+        };
+        let values = keys
+            .iter()
+            .filter_map(|key| Some((key.name, default(key)?)));
+        Self(values.collect())
+    }
+
+    /// Gives a key another value.
+    pub fn set(&mut self, key: &'static str, value: Value) {
+        self.0.retain(|(name, _)| *name != key);
+        self.0.push((key, value));
+    }
+
+    /// The value of a key, if it has one.
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        let found = self.0.iter().find(|(name, _)| *name == key);
+        found.map(|(_, value)| value)
+    }
+
+    /// The number of a key.
+    ///
+    /// # Panics
+    /// When the key has none: it is not declared as a number, or was not given.
+    pub fn number(&self, key: &str) -> f64 {
+        match self.get(key) {
+            Some(Value::Number(number)) => *number,
+            other => panic!("`{key}` is no number: {other:?}"),
+        }
+    }
+
+    /// The word of a key.
+    ///
+    /// # Panics
+    /// When the key has none.
+    pub fn word(&self, key: &str) -> &str {
+        match self.get(key) {
+            Some(Value::Word(word)) => word,
+            other => panic!("`{key}` is no word: {other:?}"),
+        }
+    }
+
+    /// The function of a key, if it was given.
+    pub fn of_length(&self, key: &str) -> Option<&Arc<dyn OfLength>> {
+        match self.get(key) {
+            Some(Value::OfLength(function)) => Some(function),
+            _ => None,
+        }
+    }
+}
+
+/// What a law is made from: constants of an end of bonds.
+pub struct Given<'a> {
+    /// The setting.
+    pub dimension: Dimension,
+    /// Elastic constants.
+    pub elastic: Isotropic,
+    /// δ, m.
+    pub horizon: f64,
+    /// Values of the law's own keys, all that must be given among them.
+    pub values: &'a Values,
+    /// Whether the critical stretch follows from a fracture energy, which a law may then hold bond by
+    /// bond; else it was given itself and holds for all bonds alike.
+    pub tough: bool,
+}
+
+/// The critical stretch of the prototype law with these constants and this fracture energy (J/m²).
+pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
+    CriticalStretch::from_energy(given.dimension, given.elastic, energy, given.horizon)
+}
+
+/// A law, and what of it lies outside of the loops over bonds.
+pub struct Built {
+    /// The law.
+    pub law: AnyLaw,
+    /// What bonds of a length (m) are multiplied by in all sums of a point; 1 if there is none.
+    pub influence: Option<Box<dyn Fn(f64) -> f64>>,
+}
+
+impl Built {
+    /// Without an influence.
+    pub fn plain(law: impl Into<AnyLaw>) -> Self {
+        Self {
+            law: law.into(),
+            influence: None,
+        }
+    }
+
+    /// With an influence of the bond's length (m).
+    pub fn with_influence(
+        law: impl Into<AnyLaw>,
+        influence: impl Fn(f64) -> f64 + 'static,
+    ) -> Self {
+        Self {
+            law: law.into(),
+            influence: Some(Box::new(influence)),
+        }
+    }
+}

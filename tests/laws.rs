@@ -1,0 +1,120 @@
+//! What follows from the laws' declarations: the README's table, and laws for plans made in Rust.
+
+use fissure::comm::threads;
+use fissure::deck::expression::Expression;
+use fissure::deck::plan::{
+    CriticalStretch, Law, Material, Plan, Shape, StepRule, Toughness, VolumeCorrection,
+};
+use fissure::dimension::Dimension;
+use fissure::elastic::Isotropic;
+use fissure::material::{Declaration, Key, Kind, declarations};
+use fissure::solver::Simulation;
+
+fn key(key: &Key) -> String {
+    let words = match &key.kind {
+        Kind::Word(words) => {
+            let words: Vec<String> = (words.iter())
+                .map(|word| format!("`\"{}\"`", word.word))
+                .collect();
+            format!(" ({})", words.join(", "))
+        }
+        _ => String::new(),
+    };
+    format!("`{}`{words}: {}", key.name, key.meaning)
+}
+
+fn row(law: &Declaration) -> String {
+    let mut force = law.force.to_owned();
+    if law.any_poisson_ratio {
+        force += "; any Poisson's ratio (two constants)";
+    }
+    if law.no_line.is_some() {
+        force += "; 2-D and 3-D";
+    }
+    force += match law.critical_stretch {
+        Some(_) => "; can break",
+        None => "; cannot break",
+    };
+    let keys: Vec<String> = law.keys.iter().map(key).collect();
+    let cells = format!("{force} @ {}", keys.join("; "));
+    let cells = cells.replace('|', "\\|").replace(" @ ", " | ");
+    format!("| `{}` | {cells} |", law.name)
+}
+
+#[test]
+fn the_readme_has_the_table_of_laws() {
+    let rows: Vec<String> = declarations().map(row).collect();
+    let table = format!(
+        "| law | force | its own keys |\n|---|---|---|\n{}\n",
+        rows.join("\n")
+    );
+    let readme = include_str!("../README.md");
+    assert!(readme.contains(&table), "not in README.md:\n{table}");
+}
+
+#[test]
+fn names_of_laws_and_keys_are_said_once_and_have_a_meaning() {
+    let mut names: Vec<&str> = declarations().map(|law| law.name).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), declarations().count());
+    for law in declarations() {
+        assert!(!law.force.is_empty() && !law.examples.is_empty(), "{law:?}");
+        for key in law.keys {
+            assert!(!key.meaning.is_empty(), "{law:?} {key:?}");
+            let same = law.keys.iter().filter(|other| other.name == key.name);
+            assert_eq!(same.count(), 1, "{law:?} {key:?}");
+        }
+    }
+}
+
+/// A plan of a small body with a law, built in Rust.
+fn body(dimension: Dimension, law: Law, damage: Option<CriticalStretch>) -> Plan {
+    let mut plan = Plan::new(dimension, 3.0, 1.0);
+    plan.time.step = StepRule::Fixed(0.01);
+    plan.volume_correction = VolumeCorrection::Linear;
+    let elastic = Isotropic {
+        youngs_modulus: 5.0,
+        poisson_ratio: 0.25,
+    };
+    let cube = Shape::Box {
+        lower: [0.0; 3],
+        upper: [6.0; 3],
+    };
+    plan.add_body("cube", Material::new(law, 2.0, elastic), damage, cube, 1.0);
+    plan
+}
+
+/// What is wrong with a plan in `D` dimensions.
+fn fault<const D: usize>(plan: &Plan) -> Option<String> {
+    let comm = threads::alone();
+    let made = Simulation::<D>::new(plan, &comm);
+    made.err().map(|error| error.message)
+}
+
+#[test]
+fn a_law_of_a_plan_in_rust_is_checked_before_the_run() {
+    let law = |name| Law::named(name).unwrap();
+    let line = Dimension::Line { cross_section: 1.0 };
+    let space = Dimension::Space;
+    let brittle = CriticalStretch::new(Toughness::FractureEnergy(1.0));
+    let found = fault::<3>(&body(space, law("elastic_plastic_pmb"), None));
+    assert_eq!(
+        found.unwrap(),
+        "[body.cube] law `elastic_plastic_pmb`: needs `yield_stretch`: the stretch s_y, pulled or \
+         pushed, at which a bond yields"
+    );
+    let found = fault::<1>(&body(line, law("ordinary"), None)).unwrap();
+    assert!(found.contains("has no 1-D form"), "{found}");
+    let found = fault::<3>(&body(space, law("proportional"), Some(brittle.clone()))).unwrap();
+    assert!(found.contains("never break"), "{found}");
+
+    let yielding = law("elastic_plastic_pmb").with("yield_stretch", 0.1);
+    let printed = law("normalised_pmb").with("form", "diehl2016");
+    for law in [yielding.unwrap(), printed.unwrap(), law("ordinary")] {
+        assert_eq!(fault::<3>(&body(space, law, Some(brittle.clone()))), None);
+    }
+    let lambda = Expression::of_length("0.01*exp(-r)").unwrap();
+    let linear = law("linear_microelastic").with("lambda", lambda);
+    assert_eq!(fault::<3>(&body(space, linear.unwrap(), None)), None);
+}

@@ -1,0 +1,130 @@
+//! Steps that are undone and made again give the same bits: bonds that broke are whole again, bonds
+//! that yielded have not, and time, loads, supports and energies are where they were.
+
+use crate::support::simulate_on;
+use fissure::comm::IdOrder;
+use fissure::solver::Simulation;
+use fissure::solver::motion::{Kept, Saved};
+use fissure::solver::observers::{HistoryObserver, Snapshot};
+
+/// A damped plate that is torn by supports and pushed by loads, with listed bonds between its parts.
+fn plate(law: &str, alpha: f64, family: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
+        material.sheet.{law}
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.03, alpha = {alpha} }}
+        body.plate = {{ material = 'sheet', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [20, 12] }} }}
+        crack.notch.segment = {{ from = [-1, 6], to = [6, 6] }}
+        set.top.where = 'y > 10'
+        set.bottom.where = 'y < 2'
+        set.right.where = 'x > 18'
+        condition.up = {{ set = 'top', velocity = ['free', '0.05*ramp(t, 0, 2)'] }}
+        condition.down = {{ set = 'bottom', displacement = ['free', '-0.02*t'] }}
+        condition.push = {{ set = 'right', body_force = ['0.01*sin(t)', 0] }}
+        time = {{ end = 40, step = 0.2 }}
+        "
+    )
+}
+
+/// All that can be seen of a run: state, forces and the row of the history.
+#[derive(Debug, PartialEq)]
+struct Seen {
+    saved: Saved,
+    forces: Vec<u64>,
+    row: Vec<u64>,
+    clock: (u64, u64),
+}
+
+fn see<const D: usize>(
+    simulation: &mut Simulation<D>,
+    order: &IdOrder,
+    observer: &mut HistoryObserver,
+) -> Seen {
+    let bits = |values: &[f64]| -> Vec<u64> { values.iter().map(|v| v.to_bits()).collect() };
+    let snapshot = Snapshot::new(simulation);
+    Seen {
+        row: bits(&observer.row(simulation, &snapshot).values),
+        saved: simulation.save(order),
+        forces: bits(&simulation.fields.internal_force.concat()),
+        clock: (simulation.clock.number(), simulation.clock.time().to_bits()),
+    }
+}
+
+/// Whether steps that are undone, twice, give the same bits when they are made again; `happened` says
+/// of the rows before and after them whether they did what they are to test.
+fn undone_and_made_again(deck: &str, happened: fn(&[f64], &[f64]) -> bool) {
+    let ranks = 2;
+    let parts = simulate_on(ranks, deck, |mut simulation: Simulation<2>| {
+        let owned = simulation.model.owned();
+        let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
+        let order = IdOrder::new(simulation.comm, ids, total);
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let mut steps = |simulation: &mut Simulation<2>, count: usize| {
+            for _ in 0..count {
+                simulation.advance();
+            }
+            see(simulation, &order, &mut observer)
+        };
+        let start = steps(&mut simulation, 120);
+        let mut kept = Kept::default();
+        simulation.keep(&mut kept);
+        let first = steps(&mut simulation, 40);
+        for _ in 0..2 {
+            simulation.undo(&kept);
+            assert_eq!(simulation.save(&order), start.saved);
+            assert_eq!(steps(&mut simulation, 40), first);
+        }
+        // From another moment with the same memory, and with steps of another size in between.
+        simulation.keep(&mut kept);
+        let second = steps(&mut simulation, 20);
+        simulation.undo(&kept);
+        let size = simulation.clock.step();
+        simulation.clock.set_step(0.5 * size);
+        let other = steps(&mut simulation, 20);
+        assert_ne!(other.saved, second.saved);
+        simulation.undo(&kept);
+        assert_eq!(steps(&mut simulation, 20), second);
+        let numbers = |seen: &Seen| -> Vec<f64> {
+            seen.row.iter().map(|bits| f64::from_bits(*bits)).collect()
+        };
+        happened(&numbers(&start), &numbers(&first))
+    });
+    assert!(parts.iter().all(|happened| *happened), "{deck}");
+}
+
+/// Columns of the history.
+const DISSIPATED: usize = 6;
+const BROKEN: usize = 8;
+
+fn breaks(before: &[f64], after: &[f64]) -> bool {
+    before[BROKEN] > 0.0 && after[BROKEN] > before[BROKEN]
+}
+
+#[test]
+fn of_bonds_that_break() {
+    let law = "pmb = { density = 2, youngs_modulus = 5, damping = 0.01 }";
+    for family in ["lattice", "list"] {
+        for alpha in [0.0, 0.25] {
+            undone_and_made_again(&plate(law, alpha, family), breaks);
+        }
+    }
+}
+
+#[test]
+fn of_points_with_a_dilatation() {
+    let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.1 }";
+    for family in ["lattice", "list"] {
+        undone_and_made_again(&plate(law, 0.25, family), breaks);
+    }
+}
+
+#[test]
+fn of_bonds_that_yield_and_break() {
+    let law = "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.01 }";
+    for family in ["lattice", "list"] {
+        undone_and_made_again(&plate(law, 0.0, family), |before, after| {
+            breaks(before, after) && after[DISSIPATED] > before[DISSIPATED]
+        });
+    }
+}
