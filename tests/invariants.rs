@@ -288,7 +288,8 @@ fn the_force_is_the_slope_of_the_energy() {
                 simulation.fields.displacement[d][point] = place;
                 let slope = -(above - below) / (2.0 * step);
                 let scale = force.abs().max(1e-3);
-                assert!((force - slope).abs() < 1e-5 * scale, "{force} {slope}");
+                let deck = &simulation.plan.source.text;
+                assert!((force - slope).abs() < 1e-5 * scale, "{force} {slope}: {deck}");
             }
         }
     }

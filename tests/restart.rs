@@ -245,7 +245,7 @@ fn signals_are_listened_to_before_mpi_has_started() {
             sleep 0.01
         done
         kill -KILL $rank";
-    let mut command = fissure(2);
+    let command = fissure(2);
     let arguments: Vec<_> = command.get_args().map(ToOwned::to_owned).collect();
     let (binary, options) = arguments.split_last().unwrap();
     let environment: Vec<_> = (command.get_envs())

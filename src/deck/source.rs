@@ -32,7 +32,7 @@ impl Source {
     /// An error that names file, line and column and shows the line with a caret below the bytes
     /// of `span`; without a deck, the message alone.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
-        if self.text.is_empty() {
+        if self.path.as_os_str().is_empty() {
             return Error::input(message.as_ref());
         }
         let start = span.start.min(self.text.len());

@@ -229,7 +229,7 @@ pub struct Given<'a> {
     pub values: &'a Values,
     /// Whether the critical stretch follows from a fracture energy, which a law may then hold bond by
     /// bond; else it was given itself and holds for all bonds alike.
-    pub tough: bool,
+    pub from_fracture_energy: bool,
 }
 
 /// The critical stretch of the prototype law with these constants and this fracture energy (J/m²).

@@ -5,9 +5,10 @@
 //! which unloading returns on a line of the same slope. The bond's elastic energy is c (s − s_p)² |ξ|/2;
 //! to let s_p grow by Δs_p takes c s_y |Δs_p| |ξ|, which is dissipated.
 
+use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
 use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Simd};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +89,21 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
         // s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
         let elastic = bond.shortening - *plastic * (Lanes::splat(1.0) - bond.shortening);
         Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))
+    }
+
+    #[inline(always)]
+    fn bond_force<S: Simd>(
+        _: S,
+        laws: &[Self; 2],
+        bond: &Bond<D>,
+        _: &[[Lanes; 0]; 2],
+        [here, there]: &[[Lanes; 2]; 2],
+        weights: Weights,
+    ) -> Along {
+        let [a, b] = laws.map(|law| Lanes::splat(0.5 * law.elastic.micromodulus));
+        let elastic = bond.shortening * (bond.inverse * weights.sum(a, b));
+        let plastic = bond.inverse * weights.sum(a * here[0], b * there[0]);
+        Along(elastic - (Lanes::splat(1.0) - bond.shortening) * plastic)
     }
 
     #[inline(always)]

@@ -30,7 +30,7 @@ pub struct Normalised {
 
 const FORM: Key = Key {
     name: "form",
-    meaning: "whose energy is the classical one: w = c s²|ξ|/2, or c s²/2 as printed by Diehl & \
+    meaning: "what is normalised: the energy of w = c s²|ξ|/2, or that of c s²/2 as printed by Diehl & \
               Schweitzer (2016)",
     kind: Kind::Word(&[
         Word::new("energy"),
@@ -58,7 +58,9 @@ fn build(given: &Given) -> Built {
     if as_printed(given) {
         let law = Normalised {
             energy: 2.25 * given.elastic.bulk_modulus(),
-            reference: given.tough.then(|| printed_micromodulus(given)),
+            reference: given
+                .from_fracture_energy
+                .then(|| printed_micromodulus(given)),
         };
         let horizon = given.horizon;
         Built::with_influence(law, move |length| Influence::Inverse.at(length, horizon))
@@ -99,7 +101,9 @@ impl Normalised {
     pub(super) fn classical(given: &Given) -> Self {
         Self {
             energy: Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus),
-            reference: given.tough.then(|| Pmb::of(given).micromodulus),
+            reference: given
+                .from_fracture_energy
+                .then(|| Pmb::of(given).micromodulus),
         }
     }
 }

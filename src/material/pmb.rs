@@ -59,7 +59,7 @@ impl Pmb {
 /// What corrects the micromodulus near surfaces.
 pub(super) const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
-    meaning: "what scales the micromodulus of each point: its own family's strain energy, or nothing",
+    meaning: "whether the strain energy of each point's own family corrects its micromodulus",
     kind: Kind::Word(&[Word::new("none"), Word::new("energy")]),
 };
 
@@ -73,7 +73,7 @@ impl Declared for Pmb {
         },
         Declaration {
             keys: &[SURFACE_CORRECTION],
-            ..Declaration::new("proportional", "the same, which cannot break", build)
+            ..Declaration::new("proportional", "as `pmb`", build)
         },
     ];
 }

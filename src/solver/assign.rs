@@ -67,7 +67,7 @@ fn given<'a>(plan: &Plan, body: &'a Body, constants: Constants) -> Given<'a> {
         elastic: constants.elastic,
         horizon: constants.horizon,
         values: &body.material.law.values,
-        tough: body.damage.as_ref().is_some_and(|damage| !itself(damage)),
+        from_fracture_energy: body.damage.as_ref().is_some_and(|damage| !itself(damage)),
     }
 }
 

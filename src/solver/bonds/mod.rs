@@ -30,7 +30,7 @@ use crate::error::Result;
 use crate::families::{BlockBonds, Grid, Which};
 use crate::lanes::{Instructions, Lanes, Numbers};
 use crate::material::bond::stretch_of;
-use crate::material::{Law, PairLaw, with_pair};
+use crate::material::{Law, with_pair};
 
 use super::model::Model;
 use grid_points::GridValues;
@@ -141,7 +141,9 @@ impl<const D: usize> Forces<D> {
         blocks: Vec<BlockLaws>,
     ) -> Result<Self> {
         let instructions = Instructions::of_all(comm)?;
-        let mixed = (interactions.iter()).any(|i| matches!(i.laws, PairLaw::Mixed(_)));
+        // The same on all ranks, whatever bonds they have.
+        let kind = |block: &BlockLaws| std::mem::discriminant(&block.law);
+        let mixed = blocks.windows(2).any(|pair| kind(&pair[0]) != kind(&pair[1]));
         let numbers = PointNumbers::new(&blocks, mixed, model);
         let with_thresholds =
             (blocks.iter()).any(|block| block.damage.is_some_and(|law| law.alpha > 0.0));
