@@ -60,6 +60,8 @@ fn undone_and_made_again(deck: &str, happened: fn(&[f64], &[f64]) -> bool) {
         let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
         let order = IdOrder::new(simulation.comm, ids, total);
         let mut observer = HistoryObserver::new(&simulation).unwrap();
+        // Broken bonds count from the first row.
+        see(&mut simulation, &order, &mut observer);
         let mut steps = |simulation: &mut Simulation<2>, count: usize| {
             for _ in 0..count {
                 simulation.advance();

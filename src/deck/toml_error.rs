@@ -241,7 +241,7 @@ fn wanted(expected: &str) -> &str {
         "u32" => "a whole number from 0 to 4294967295",
         "u64" => "a whole number from 0 on",
         "a nonzero u64" => "a whole number from 1 on",
-        "a map" | "newtype variant" | "struct variant" => "a table",
+        "a map" | "a spanned value" | "newtype variant" | "struct variant" => "a table",
         _ if expected.starts_with("struct ") => "a table",
         _ => expected,
     }

@@ -40,5 +40,7 @@ impl<const D: usize> Simulation<'_, D> {
             column.copy_from_slice(kept);
         }
         self.forces.undo(&kept.bonds);
+        // Loads know their values at the present time.
+        self.conditions.load(&mut self.fields, clock.time(), true);
     }
 }
