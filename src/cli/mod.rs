@@ -36,6 +36,7 @@ macro_rules! tell {
 }
 pub(crate) use tell;
 
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -325,6 +326,24 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => init::init(&arguments, verbosity),
     };
     finish(outcome, true)
+}
+
+/// Prints what a command was asked for. A reader that has closed the output has had enough.
+///
+/// # Errors
+/// When it cannot be written.
+fn print(text: &str) -> Result<()> {
+    let mut output = std::io::stdout().lock();
+    let written = output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush());
+    match written {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            let message = format!("cannot write to the standard output: {error}");
+            Err(Error::run(message))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The exit code of an outcome; prints an error if `speaks`.

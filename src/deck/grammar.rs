@@ -23,8 +23,8 @@ pub type Tables<T> = IndexMap<String, Spanned<T>>;
 #[serde(deny_unknown_fields)]
 pub struct Deck {
     /// One line for summaries and pictures.
-    #[serde(default)]
-    pub title: String,
+    #[serde(default = "nowhere")]
+    pub title: Text,
     /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
     pub dimension: Spanned<DimensionName>,
     /// Thickness of a plane body in m; 1 if not given.

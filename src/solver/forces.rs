@@ -101,6 +101,13 @@ impl<const D: usize> Forces<D> {
             .sum()
     }
 
+    /// The bonds of the rank's points from each block to each, counted from their ends here, broken ones
+    /// included.
+    pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
+        let families = self.passes.bonds.iter().map(|bonds| &bonds.family);
+        families.map(|family| (family.blocks(), family.bonds()))
+    }
+
     /// Memory of the bonds and of what they read of the points, bytes.
     pub fn bytes(&self) -> usize {
         let families = self.passes.bonds.iter().map(|bonds| bonds.family.bytes());

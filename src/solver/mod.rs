@@ -15,6 +15,7 @@ mod kernels;
 pub mod laws;
 mod measures;
 pub mod model;
+pub mod nearest;
 pub mod observe;
 mod passes;
 mod places;
@@ -26,6 +27,7 @@ pub mod stable_step;
 pub mod state;
 mod sweep;
 mod tip;
+pub mod values;
 mod verlet;
 
 pub use kernels::{Response, Stored};

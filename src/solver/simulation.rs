@@ -1,5 +1,6 @@
 //! A run: from the plan to points in motion, step by step.
 
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
@@ -18,7 +19,7 @@ use super::model::Model;
 use super::size;
 use super::stable_step::stable_step;
 use super::state::State;
-use super::verlet;
+use super::{values, verlet};
 
 /// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
 /// cell off their grid.
@@ -42,6 +43,8 @@ pub struct Simulation<'a, const D: usize> {
     pub damping: Damping,
     /// Volume of each owned point's whole family, broken bonds included, m³.
     pub family_volume: Vec<f64>,
+    /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
+    pub cut: Vec<u64>,
     /// The stable step, s.
     pub stable_step: f64,
     /// The time step, s.
@@ -106,11 +109,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let mut state = State::new(&model);
         let (step, last) = choose_step(plan, stable)?;
         let family_volume = forces.family_volume(&model);
-        pre_crack(plan, &model, &mut forces);
+        let cut = pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 
         apply_initials(plan, comm, &model, &mut state)?;
         let conditions = Conditions::new(plan, comm, &model)?;
+        values::are_finite(plan, comm, &model, 0.0)?;
         let mut simulation = Self {
             damping: Damping::new(&model),
             plan,
@@ -120,6 +124,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             forces,
             conditions,
             family_volume,
+            cut,
             stable_step: stable,
             step,
             last,
@@ -214,6 +219,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if earliest[0] == f64::MAX {
             return Ok(());
         }
+        let time = earliest[0] * self.step;
+        values::are_finite(self.plan, self.comm, &self.model, time)
+            .map_err(|error| Error::run(error.message))?;
         let own = self.bad.filter(|bad| bad.step as f64 == earliest[0]);
         let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
         comm::min(self.comm, &mut smallest);
@@ -221,21 +229,30 @@ impl<'a, const D: usize> Simulation<'a, D> {
             None => Ok(()),
             Some(bad) => {
                 let block = usize::from(self.model.block[bad.index]);
-                let hint = match bad.step {
-                    0 => "An expression without a value there, or points moved onto one another?",
-                    _ => "A time step beyond the stable one, or a load that grows without bound?",
-                };
-                Err(Error::run(format!(
-                    "step {} (t = {:.6e} s): the motion of point {} of body `{}` is not finite; \
-                     reference position {:?} m. {hint} (time step {:.3e} s, stable {:.3e} s)",
-                    bad.step,
-                    bad.step as f64 * self.step,
-                    bad.id,
-                    self.plan.bodies[block].name,
-                    &self.model.position(bad.index)[..D],
-                    self.step,
-                    self.stable_step,
-                )))
+                let body = &self.plan.bodies[block];
+                let position = self.model.position(bad.index);
+                Err(if bad.step == 0 {
+                    let message = format!(
+                        "[body.{}]: the force on its point {}, {:?} m, is not finite at the start; \
+                         do displacements move points onto one another?",
+                        body.name,
+                        bad.id,
+                        &position[..D],
+                    );
+                    self.plan.source.error(body.span.clone(), message)
+                } else {
+                    Error::run(format!(
+                        "step {} (t = {time:.6e} s): the motion of point {} of body `{}` is not \
+                         finite; reference position {:?} m. A time step beyond the stable one, or a \
+                         load that grows without bound? (time step {:.3e} s, stable {:.3e} s)",
+                        bad.step,
+                        bad.id,
+                        body.name,
+                        &position[..D],
+                        self.step,
+                        self.stable_step,
+                    ))
+                })
             }
         };
         agree(self.comm, named)
@@ -243,7 +260,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
 }
 
 /// The time step and the number of the last one. An automatic step divides the run evenly.
-fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
+///
+/// # Errors
+/// When there is no stable step, or there are more steps than can be counted.
+pub fn choose_step(plan: &Plan, stable: f64) -> Result<(f64, u64)> {
     let (step, last) = match plan.time.step {
         StepRule::Fixed(step) => (step, steps_to(plan.time.end, step)),
         StepRule::Automatic(_) if stable.is_infinite() => {
@@ -277,21 +297,29 @@ pub(super) fn steps_to(end: f64, step: f64) -> f64 {
     }
 }
 
-/// Breaks the bonds that cross a pre-crack. Both ends ask with the lower id first.
-fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<D>) {
+/// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id
+/// first.
+fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<D>) -> Vec<u64> {
     if plan.cracks.is_empty() {
-        return;
+        return Vec::new();
     }
+    let counts = vec![Cell::new(0); plan.cracks.len()];
     forces.cut(|here, there| {
         let (first, second) = match model.ids[here] < model.ids[there] {
             true => (here, there),
             false => (there, here),
         };
         let [from, to] = [first, second].map(|point| model.position(point));
-        plan.cracks
-            .iter()
-            .any(|crack| points::crack::crosses(crack, from, to))
+        let mut cut = false;
+        for (crack, count) in plan.cracks.iter().zip(&counts) {
+            if points::crack::crosses(&crack.surface, from, to) {
+                count.set(count.get() + 1);
+                cut = true;
+            }
+        }
+        cut
     });
+    counts.into_iter().map(Cell::into_inner).collect()
 }
 
 /// Makes the bonds of no-failure zones unbreakable.
