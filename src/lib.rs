@@ -12,3 +12,4 @@ pub mod partition;
 pub mod picture;
 pub mod points;
 pub mod solver;
+pub mod survey;

@@ -3,6 +3,7 @@
 mod bench;
 mod bench_report;
 mod check;
+mod check_report;
 mod explain;
 mod files;
 mod format;
@@ -13,6 +14,7 @@ mod memory;
 mod plot;
 mod progress;
 mod recorder;
+mod report;
 mod restart;
 mod run;
 mod summary;
@@ -149,7 +151,8 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 
 /// Validate a deck and show what it would do, without running it.
 ///
-/// Makes the points and finds the bonds on this machine, so it needs the memory of the whole run.
+/// Makes the points and finds the bonds on this machine; where these are too many, it estimates their
+/// numbers instead.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

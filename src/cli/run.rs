@@ -11,9 +11,10 @@ use fissure::deck::{self, Plan};
 use fissure::error::Result;
 use fissure::output::{self, Creation};
 use fissure::solver::Simulation;
+use fissure::survey::Survey;
 
 use super::files::Files;
-use super::format::si;
+use super::format::{count, si};
 use super::progress::Progress;
 use super::recorder::{Recorder, Start, can_continue};
 use super::restart::{Keeper, Restart, restart};
@@ -113,13 +114,15 @@ impl<'a> Job<'a> {
         }
         let mut simulation = Simulation::<D>::new(self.plan, self.world)?;
         simulation.check()?;
-        if self.speaks() && simulation.step > simulation.stable_step {
-            let (step, stable) = (simulation.step, simulation.stable_step);
-            tell!(
-                "warning: the time step {} is larger than the stable one, {}",
-                si(step, "s"),
-                si(stable, "s")
-            );
+        let survey = Survey::new(&mut simulation);
+        if self.speaks() {
+            for (pair, bonds) in &survey.joints {
+                let [a, b] = pair.map(|body| &self.plan.bodies[body].name);
+                say!("{} bonds join {a} and {b}", count(*bonds));
+            }
+            for warning in &survey.warnings {
+                tell!("warning: {warning}");
+            }
         }
         let (mut keeper, mut recorder) = match self.arguments.restart {
             true => self.continue_run(&mut simulation, hosts)?,
