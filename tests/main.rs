@@ -21,4 +21,5 @@ mod readers;
 mod restart;
 mod stable_step;
 mod support;
+mod survey;
 mod waves;

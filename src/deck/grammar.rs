@@ -23,8 +23,8 @@ pub type Tables<T> = IndexMap<String, Spanned<T>>;
 #[serde(deny_unknown_fields)]
 pub struct Deck {
     /// One line for summaries and pictures.
-    #[serde(default)]
-    pub title: String,
+    #[serde(default = "nowhere")]
+    pub title: Text,
     /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
     pub dimension: Spanned<DimensionName>,
     /// Thickness of a plane body in m; 1 if not given.
@@ -145,7 +145,8 @@ fn no_correction() -> Spanned<VolumeCorrection> {
 pub enum VolumeCorrection {
     /// Points within the horizon count whole.
     None,
-    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1).
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too; LAMMPS ends this
+    /// taper at δ.
     Linear,
     /// Points count the share of their cell within the horizon.
     Exact,
@@ -263,8 +264,9 @@ pub struct Elastic {
     /// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping: Option<Number>,
-    /// `"energy"` corrects the micromodulus by the strain energy of each point's own family, `"none"`
-    /// does not; for `pmb`, `proportional` and `linear_microelastic`.
+    /// `"energy"` corrects the micromodulus so that each point's own family has the energy of an isotropic
+    /// expansion, which is right for that and near a surface for no other strain; `"none"` does not. For
+    /// `pmb`, `proportional` and `linear_microelastic`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_correction: Option<Spanned<SurfaceCorrection>>,
     /// `"energy"` or `"diehl2016"`; for `normalised_pmb`.

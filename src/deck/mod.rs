@@ -4,12 +4,14 @@ mod bodies;
 mod build;
 mod conditions;
 mod difference;
+mod doubts;
 mod explain;
 pub mod expression;
 pub mod grammar;
 mod history;
 mod interface;
 mod materials;
+mod names;
 mod number;
 mod outputs;
 mod parameters;
@@ -67,7 +69,9 @@ impl Deck {
     /// # Errors
     /// As [`read`].
     pub fn plan(&self) -> Result<Plan> {
-        validate::validate(&self.source, &self.grammar)
+        let mut plan = validate::validate(&self.source, &self.grammar)?;
+        plan.warnings = doubts::doubts(&self.source, &self.grammar, &plan)?;
+        Ok(plan)
     }
 
     /// The deck as TOML with every default written out.

@@ -46,6 +46,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
 use crate::solver::observers::HistoryRow;
+use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use recorder::{Recorder, Start, can_continue};
@@ -150,6 +151,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::SetUp {
             step: simulation.clock.step(),
             stable_step: simulation.stable_step,
+            survey: Survey::new(&mut simulation),
         });
         self.look_before_the_first_step()?;
         let (mut checkpoints, mut recorder) = match self.options.existing {
