@@ -60,10 +60,11 @@ pub fn plate(end: f64) -> Result<Plan> {
     };
     let brittle = CriticalStretch::new(Toughness::FractureEnergy(135.0));
     plan.add_body("plate", glass, Some(brittle), plate, SPACING);
-    plan.cracks.push(Crack::Segment {
+    let notch = Crack::Segment {
         from: [0.0, 0.015, 0.0],
         to: [0.02, 0.015, 0.0],
-    });
+    };
+    plan.add_crack("notch", notch);
     for (name, place, velocity) in [
         ("top", "y > 0.027", "ramp(t, 0, 1e-5)"),
         ("bottom", "y < 0.003", "-ramp(t, 0, 1e-5)"),

@@ -14,6 +14,7 @@ pub mod picture;
 pub mod points;
 pub mod run;
 pub mod solver;
+pub mod survey;
 
 pub use run::run;
 

@@ -183,3 +183,136 @@ fn the_benchmark_counts_what_it_does() {
     assert_eq!(wrong.status.code(), Some(2));
     assert!(text(&wrong).contains("edges such as"), "{}", text(&wrong));
 }
+
+#[test]
+fn an_output_that_is_full_is_an_error() {
+    let folder = Folder::new("full");
+    let deck = folder.join("plate.toml");
+    succeed(fissure(1).arg("init").arg(&deck));
+    for command in ["check", "explain"] {
+        let run = |output: &str| {
+            let output = std::fs::File::options().write(true).open(output).unwrap();
+            let mut command = fissure(1)
+                .arg(command)
+                .arg(&deck)
+                .stdout(output)
+                .spawn()
+                .unwrap();
+            command.wait().unwrap().code()
+        };
+        assert_eq!(run("/dev/full"), Some(1), "{command}");
+        assert_eq!(run("/dev/null"), Some(0), "{command}");
+    }
+    // A reader that has seen enough is no mistake.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut command = fissure(1)
+        .arg("explain")
+        .arg(&deck)
+        .stdout(writer)
+        .spawn()
+        .unwrap();
+    assert_eq!(command.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn far_more_threads_than_cores() {
+    let folder = Folder::new("threads");
+    let deck = folder.join("plate.toml");
+    succeed(fissure(1).arg("init").arg(&deck));
+    let mut command = fissure(1);
+    command
+        .arg("run")
+        .arg(&deck)
+        .args(["-t", "65535", "--output"]);
+    let output = finish(command.arg(folder.join("out")));
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(
+        text(&output).contains("--threads 65535: this host has"),
+        "{}",
+        text(&output)
+    );
+    assert!(!folder.join("out/result.vtkhdf").exists());
+}
+
+#[test]
+fn too_many_points_to_make_are_counted_by_formula() {
+    let folder = Folder::new("large");
+    let deck = folder.write(
+        "cube.toml",
+        "dimension = '3d'
+        grid = { spacing = 5e-4, horizon = 1.5e-3 }
+        material.glass.pmb = { density = 2440, youngs_modulus = 72e9 }
+        body.cube = { material = 'glass', shape.box = { lower = [0, 0, 0], upper = [1, 1, 1] } }
+        time.end = 1e-4
+        ",
+    );
+    let start = std::time::Instant::now();
+    let output = finish(fissure(1).arg("check").arg(&deck).args(["--ranks", "1000"]));
+    assert!(output.status.success(), "{}", text(&output));
+    assert!(start.elapsed().as_secs() < 30);
+    for words in [
+        "points                  8.000e9",
+        "bonds                   4.8",
+        "memory of each rank",
+        "steps                   908",
+        "stable step",
+        "bulk modulus inside",
+    ] {
+        assert!(text(&output).contains(words), "{words}\n{}", text(&output));
+    }
+    // One rank cannot hold them.
+    let output = finish(fissure(1).arg("check").arg(&deck));
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output).contains("are too many for 1 rank(s)"),
+        "{}",
+        text(&output)
+    );
+}
+
+#[test]
+fn check_and_run_warn_of_the_same() {
+    let folder = Folder::new("warnings");
+    let deck = folder.write(
+        "plate.toml",
+        "dimension = 'plane-stress'
+parameters.unused = 1
+grid = { spacing = 1, horizon = 3 }
+material.glass.pmb = { density = 2, youngs_modulus = 5 }
+body.plate = { material = 'glass', shape.box = { lower = [0, 0], upper = [12, 8] } }
+body.ball = { material = 'glass', shape.disc = { centre = [16, 4], radius = 3 } }
+set.low.where = 'y'
+condition.hold = { set = 'low', displacement = [0, 'free'] }
+history.probe.far.at = [0, 20]
+time.end = 1
+",
+    );
+    let check = succeed(fissure(1).arg("check").arg(&deck));
+    assert!(check.contains("plate and ball"), "{check}");
+    let warnings = |printed: &str| -> Vec<String> {
+        let lines = printed.lines().filter(|line| line.starts_with("warning: "));
+        lines.map(str::to_owned).collect()
+    };
+    let expected = warnings(&check);
+    for (part, line) in [
+        ("[parameters] unused: no expression uses it", 2),
+        ("[set.low] where: is a number rather than a condition", 7),
+        ("[history.probe.far] at: the nearest point is", 9),
+    ] {
+        let place = format!("plate.toml:{line}: {part}");
+        assert!(expected.iter().any(|line| line.contains(&place)), "{check}");
+    }
+    for ranks in [1, 2] {
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output");
+        let output = finish(command.arg(folder.join(format!("out{ranks}"))));
+        assert!(output.status.success(), "{}", text(&output));
+        assert_eq!(warnings(&text(&output)), expected);
+        assert!(
+            text(&output).contains("bonds join plate and ball"),
+            "{}",
+            text(&output)
+        );
+    }
+}

@@ -242,3 +242,31 @@ fn an_output_folder_that_cannot_be_made() {
         .arg(file.join("out"));
     failing(&mut command, "cannot create the folder", 1);
 }
+
+#[test]
+fn a_load_that_loses_its_value_is_named() {
+    let folder = Folder::new("lost");
+    let deck = folder.write(
+        "deck.toml",
+        &(bar("end = 10")
+            + "condition.pull = { set = 'all', body_force = [0, '0.01*sqrt(2 - t - x/60)'] }"),
+    );
+    let mut messages = Vec::new();
+    for ranks in [1, 3] {
+        let out = folder.join(format!("out{ranks}"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        let message = "[condition.pull] body_force: component y is NaN at t = ";
+        let printed = failing(&mut command, message, 1);
+        assert!(printed.contains("deck.toml:8:"), "{printed}");
+        messages.push(
+            printed
+                .lines()
+                .find(|line| line.contains(message))
+                .unwrap()
+                .to_owned(),
+        );
+    }
+    messages.dedup();
+    assert_eq!(messages.len(), 1, "{messages:?}");
+}

@@ -290,7 +290,10 @@ fn the_force_is_the_slope_of_the_energy() {
                 let slope = -(above - below) / (2.0 * step);
                 let scale = force.abs().max(1e-3);
                 let deck = &simulation.plan.source.text;
-                assert!((force - slope).abs() < 1e-5 * scale, "{force} {slope}: {deck}");
+                assert!(
+                    (force - slope).abs() < 1e-5 * scale,
+                    "{force} {slope}: {deck}"
+                );
             }
         }
     }

@@ -23,5 +23,6 @@ mod readers;
 mod restart;
 mod stable_step;
 mod support;
+mod survey;
 mod undo;
 mod waves;

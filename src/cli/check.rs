@@ -1,134 +1,144 @@
 //! `fissure check`: what a deck would do.
 
-use crate::cli::say;
+use std::time::{Duration, Instant};
+
 use fissure::comm::threads;
 use fissure::deck::{self, Plan};
 use fissure::error::Result;
 use fissure::solver::Simulation;
-use fissure::solver::assign::block_laws;
-use fissure::solver::conditions::members;
+use fissure::solver::assign::cutoffs;
 use fissure::solver::observers::HistoryObserver;
+use fissure::solver::simulation::choose_step;
+use fissure::solver::size::is_feasible;
+use fissure::survey::{Cost, Interior, Size, Survey, interior, size};
 
-use super::format::{bytes, count, si};
-use super::{CheckArguments, Verbosity, launch};
+use super::check_report as say;
+use super::report::Report;
+use super::{CheckArguments, Verbosity, launch, print};
 
-/// Fewest bonds of a point, by dimension, below which it is poorly held: half of a family at a
-/// horizon of two spacings.
-const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
+/// More lattice cells, points or bonds than these, counted from both ends, are not made to check a deck:
+/// it would take more than some seconds and some 2 GB.
+const MOST_CELLS: f64 = 2e7;
+const MOST_POINTS: f64 = 4e6;
+const MOST_BONDS: f64 = 3e8;
+
+/// How long the time loop is tried to know its speed.
+const TRIAL: Duration = Duration::from_millis(300);
 
 /// Validates the deck and prints the figures.
 ///
 /// # Errors
-/// When the deck is wrong.
+/// When the deck is wrong or the output is full.
 pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     let plan = deck::read(&arguments.deck, &arguments.set)?.plan()?;
     launch::start_threads(launch::threads(None))?;
-    match plan.dimension.count() {
-        1 => report::<1>(&plan, arguments, verbosity),
-        2 => report::<2>(&plan, arguments, verbosity),
-        _ => report::<3>(&plan, arguments, verbosity),
-    }
-}
-
-fn line(name: &str, value: impl std::fmt::Display) {
-    say!("  {name:<24}{value}");
-}
-
-fn report<const D: usize>(
-    plan: &Plan,
-    arguments: &CheckArguments,
-    verbosity: Verbosity,
-) -> Result<()> {
-    let comm = threads::alone();
-    let mut simulation = Simulation::<D>::new(plan, &comm)?;
-    simulation.check()?;
-    HistoryObserver::new(&simulation)?;
+    is_feasible(&plan, &cutoffs(&plan), arguments.ranks as usize)?;
+    let size = size(&plan)?;
+    let few = size.cells <= MOST_CELLS
+        && size.all_points() <= MOST_POINTS
+        && size.directed_bonds <= MOST_BONDS;
+    let report = match (few, plan.dimension.count()) {
+        (false, _) => estimate(&plan, arguments, &size)?,
+        (true, 1) => look::<1>(&plan, arguments)?,
+        (true, 2) => look::<2>(&plan, arguments)?,
+        (true, _) => look::<3>(&plan, arguments)?,
+    };
     if verbosity == Verbosity::Quiet {
         return Ok(());
     }
-    say!(
-        "{} is a valid deck: {}",
-        arguments.deck.display(),
-        plan.title
-    );
-    line("dimension", plan.dimension.name());
-    line("horizon", si(plan.horizon, "m"));
-    for body in &plan.bodies {
-        say!("body {}", body.name);
-        line("material", &body.material_name);
-        line("density", format!("{} kg/m³", body.material.density));
-        line(
-            "Young's modulus",
-            si(body.material.elastic.youngs_modulus, "Pa"),
-        );
-        line(
-            "Poisson's ratio",
-            format!("{:.4}", body.material.elastic.poisson_ratio),
-        );
-        let laws = block_laws(plan, body);
-        for (name, value) in laws.law.described() {
-            line(name, value);
-        }
-        match laws.damage {
-            None => line("damage", "none"),
-            Some(damage) => {
-                line("critical stretch", format!("{:.4e}", damage.critical));
-                line("alpha", damage.alpha);
-            }
-        }
-    }
-    say!("size");
-    let model = &simulation.model;
-    let total = model.total;
-    line("points", count(total));
-    line("bonds", count(simulation.forces.directed_bonds() / 2));
-    line(
-        "of them as lattice",
-        count(simulation.forces.lattice_bonds() / 2),
-    );
-    let state = 8 * (2 * D + 1) + 8 * D + 8 * (D + 1) + 8 + 2;
-    let whole = simulation.forces.bytes() as f64 + (state as u64 * total) as f64;
-    let ranks = arguments.ranks;
-    let estimate = whole / f64::from(ranks) * (1.0 + ghost_share(&simulation, ranks));
-    line(
-        "memory of each rank",
-        format!("about {} on {ranks} rank(s)", bytes(estimate)),
-    );
-    say!("time");
-    line("end", si(plan.time.end, "s"));
-    line("stable step", si(simulation.stable_step, "s"));
-    line("time step", si(simulation.clock.step(), "s"));
-    line("steps", count(simulation.clock.last()));
-    say!("sets");
-    let model = &simulation.model;
-    for (index, set) in plan.sets.iter().enumerate() {
-        let size = members(plan, model, index).len();
-        let note = if size == 0 { "  (empty!)" } else { "" };
-        line(&set.name, format!("{} points{note}", count(size as u64)));
-    }
-    let few = FEW_NEIGHBOURS[D - 1];
-    let stored = simulation.forces.stored(&simulation.model);
-    let neighbours = stored.neighbours.iter();
-    let poor = neighbours.filter(|count| **count < few).count();
-    if poor > 0 {
-        say!(
-            "warning: {} points have fewer than {few} intact bonds",
-            count(poor as u64)
-        );
-    }
-    if simulation.clock.step() > simulation.stable_step {
-        say!("warning: the time step is larger than the stable one");
-    }
-    Ok(())
+    print(&report.text)
 }
 
-/// Ghosts of a rank as a share of its own points, if the ranks' parts were cubes.
-fn ghost_share<const D: usize>(simulation: &Simulation<'_, D>, ranks: u32) -> f64 {
-    if ranks == 1 {
-        return 0.0;
+/// What a point inside each body is like, where that can be found.
+fn interiors(plan: &Plan) -> Vec<Option<Interior>> {
+    (0..plan.bodies.len())
+        .map(|body| interior(plan, body))
+        .collect()
+}
+
+/// Makes points and bonds and looks at them.
+fn look<const D: usize>(plan: &Plan, arguments: &CheckArguments) -> Result<Report> {
+    let comm = threads::alone();
+    let mut simulation = Simulation::<D>::new(plan, &comm)?;
+    simulation.check()?;
+    let columns = HistoryObserver::new(&simulation)?.columns().len();
+    let survey = Survey::new(&mut simulation);
+    let interiors = interiors(plan);
+    let mut report = Report::default();
+    say::heading(&mut report, plan, &arguments.deck);
+    for (index, body) in plan.bodies.iter().enumerate() {
+        say::body(&mut report, plan, body);
+        say::figures(&mut report, body, &survey.bodies[index], D);
+        say::interior(&mut report, plan, interiors[index].as_ref());
     }
-    let volume: f64 = simulation.model.volume.iter().sum();
-    let extent = volume / simulation.plan.dimension.section() / f64::from(ranks);
-    let edge = extent.powf(1.0 / D as f64);
-    (1.0 + 2.0 * simulation.plan.horizon / edge).powi(D as i32) - 1.0
+    say::joints(&mut report, plan, &survey);
+    say::places(&mut report, plan, &survey, D);
+    say::sets(&mut report, plan, &survey);
+    report.say("size");
+    say::size(
+        &mut report,
+        simulation.model.total,
+        simulation.forces.directed_bonds() / 2,
+    );
+    report.line(
+        "of them as lattice",
+        super::format::count(simulation.forces.lattice_bonds() / 2),
+    );
+    let ghosts = say::ghost_share(plan, &survey, arguments.ranks);
+    let cost = Cost::of(&simulation, columns);
+    say::cost(&mut report, &cost, arguments.ranks, ghosts);
+    say::time(&mut report, plan, simulation.stable_step);
+    say::steps(&mut report, &simulation.clock);
+    let steps = simulation.clock.last();
+    let seconds = seconds_a_step(&mut simulation);
+    say::run_time(&mut report, seconds, steps, arguments.ranks);
+    for warning in &survey.warnings {
+        report.say(format_args!("warning: {warning}"));
+    }
+    Ok(report)
+}
+
+/// Wall-clock time of a step, from some of them.
+fn seconds_a_step<const D: usize>(simulation: &mut Simulation<'_, D>) -> f64 {
+    // The first ones bring everything into the caches.
+    simulation.advance();
+    let (start, mut steps) = (Instant::now(), 0);
+    while start.elapsed() < TRIAL && steps < 1000 {
+        simulation.advance();
+        steps += 1;
+    }
+    start.elapsed().as_secs_f64() / f64::from(steps)
+}
+
+/// Says by formula what there is too much of to make.
+fn estimate(plan: &Plan, arguments: &CheckArguments, size: &Size) -> Result<Report> {
+    let interiors = interiors(plan);
+    let mut report = Report::default();
+    say::heading(&mut report, plan, &arguments.deck);
+    for (index, body) in plan.bodies.iter().enumerate() {
+        say::body(&mut report, plan, body);
+        report.line("points", format_args!("about {:.3e}", size.points[index]));
+        say::interior(&mut report, plan, interiors[index].as_ref());
+    }
+    report.say("size, estimated: there is too much of it to be made here");
+    report.line("points", format_args!("{:.3e}", size.all_points()));
+    report.line("bonds", format_args!("{:.3e}", 0.5 * size.directed_bonds));
+    let stable = interiors
+        .iter()
+        .flatten()
+        .map(|interior| interior.stable_step)
+        .fold(f64::INFINITY, f64::min);
+    // Where all points come from files nothing is known of the step.
+    if stable.is_finite() {
+        let clock = choose_step(plan, stable)?;
+        let cost = Cost::estimate(plan, size.all_points(), size.directed_bonds, &clock);
+        say::cost(&mut report, &cost, arguments.ranks, None);
+        say::time(&mut report, plan, stable);
+        say::steps(&mut report, &clock);
+    }
+    report.say("sets, cracks and probes are not looked at");
+    for warning in &plan.warnings {
+        report.say(format_args!("warning: {warning}"));
+    }
+    Ok(report)
 }

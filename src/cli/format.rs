@@ -47,6 +47,27 @@ pub fn count(value: u64) -> String {
     text
 }
 
+/// A time for people, such as `3 h 20 min`.
+pub fn duration(seconds: f64) -> String {
+    const UNITS: [(f64, &str); 4] = [
+        (31_557_600.0, "a"),
+        (86_400.0, "d"),
+        (3600.0, "h"),
+        (60.0, "min"),
+    ];
+    let Some(k) = UNITS.iter().position(|(unit, _)| seconds >= *unit) else {
+        return si(seconds, "s");
+    };
+    let (unit, name) = UNITS[k];
+    let (smaller, smaller_name) = UNITS.get(k + 1).copied().unwrap_or((1.0, "s"));
+    if seconds >= 1000.0 * unit {
+        return format!("{:.1e} {name}", seconds / unit);
+    }
+    let whole = (seconds / unit).floor();
+    let rest = ((seconds - whole * unit) / smaller).floor();
+    format!("{whole} {name} {rest} {smaller_name}")
+}
+
 /// Bytes in binary units.
 pub fn bytes(value: f64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
@@ -70,6 +91,10 @@ mod tests {
         assert_eq!(si(0.0, "J"), "0 J");
         assert_eq!(count(1234567), "1 234 567");
         assert_eq!(count(12), "12");
+        assert_eq!(duration(0.25), "250.0 ms");
+        assert_eq!(duration(12_000.0), "3 h 20 min");
+        assert_eq!(duration(61.0), "1 min 1 s");
+        assert_eq!(duration(1e12), "3.2e4 a");
         assert_eq!(bytes(3.0 * 1024.0 * 1024.0), "3.0 MiB");
     }
 }

@@ -11,6 +11,9 @@ use fissure::run::start_mpi;
 
 use super::{finish, tell};
 
+/// Threads that no host is asked too much with.
+const MOST_THREADS: usize = 64;
+
 /// Starts MPI, runs `body` on all ranks, and ends MPI. Its errors must be the same on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
     // MPI may set such variables for a process that it finds alone.
@@ -121,10 +124,13 @@ pub fn threads(asked: Option<u16>) -> usize {
 
 /// Whether the launcher has bound this process to fewer cores than the host has.
 fn is_bound() -> bool {
-    let Ok(list) = std::fs::read_to_string("/sys/devices/system/cpu/online") else {
-        return false;
-    };
-    cores() < cores_in(&list)
+    cores() < cores_of_host()
+}
+
+/// The cores of this host, as far as the system tells.
+fn cores_of_host() -> usize {
+    let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
+    cores_in(&list).max(cores())
 }
 
 /// The number of cores in a list such as `0-3,8`, as Linux writes them; 0 of an empty one.
@@ -166,8 +172,15 @@ fn warning(threads: usize) -> Option<String> {
 /// Sets up the threads of this rank.
 ///
 /// # Errors
-/// When the system refuses.
+/// When there are far more than cores, or the system refuses.
 pub fn start_threads(threads: usize) -> Result<()> {
+    let most = MOST_THREADS.max(4 * cores_of_host());
+    if threads > most {
+        return Err(Error::input(format!(
+            "--threads {threads}: this host has {} cores; {most} threads at most",
+            cores_of_host()
+        )));
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build_global()

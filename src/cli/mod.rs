@@ -3,6 +3,7 @@
 mod bench;
 mod bench_report;
 mod check;
+mod check_report;
 mod explain;
 mod format;
 mod init;
@@ -11,6 +12,7 @@ mod machine_limits;
 mod memory;
 mod plot;
 mod progress;
+mod report;
 mod run;
 mod summary;
 mod version;
@@ -34,6 +36,7 @@ macro_rules! tell {
 }
 pub(crate) use tell;
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -147,7 +150,8 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 
 /// Validate a deck and show what it would do, without running it.
 ///
-/// Makes the points and finds the bonds on this machine, so it needs the memory of the whole run.
+/// Makes the points and finds the bonds on this machine; where these are too many, it estimates their
+/// numbers instead.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -330,6 +334,24 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => init::init(&arguments, verbosity),
     };
     finish(outcome, true)
+}
+
+/// Prints what a command was asked for. A reader that has closed the output has had enough.
+///
+/// # Errors
+/// When it cannot be written.
+fn print(text: &str) -> Result<()> {
+    let mut output = std::io::stdout().lock();
+    let written = output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush());
+    match written {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            let message = format!("cannot write to the standard output: {error}");
+            Err(Error::run(message))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The exit code of an outcome; prints an error if `speaks`.

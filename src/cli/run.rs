@@ -11,7 +11,7 @@ use fissure::deck;
 use fissure::error::Result;
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Signals, View};
 
-use super::format::si;
+use super::format::{count, si};
 use super::progress::Progress;
 use super::{RunArguments, Verbosity, launch, summary};
 
@@ -77,6 +77,7 @@ fn run_deck(
             plan.title,
             world.size()
         ),
+        bodies: plan.bodies.iter().map(|body| body.name.clone()).collect(),
         progress: Progress::Silent,
     };
     let outcome = fissure::run(&plan, world, options, &mut log)?;
@@ -95,6 +96,8 @@ struct Log {
     /// Whether this rank prints more than errors and warnings.
     speaks: bool,
     title: String,
+    /// Their names.
+    bodies: Vec<String>,
     progress: Progress,
 }
 
@@ -102,11 +105,15 @@ impl Observer for Log {
     fn message(&mut self, message: &Message) {
         match message {
             Message::Started if self.speaks => say!("{}", self.title),
-            Message::SetUp { step, stable_step } if self.speaks && step > stable_step => tell!(
-                "warning: the time step {} is larger than the stable one, {}",
-                si(*step, "s"),
-                si(*stable_step, "s")
-            ),
+            Message::SetUp { survey, .. } if self.speaks => {
+                for (pair, bonds) in &survey.joints {
+                    let [a, b] = pair.map(|body| &self.bodies[body]);
+                    say!("{} bonds join {a} and {b}", count(*bonds));
+                }
+                for warning in &survey.warnings {
+                    tell!("warning: {warning}");
+                }
+            }
             Message::Continued {
                 number,
                 time,

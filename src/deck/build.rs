@@ -4,8 +4,8 @@ use super::expression::{Expression, Variable};
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
-    Action, Body, CheckpointRule, Condition, CriticalStretch, FamilyRule, History, Initial,
-    Interface, InterfaceRule, Interval, Law, Material, Output, Places, Plan, PointSource,
+    Action, Body, CheckpointRule, Condition, Crack, CriticalStretch, FamilyRule, History, Initial,
+    Interface, InterfaceRule, Interval, Law, Material, Output, Places, Plan, PointSource, PreCrack,
     Quadrature, Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
 };
 use super::resolve::ALL_VARIABLES;
@@ -23,6 +23,7 @@ impl Plan {
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
             source: Source::default(),
+            warnings: Vec::new(),
             places: Places::default(),
             title: String::new(),
             dimension,
@@ -108,12 +109,24 @@ impl Plan {
         self.sets.len() - 1
     }
 
+    /// Adds a crack that is there from the start.
+    pub fn add_crack(&mut self, name: &str, surface: Crack) {
+        self.cracks.push(PreCrack {
+            name: name.to_owned(),
+            span: 0..0,
+            surface,
+        });
+    }
+
     /// Adds a load on or a support of a set, given by its index.
     pub fn add_condition(&mut self, name: &str, set: usize, action: Action) {
         self.conditions.push(Condition {
             name: name.to_owned(),
             set,
             span: 0..0,
+            quantity: action.quantity(),
+            place: 0..0,
+            default_depth: None,
             action,
         });
     }
@@ -125,8 +138,20 @@ impl Plan {
             set,
             span: 0..0,
             displacement: None,
-            velocity: Some(velocity),
+            velocity: Some((velocity, 0..0)),
         });
+    }
+}
+
+impl Action {
+    /// The key of decks that prescribes it, a traction or pressure being a body force here.
+    fn quantity(&self) -> &'static str {
+        match self {
+            Self::Displacement(_) => "displacement",
+            Self::Velocity(_) => "velocity",
+            Self::BodyForce(..) => "body_force",
+            Self::Force(_) => "force",
+        }
     }
 }
 

@@ -24,11 +24,13 @@ pub fn initials(scope: &Scope, deck: &Deck, sets: &[plan::Set]) -> Result<Vec<pl
                 let message = format!("{key}: give `displacement`, `velocity` or both");
                 return Err(scope.error(table.span(), message));
             }
-            let values = |vector: &Option<_>, name: &str| {
-                vector
-                    .as_ref()
-                    .map(|vector| scope.expressions(vector, &format!("{key} {name}"), &POSITION))
-                    .transpose()
+            let values = |vector: &Option<Vector>, name: &str| {
+                let resolve = |vector: &Vector| {
+                    let key = format!("{key} {name}");
+                    let values = scope.expressions(vector, &key, &POSITION)?;
+                    Ok((values, vector.span()))
+                };
+                vector.as_ref().map(resolve).transpose()
             };
             Ok(plan::Initial {
                 name: name.clone(),
@@ -65,15 +67,24 @@ pub fn conditions(
                 ("pressure", condition.pressure.as_ref().map(Spanned::span)),
                 ("force", vector(&condition.force)),
             ];
-            scope.exactly_one(table.span(), &key, &given)?;
+            let (quantity, place) = &given[scope.exactly_one(table.span(), &key, &given)?];
             Ok(plan::Condition {
                 name: name.clone(),
                 set: find_set(scope, &condition.set, sets, &format!("{key} set"))?,
                 span: condition.set.span(),
+                quantity,
+                place: place.clone().unwrap_or(table.span()),
+                default_depth: spacing
+                    .filter(|_| on_a_layer(condition) && condition.depth.is_none()),
                 action: action(scope, &key, condition, spacing)?,
             })
         })
         .collect()
+}
+
+/// Whether what a condition prescribes is spread over a layer with a depth.
+fn on_a_layer(condition: &grammar::Condition) -> bool {
+    condition.traction.is_some() || condition.pressure.is_some()
 }
 
 fn action(
@@ -82,8 +93,7 @@ fn action(
     condition: &grammar::Condition,
     spacing: Option<f64>,
 ) -> Result<Action> {
-    let on_a_layer = condition.traction.is_some() || condition.pressure.is_some();
-    if let (Some(depth), false) = (&condition.depth, on_a_layer) {
+    if let (Some(depth), false) = (&condition.depth, on_a_layer(condition)) {
         let message = format!("{key} depth: only a traction or a pressure has a depth");
         return Err(scope.error(depth.span(), message));
     }

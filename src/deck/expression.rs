@@ -178,6 +178,11 @@ impl Expression {
         self.evaluate(position, time) != 0.0
     }
 
+    /// Whether the value is a truth, 0 or 1, by how it is made: by a comparison or from such values.
+    pub fn is_condition(&self) -> bool {
+        evaluate::is_truth(&self.code)
+    }
+
     /// Whether the variable occurs in the expression.
     pub fn uses(&self, variable: Variable) -> bool {
         self.code.contains(&Instruction::Variable(variable))

@@ -26,8 +26,8 @@ pub type Tables<T> = IndexMap<String, Spanned<T>>;
 #[serde(deny_unknown_fields)]
 pub struct Deck {
     /// One line for summaries and pictures.
-    #[serde(default)]
-    pub title: String,
+    #[serde(default = "nowhere")]
+    pub title: Text,
     /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
     pub dimension: Spanned<DimensionName>,
     /// Thickness of a plane body in m; 1 if not given.
@@ -148,7 +148,8 @@ fn no_correction() -> Spanned<VolumeCorrection> {
 pub enum VolumeCorrection {
     /// Points within the horizon count whole.
     None,
-    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1).
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too; LAMMPS ends this
+    /// taper at δ.
     Linear,
     /// Points count the share of their cell within the horizon.
     Exact,

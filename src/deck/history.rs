@@ -3,11 +3,12 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Text};
+use super::names::suits_a_column;
 use super::number::{Number, Vector};
 use super::outputs::{ROWS, interval};
 use super::plan::{self, Field};
 use super::resolve::{Scope, find, resolve_each};
-use super::sets::{find_set, find_sets};
+use super::sets::find_set;
 use crate::error::Result;
 
 /// Damage above which a point counts as cracked if the deck does not say.
@@ -38,11 +39,22 @@ pub fn history(
             let message = format!("[history] reactions: `{}` is named twice", set.get_ref());
             return Err(scope.error(set.span(), message));
         }
+        suits_a_column(scope, "[history] reactions", set.get_ref(), set)?;
     }
     let probes = resolve_each(&history.probe, |name, probe| {
         let key = column_name(scope, "probe", name, probe)?;
-        scope.vector(&probe.get_ref().at, &format!("{key} at"))
+        Ok(plan::Probe {
+            name: name.to_owned(),
+            span: probe.span(),
+            at: scope.vector(&probe.get_ref().at, &format!("{key} at"))?,
+        })
     })?;
+    let reaction = |name: &Text| {
+        Ok(plan::Reaction {
+            set: find_set(scope, name, sets, "[history] reactions")?,
+            span: name.span(),
+        })
+    };
     let fronts = resolve_each(&history.front, |name, table| {
         front(scope, name, table, horizon)
     })?;
@@ -57,9 +69,13 @@ pub fn history(
             &history.every_steps,
             end / ROWS,
         )?,
-        reactions: find_sets(scope, &history.reactions, sets, "[history] reactions")?,
+        reactions: history
+            .reactions
+            .iter()
+            .map(reaction)
+            .collect::<Result<_>>()?,
         damage_threshold,
-        probes: probes.into_iter().collect(),
+        probes: probes.into_values().collect(),
         fronts: fronts.into_values().collect(),
         tips: tips.into_values().collect(),
     })
@@ -68,13 +84,7 @@ pub fn history(
 /// The key of a table, if its name can be part of the names of columns.
 fn column_name<T>(scope: &Scope, kind: &str, name: &str, table: &Spanned<T>) -> Result<String> {
     let key = format!("[history.{kind}.{name}]");
-    if name.is_empty() || name.contains(['/', '.', ',']) {
-        let message = format!(
-            "{key}: the name becomes that of columns, so it must not be empty or contain `/`, `.` \
-             or `,`"
-        );
-        return Err(scope.error(table.span(), message));
-    }
+    suits_a_column(scope, &key, name, table)?;
     Ok(key)
 }
 

@@ -4,6 +4,7 @@ mod bodies;
 mod build;
 mod conditions;
 mod difference;
+mod doubts;
 mod explain;
 pub mod expression;
 pub mod grammar;
@@ -11,6 +12,7 @@ mod history;
 mod interface;
 mod law;
 mod materials;
+mod names;
 mod number;
 mod outputs;
 mod parameters;
@@ -68,7 +70,9 @@ impl Deck {
     /// # Errors
     /// As [`read`].
     pub fn plan(&self) -> Result<Plan> {
-        validate::validate(&self.source, &self.grammar)
+        let mut plan = validate::validate(&self.source, &self.grammar)?;
+        plan.warnings = doubts::doubts(&self.source, &self.grammar, &plan)?;
+        Ok(plan)
     }
 
     /// The deck as TOML with every default written out.

@@ -16,6 +16,8 @@ use crate::elastic::Isotropic;
 pub struct Plan {
     /// The deck's text, for errors found later and for the result's metadata.
     pub source: Source,
+    /// What the deck may say but most likely does not mean, each with file and line.
+    pub warnings: Vec<String>,
     /// One line.
     pub title: String,
     /// Where some of the values stand in the deck.
@@ -37,7 +39,7 @@ pub struct Plan {
     /// Sets: `all`, then the bodies, then those of the deck.
     pub sets: Vec<Set>,
     /// Pre-cracks.
-    pub cracks: Vec<Crack>,
+    pub cracks: Vec<PreCrack>,
     /// Initial values, applied in order.
     pub initials: Vec<Initial>,
     /// Loads and supports, applied in order.
@@ -287,6 +289,17 @@ pub enum Selector {
     },
 }
 
+/// A crack that is there from the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreCrack {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The surface.
+    pub surface: Crack,
+}
+
 /// A surface that cuts bonds; lengths in m.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Crack {
@@ -326,10 +339,10 @@ pub struct Initial {
     pub set: usize,
     /// Where the set is named.
     pub span: Range<usize>,
-    /// Displacement (m) by component.
-    pub displacement: Option<Vec<Expression>>,
-    /// Velocity (m/s) by component.
-    pub velocity: Option<Vec<Expression>>,
+    /// Displacement (m) by component, and where it stands.
+    pub displacement: Option<(Vec<Expression>, Range<usize>)>,
+    /// Velocity (m/s) by component, and where it stands.
+    pub velocity: Option<(Vec<Expression>, Range<usize>)>,
 }
 
 /// A load or support.
@@ -341,6 +354,13 @@ pub struct Condition {
     pub set: usize,
     /// Where the set is named.
     pub span: Range<usize>,
+    /// The key of what it prescribes, such as `traction`.
+    pub quantity: &'static str,
+    /// Where that stands.
+    pub place: Range<usize>,
+    /// Thickness (m) of the layer that carries a traction or pressure, if the deck leaves it to the
+    /// spacing.
+    pub default_depth: Option<f64>,
     /// What it does.
     pub action: Action,
 }
@@ -408,16 +428,36 @@ pub struct Output {
 pub struct History {
     /// How often.
     pub every: Interval,
-    /// Indices of sets whose reaction force is recorded.
-    pub reactions: Vec<usize>,
+    /// Sets whose reaction force is recorded.
+    pub reactions: Vec<Reaction>,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
-    /// Name and place (m) of each probe.
-    pub probes: Vec<(String, [f64; 3])>,
+    /// Places that are watched.
+    pub probes: Vec<Probe>,
     /// Fronts that are followed.
     pub fronts: Vec<Front>,
     /// Crack tips that are followed.
     pub tips: Vec<Tip>,
+}
+
+/// A set whose reaction force is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reaction {
+    /// Index of the set.
+    pub set: usize,
+    /// Where it is named.
+    pub span: Range<usize>,
+}
+
+/// A place whose nearest point is followed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The place, m.
+    pub at: [f64; 3],
 }
 
 /// A start and a way from it.

@@ -156,7 +156,15 @@ fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<
 ///
 /// # Errors
 /// On a crack of another dimension or one without extent.
-pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<plan::Crack> {
+pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<plan::PreCrack> {
+    Ok(plan::PreCrack {
+        name: name.to_owned(),
+        span: crack.span(),
+        surface: surface(scope, name, crack)?,
+    })
+}
+
+fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<plan::Crack> {
     use grammar::Crack;
     let (kind, dimension) = match crack.get_ref() {
         Crack::Segment { .. } => ("segment", 2),

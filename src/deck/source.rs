@@ -1,9 +1,26 @@
 //! The deck's text, and errors that point into it.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+
+/// The most bytes of a deck.
+const LONGEST: u64 = 1 << 28;
+
+/// Characters of a whole error, where the path is not longer than all the rest.
+const MOST_SHOWN: usize = 390;
+
+/// Characters of what an error says.
+const MOST_SAID: usize = 230;
+
+/// Characters of a line that are shown in any case.
+const NARROWEST: usize = 24;
+
+/// Names longer than this are like no other.
+const LONGEST_NAME: usize = 64;
 
 /// A deck's file name and text; both are empty for a plan that was made without a deck.
 #[derive(Debug, Clone, Default)]
@@ -18,51 +35,137 @@ impl Source {
     /// Reads a deck.
     ///
     /// # Errors
-    /// When the file cannot be read or is not UTF-8.
+    /// When the file cannot be read, is not UTF-8, or is far too long for a deck.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
+        let mut bytes = Vec::new();
+        let read = |bytes: &mut Vec<u8>| File::open(path)?.take(LONGEST + 1).read_to_end(bytes);
+        read(&mut bytes).map_err(|error| {
             Error::input(format!("cannot read the deck {}: {error}", path.display()))
         })?;
-        Ok(Self {
-            path: path.to_owned(),
-            text,
-        })
+        if bytes.len() as u64 > LONGEST {
+            let message = format!("{}: is longer than {LONGEST} bytes", path.display());
+            return Err(Error::input(format!("{message}; is this a deck?")));
+        }
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(Self {
+                path: path.to_owned(),
+                text,
+            }),
+            Err(error) => {
+                let valid = error.utf8_error().valid_up_to();
+                let source = Self {
+                    path: path.to_owned(),
+                    text: String::from_utf8_lossy(error.as_bytes()).into_owned(),
+                };
+                let message = "is not UTF-8 text from here on; save the deck as UTF-8";
+                Err(source.error(valid..valid + 1, message))
+            }
+        }
     }
 
-    /// An error that names file, line and column and shows the line with a caret below the bytes
-    /// of `span`; without a deck, the message alone.
-    pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
+    /// A warning that names file and line; without a deck, the message alone.
+    pub fn warning(&self, span: Range<usize>, message: impl AsRef<str>) -> String {
+        let message = shortened(message.as_ref(), MOST_SAID);
         if self.path.as_os_str().is_empty() {
-            return Error::input(message.as_ref());
+            return message;
         }
-        let start = span.start.min(self.text.len());
-        let start = (0..=start)
-            .rev()
-            .find(|at| self.text.is_char_boundary(*at))
-            .unwrap_or(0);
+        let start = self.text.floor_char_boundary(span.start);
+        let line = self.text[..start].matches('\n').count() + 1;
+        format!("{}:{line}: {message}", self.path.display())
+    }
+
+    /// An error that names file, line and column and shows what stands there, with a caret below the
+    /// bytes of `span`; without a deck, the message alone. All of it has about [`MOST_SHOWN`] characters
+    /// at most.
+    pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
+        let message = shortened(message.as_ref(), MOST_SAID);
+        if self.path.as_os_str().is_empty() {
+            return Error::input(message);
+        }
+        let start = self.text.floor_char_boundary(span.start);
         let before = &self.text[..start];
         let line_number = before.matches('\n').count() + 1;
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
         let line = self.text[line_start..].lines().next().unwrap_or("");
         let column = self.text[line_start..start].chars().count();
-        let rest = line.chars().count().saturating_sub(column);
         let marked = self
             .text
             .get(start..span.end)
-            .map_or(1, |text| text.chars().count());
-        let carets = "^".repeat(marked.clamp(1, rest.max(1)));
-        let gutter = " ".repeat(line_number.to_string().len());
-        let tabs_kept: String = line
-            .chars()
-            .take(column)
-            .map(|c| if c == '\t' { '\t' } else { ' ' })
-            .collect();
-        Error::input(format!(
-            "{}:{line_number}:{}: {}\n{gutter} |\n{line_number} | {line}\n{gutter} | {tabs_kept}{carets}",
+            .map_or(1, |text| text.chars().take(MOST_SHOWN).count());
+        let heading = format!(
+            "{}:{line_number}:{}: {message}",
             self.path.display(),
-            column + 1,
-            message.as_ref(),
+            column + 1
+        );
+        let room = MOST_SHOWN.saturating_sub(heading.chars().count()) / 2;
+        let window = Window::new(line, column, room.saturating_sub(12).max(NARROWEST));
+        let carets = "^".repeat(marked.clamp(1, window.rest().max(1)));
+        let gutter = " ".repeat(line_number.to_string().len());
+        Error::input(format!(
+            "{heading}\n{gutter} |\n{line_number} | {}\n{gutter} | {}{carets}",
+            window.text, window.indent,
         ))
+    }
+}
+
+/// The part of a line that is shown.
+struct Window {
+    text: String,
+    /// What stands below the text before the mark: blanks, and tabs where the text has them.
+    indent: String,
+}
+
+impl Window {
+    /// So many characters of a line at most, those from `column` on among them.
+    fn new(line: &str, column: usize, width: usize) -> Self {
+        // The end of a line may be marked as well.
+        let fits = line.chars().nth(width).is_none();
+        let first = if fits || column < 2 * width / 3 {
+            0
+        } else {
+            column - width / 3
+        };
+        let mut shown: Vec<char> = line.chars().skip(first).take(width).collect();
+        if first > 0 {
+            shown[0] = '…';
+        }
+        if line.chars().nth(first + width).is_some() {
+            shown[width - 1] = '…';
+        }
+        for c in &mut shown {
+            if c.is_control() && *c != '\t' {
+                *c = char::REPLACEMENT_CHARACTER;
+            }
+        }
+        let blank = |c: &char| if *c == '\t' { '\t' } else { ' ' };
+        Self {
+            indent: shown.iter().take(column - first).map(blank).collect(),
+            text: shown.into_iter().collect(),
+        }
+    }
+
+    /// Characters from the mark on.
+    fn rest(&self) -> usize {
+        self.text.chars().count() - self.indent.chars().count()
+    }
+}
+
+/// A message on one line, of so many characters at most.
+fn shortened(message: &str, most: usize) -> String {
+    let mut shown = String::new();
+    for c in message.chars() {
+        if c.is_control() {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+        if shown.len() > 4 * most {
+            break;
+        }
+    }
+    match shown.char_indices().nth(most) {
+        None => shown,
+        Some((end, _)) => format!("{}…", &shown[..end]),
     }
 }
 
@@ -70,6 +173,7 @@ impl Source {
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
+        .filter(|candidate| name.len().max(candidate.len()) <= LONGEST_NAME)
         .map(|candidate| {
             let likeness = strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase());
             (likeness, candidate)
@@ -84,9 +188,10 @@ pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> S
     let known: Vec<&str> = known.into_iter().collect();
     let mean = nearest(name, known.iter().copied())
         .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    match known.is_empty() {
-        true => format!("{mean} (none is defined)"),
-        false => format!("{mean} (known: {})", known.join(", ")),
+    if known.is_empty() {
+        format!("{mean} (none is defined)")
+    } else {
+        format!("{mean} (known: {})", known.join(", "))
     }
 }
 
@@ -105,6 +210,68 @@ mod tests {
         assert_eq!(
             error.message,
             "a.toml:2:10: no such thing\n  |\n2 | two = µ, bad\n  |          ^^^"
+        );
+    }
+
+    fn shown(text: &str, marked: Range<usize>, message: &str) -> String {
+        let source = Source {
+            path: "a.toml".into(),
+            text: text.to_owned(),
+        };
+        source.error(marked, message).message
+    }
+
+    #[test]
+    fn of_a_long_line_only_what_is_near_the_mark_is_shown() {
+        let text = format!(
+            "a = [{} bad{}]",
+            "1, ".repeat(1_000_000),
+            ", 1".repeat(1_000_000)
+        );
+        let at = text.find("bad").unwrap();
+        let error = shown(&text, at..at + 3, "no such thing");
+        let lines: Vec<&str> = error.lines().collect();
+        assert_eq!(lines[0], "a.toml:1:3000007: no such thing");
+        assert!(
+            lines[2].starts_with("1 | …") && lines[2].ends_with('…'),
+            "{error}"
+        );
+        let carets = lines[3].chars().position(|c| c == '^').unwrap();
+        let marked: String = lines[2].chars().skip(carets).take(3).collect();
+        assert_eq!(marked, "bad");
+        assert_eq!(lines[3].matches('^').count(), 3);
+        assert!(error.chars().count() <= 400, "{error}");
+    }
+
+    #[test]
+    fn an_error_is_never_long_and_has_no_control_characters() {
+        let long = "é\n\u{1b}".repeat(100_000);
+        let text = format!("a = \"{}\"", "é\u{1b}".repeat(100_000));
+        for (marked, message) in [
+            (4..text.len(), &long[..]),
+            (text.len() - 1..text.len(), "no"),
+            (text.len()..text.len(), &long),
+            (0..1, &long),
+        ] {
+            let error = shown(&text, marked, message);
+            assert!(error.chars().count() <= 400, "{error}");
+            assert_eq!(error.lines().count(), 4, "{error}");
+            assert!(
+                !error.replace('\n', "").contains(char::is_control),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn text_of_another_encoding_has_a_line() {
+        let path = std::env::temp_dir().join(format!("fissure-latin-{}", std::process::id()));
+        std::fs::write(&path, b"title = 'a'\nend = 1 # \xb5s\n").unwrap();
+        let error = Source::read(&path).unwrap_err().message;
+        std::fs::remove_file(&path).unwrap();
+        assert!(
+            error.contains(":2:11: is not UTF-8 text from here on"),
+            "{error}"
         );
     }
 

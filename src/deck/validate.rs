@@ -7,7 +7,7 @@ use super::number::{Edges, Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
-use super::{bodies, conditions, history, interface, materials, outputs, sets, shapes};
+use super::{bodies, conditions, history, interface, materials, names, outputs, sets, shapes};
 use crate::dimension::Dimension;
 use crate::error::Result;
 
@@ -17,6 +17,7 @@ use crate::error::Result;
 /// The first mistake, with its place in the deck, the key and what would be right.
 pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let scope = Scope::of(source, deck)?;
+    names::names(&scope, deck)?;
     let dimension = dimension(&scope, deck)?;
     let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;
     let spacing = match &deck.grid.get_ref().spacing {
@@ -40,7 +41,8 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let time = time(&scope, deck)?;
     Ok(Plan {
         source: source.clone(),
-        title: deck.title.clone(),
+        warnings: Vec::new(),
+        title: deck.title.get_ref().clone(),
         places: places(deck),
         dimension,
         horizon,

@@ -1,8 +1,9 @@
 //! The share of a lattice cell that counts in a family: Ṽ/V.
 //!
-//! `linear` is the taper of EMU, Peridigm and LAMMPS (Parks et al. 2008); `exact` is the share of the
-//! cell that lies within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl & Schweitzer 2016, eq. 2): closed
-//! form in 1-D and 2-D, quadrature over slices in 3-D.
+//! `linear` falls from 1 to 0 between δ − dx/2 and δ + dx/2, so that families hold points beyond the
+//! horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014); LAMMPS (Parks et al. 2008) ends the same
+//! taper at δ. `exact` is the share of the cell that lies within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl
+//! & Schweitzer 2016, eq. 2): closed form in 1-D and 2-D, quadrature over slices in 3-D.
 
 use std::cell::RefCell;
 use std::collections::HashMap;

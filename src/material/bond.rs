@@ -163,7 +163,9 @@ pub fn deform<S: Simd, const D: usize>(
     let (mut stretch, mut shortening) = (growth, growth);
     if wanted.stretch {
         let near = series(simd, growth, &STRETCH);
-        stretch = with_far(simd, growth, marked, near, |_| (Lanes::splat(1.0), Lanes::splat(0.0)));
+        stretch = with_far(simd, growth, marked, near, |_| {
+            (Lanes::splat(1.0), Lanes::splat(0.0))
+        });
     }
     if wanted.shortening {
         let near = series(simd, growth, &SHORTENING);

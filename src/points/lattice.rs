@@ -6,7 +6,7 @@ use crate::deck::plan::{Body, Plan, PointSource, Quadrature, Shape};
 use crate::error::{Error, Result};
 
 use super::region::{Region, TOLERANCE};
-use super::{MOST_A_RANK, Point, shape};
+use super::{MOST_A_RANK, Point, distance_squared, shape};
 
 /// Binary logarithm of the cells that one rank goes through; some minutes' worth.
 const CELLS_A_RANK: u32 = 33;
@@ -16,6 +16,13 @@ const SAMPLES: u64 = 1 << 17;
 
 /// Consecutive multiples of this share of 1, less whole numbers, fill it evenly: the golden ratio.
 const EVENLY: f64 = 0.618_033_988_749_894_9;
+
+/// The same for places in a cube: powers of the root of x⁴ = x + 1 (Roberts 2018).
+const EVENLY_IN: [f64; 3] = [
+    0.819_172_513_396_164_4,
+    0.671_043_606_703_789_2,
+    0.549_700_477_901_970_2,
+];
 
 /// A body made of lattice cells. A cell belongs to it if its centre lies within its shape; one that also
 /// lies in a later lattice body is left to that one.
@@ -27,6 +34,8 @@ pub struct LatticeBody<'a> {
     dimension: usize,
     tolerance: f64,
     region: Region,
+    /// All cells that the shape can touch.
+    around: Region,
     quadrature: Quadrature,
     section: f64,
 }
@@ -49,7 +58,8 @@ impl<'a> LatticeBody<'a> {
             return Ok(None);
         };
         let dimension = plan.dimension.count();
-        let Some(region) = Region::new(shape, spacing, origin, dimension) else {
+        let region = |margin| Region::new(shape, spacing, origin, dimension, margin);
+        let (Some(region), Some(around)) = (region(0.0), region(0.5)) else {
             return Err(too_many(plan, body));
         };
         let later = plan.bodies[body + 1..].iter().filter_map(lattice);
@@ -62,6 +72,7 @@ impl<'a> LatticeBody<'a> {
             dimension,
             tolerance: TOLERANCE * edges.fold(f64::INFINITY, f64::min),
             region,
+            around,
             quadrature: plan.quadrature,
             section: plan.dimension.section(),
         }))
@@ -74,14 +85,22 @@ impl<'a> LatticeBody<'a> {
 
     /// The centre (m) of one of these cells, if it belongs to the body.
     pub fn centre(&self, index: u64) -> Option<[f64; 3]> {
-        let cell = self.region.cell(index);
+        self.centre_of(self.region.cell(index))
+    }
+
+    /// The centre (m) of a cell, if it belongs to the body.
+    fn centre_of(&self, cell: [i64; 3]) -> Option<[f64; 3]> {
         let mut centre = [0.0; 3];
         for k in 0..self.dimension {
             centre[k] = self.origin[k] + (cell[k] as f64 + 0.5) * self.spacing[k];
         }
-        let within = |shape: &Shape| shape::contains(shape, centre, self.tolerance);
-        let belongs = within(self.shape) && !self.later.iter().any(|shape| within(shape));
-        belongs.then_some(centre)
+        self.contains(centre).then_some(centre)
+    }
+
+    /// Whether a place (m) is within the shape and in no later body.
+    fn contains(&self, place: [f64; 3]) -> bool {
+        let within = |shape: &Shape| shape::contains(shape, place, self.tolerance);
+        within(self.shape) && !self.later.iter().any(|shape| within(shape))
     }
 
     /// Volume of a cell, m³.
@@ -101,12 +120,76 @@ impl<'a> LatticeBody<'a> {
         let share = if cells <= SAMPLES {
             (0..cells).filter(belongs).count() as f64 / all.max(1.0)
         } else {
-            let at = |k: u64| ((k as f64 * EVENLY).fract() * all) as u64;
-            let found = (0..SAMPLES).map(at).filter(belongs).count();
+            let found = evenly(SAMPLES, cells).filter(belongs).count();
             found as f64 / SAMPLES as f64
         };
         share * all * self.points_of_cell() as f64
     }
+
+    /// The centres (m) of about so many of the body's cells, spread evenly.
+    pub fn some_centres(&self, count: u64) -> Vec<[f64; 3]> {
+        let centres = evenly(SAMPLES, self.cells()).filter_map(|index| self.centre(index));
+        centres.take(count as usize).collect()
+    }
+
+    /// Number of cells of the lattice within a distance (m), about.
+    pub fn cells_within(&self, distance: f64) -> f64 {
+        let widths = (0..self.dimension).map(|k| 2.0 * (distance / self.spacing[k]).floor() + 1.0);
+        widths.product()
+    }
+
+    /// Number of the body's points in cells whose centres are at most a distance (m) from a place (m).
+    pub fn count_near(&self, place: [f64; 3], distance: f64) -> u64 {
+        let range = |k: usize| {
+            if k >= self.dimension {
+                return 0..=0;
+            }
+            let cell = |x: f64| (x - self.origin[k]) / self.spacing[k] - 0.5;
+            let first = cell(place[k] - distance).ceil() as i64;
+            first..=cell(place[k] + distance).floor() as i64
+        };
+        let mut count = 0;
+        for z in range(2) {
+            for y in range(1) {
+                for x in range(0) {
+                    let near =
+                        |centre: &[f64; 3]| distance_squared(*centre, place) <= distance * distance;
+                    let centre = self.centre_of([x, y, z]);
+                    count += u64::from(centre.as_ref().is_some_and(near));
+                }
+            }
+        }
+        count * self.points_of_cell()
+    }
+
+    /// The volume (m³) of the shape less that of later bodies, from places that fill it evenly.
+    pub fn shape_volume(&self) -> f64 {
+        let (region, all) = (&self.around, self.around.total() as f64);
+        let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);
+        let mut within = 0;
+        for k in 0..samples {
+            // The same number of places in each cell, or in each of some cells.
+            let index = if region.total() <= SAMPLES {
+                k % region.total()
+            } else {
+                ((k as f64 * EVENLY).fract() * all) as u64
+            };
+            let cell = region.cell(index);
+            let mut place = [0.0; 3];
+            for d in 0..self.dimension {
+                let share = (k as f64 * EVENLY_IN[d]).fract();
+                place[d] = self.origin[d] + (cell[d] as f64 + share) * self.spacing[d];
+            }
+            within += u64::from(self.contains(place));
+        }
+        within as f64 / samples.max(1) as f64 * all * self.cell_volume()
+    }
+}
+
+/// So many of the numbers below a count, spread evenly.
+fn evenly(samples: u64, count: u64) -> impl Iterator<Item = u64> {
+    let at = move |k: u64| ((k as f64 * EVENLY).fract() * count as f64) as u64;
+    (0..if count == 0 { 0 } else { samples }).map(at)
 }
 
 /// This rank's piece of a body's points; ids count from 0 within the piece. Cells are numbered with

@@ -41,17 +41,18 @@ struct Stretch {
 }
 
 impl Region {
-    /// The cells of a lattice that has a corner of a cell at `origin` (m); `None` if some lie too far
-    /// away to be numbered.
+    /// The cells of a lattice that has a corner of a cell at `origin` (m), and those whose centres lie up
+    /// to `margin` edges outside; `None` if some lie too far away to be numbered.
     pub fn new(
         shape: &Shape,
         spacing: [f64; 3],
         origin: [f64; 3],
         dimension: usize,
+        margin: f64,
     ) -> Option<Self> {
         let boxes = parts(shape)
             .into_iter()
-            .map(|part| cells(shape::bounds(part), spacing, origin, dimension))
+            .map(|part| cells(shape::bounds(part), spacing, origin, dimension, margin))
             .collect::<Option<Vec<CellBox>>>()?;
         let has_cells = |cells: &&CellBox| (0..3).all(|k| cells.first[k] < cells.end[k]);
         let boxes: Vec<&CellBox> = boxes.iter().filter(has_cells).collect();
@@ -96,12 +97,13 @@ fn parts(shape: &Shape) -> Vec<&Shape> {
     }
 }
 
-/// The cells whose centres can lie within a box (m).
+/// The cells whose centres can lie within a box (m), or so many edges outside.
 fn cells(
     (lower, upper): ([f64; 3], [f64; 3]),
     spacing: [f64; 3],
     origin: [f64; 3],
     dimension: usize,
+    margin: f64,
 ) -> Option<CellBox> {
     let mut cells = CellBox {
         first: [0; 3],
@@ -114,7 +116,7 @@ fn cells(
             return None;
         }
         // Twice what counts as within, and what rounding makes of large numbers.
-        let slack = 2.0 * TOLERANCE + 4.0 * f64::EPSILON * largest;
+        let slack = margin + 2.0 * TOLERANCE + 4.0 * f64::EPSILON * largest;
         cells.first[k] = (low - 0.5 - slack).ceil() as i64;
         cells.end[k] = (high - 0.5 + slack).floor() as i64 + 1;
     }
@@ -189,7 +191,7 @@ mod tests {
     #[test]
     fn what_lies_between_the_parts_of_a_union_is_left_out() {
         let apart = Shape::Union(vec![cube([0.0; 3], 2.0), cube([1e6, 1e6, 1.0], 2.0)]);
-        let region = Region::new(&apart, [1.0; 3], [0.0; 3], 3).unwrap();
+        let region = Region::new(&apart, [1.0; 3], [0.0; 3], 3, 0.0).unwrap();
         assert_eq!(region.total(), 16);
         assert_eq!(region.cell(0), [0, 0, 0]);
         assert_eq!(region.cell(15), [1_000_001, 1_000_001, 2]);
@@ -199,19 +201,19 @@ mod tests {
             bar([0.0; 3], [1.0, 1e4, 1.0]),
             bar([0.0; 3], [1.0, 1.0, 1e4]),
         ]);
-        let region = Region::new(&frame, [1.0; 3], [0.0; 3], 3).unwrap();
+        let region = Region::new(&frame, [1.0; 3], [0.0; 3], 3, 0.0).unwrap();
         assert_eq!(region.total(), 30_000 - 2);
     }
 
     #[test]
     fn cells_too_far_or_too_many_to_number() {
         let far = cube([1e16, 0.0, 0.0], 1e3);
-        assert!(Region::new(&far, [1.0; 3], [0.0; 3], 3).is_none());
+        assert!(Region::new(&far, [1.0; 3], [0.0; 3], 3, 0.0).is_none());
         let large = cube([0.0; 3], 1e10);
-        let region = Region::new(&large, [1.0; 3], [0.0; 3], 3).unwrap();
+        let region = Region::new(&large, [1.0; 3], [0.0; 3], 3, 0.0).unwrap();
         assert_eq!(region.total(), u64::MAX);
         let infinite = cube([f64::NEG_INFINITY; 3], f64::INFINITY);
-        assert!(Region::new(&infinite, [1.0; 3], [0.0; 3], 3).is_none());
+        assert!(Region::new(&infinite, [1.0; 3], [0.0; 3], 3, 0.0).is_none());
     }
 
     proptest! {
@@ -225,7 +227,7 @@ mod tests {
                 .iter()
                 .map(|(lower, edge)| cube(lower.map(f64::from), f64::from(*edge)))
                 .collect();
-            let region = Region::new(&Shape::Union(shapes), [1.0; 3], [0.0; 3], 3).unwrap();
+            let region = Region::new(&Shape::Union(shapes), [1.0; 3], [0.0; 3], 3, 0.0).unwrap();
             let found = all(&region);
             let key = |cell: &[i64; 3]| [cell[2], cell[1], cell[0]];
             prop_assert!(found.windows(2).all(|pair| key(&pair[0]) < key(&pair[1])));

@@ -46,6 +46,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
 use crate::solver::observers::HistoryRow;
+use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use recorder::{Recorder, Start, can_continue};
@@ -150,6 +151,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::SetUp {
             step: simulation.clock.step(),
             stable_step: simulation.stable_step,
+            survey: Survey::new(&mut simulation),
         });
         if !simulation.forces.instructions().are_fused() {
             let message = "the vector instructions of this processor do not round a product and a sum once, \

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::solver::Simulation;
 use crate::solver::observers::{Energies, HistoryRow};
+use crate::survey::Survey;
 
 /// Looks on while a run goes on. Its methods are called on all ranks alike; each does nothing unless
 /// it is given something to do.
@@ -40,6 +41,8 @@ pub enum Message {
         step: f64,
         /// The largest step that is known to be stable, s.
         stable_step: f64,
+        /// What there is, and what is most likely not meant.
+        survey: Survey,
     },
     /// The run goes on from a checkpoint.
     Continued {

@@ -18,6 +18,7 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
     let mut plan = plan.clone();
     // What may change between the parts of a run.
     plan.source = Source::default();
+    plan.warnings.clear();
     plan.title.clear();
     plan.time.end = 0.0;
     plan.output = Output {

@@ -1,5 +1,6 @@
 //! A run: from the plan to points in motion, step by step.
 
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
@@ -11,7 +12,7 @@ use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, Evolution, ForceTimes, Forces};
-use super::conditions::{Conditions, apply_initials, members};
+use super::conditions::{Conditions, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::clock::steps_to;
@@ -40,6 +41,8 @@ pub struct Simulation<'a, const D: usize> {
     pub conditions: Conditions<D>,
     /// Volume of each owned point's whole family, broken bonds included, m³.
     pub family_volume: Vec<f64>,
+    /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
+    pub cut: Vec<u64>,
     /// The stable step, s.
     pub stable_step: f64,
     /// Time and step.
@@ -118,7 +121,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let stable = stable_step(comm, &model, &forces.stiffness(&model));
         let clock = choose_step(plan, stable)?;
         let family_volume = forces.family_volume(&model);
-        pre_crack(plan, &model, &mut forces);
+        let cut = pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 
         let conditions = Conditions::new(plan, comm, &model)?;
@@ -129,6 +132,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         };
         let mut fields = Fields::new(&model, needs);
         apply_initials(plan, comm, &model, &mut fields)?;
+        are_finite(plan, comm, &model, 0.0)?;
         let mut simulation = Self {
             plan,
             comm,
@@ -137,6 +141,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             forces,
             conditions,
             family_volume,
+            cut,
             stable_step: stable,
             clock,
             times: Times::default(),
@@ -240,33 +245,47 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// # Errors
     /// Names the first point (earliest step, then smallest id) that was not.
     pub fn check(&self) -> Result<()> {
-        let mut earliest = [self.bad.map_or(f64::MAX, |bad| bad.step as f64)];
+        let mut earliest = self
+            .bad
+            .map_or([f64::MAX; 2], |bad| [bad.step as f64, bad.time]);
         comm::min(self.comm, &mut earliest);
-        if earliest[0] == f64::MAX {
+        let [step, time] = earliest;
+        if step == f64::MAX {
             return Ok(());
         }
-        let own = self.bad.filter(|bad| bad.step as f64 == earliest[0]);
+        let valued = are_finite(self.plan, self.comm, &self.model, time);
+        valued.map_err(|error| Error::run(error.message))?;
+        let own = self.bad.filter(|bad| bad.step as f64 == step);
         let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
         comm::min(self.comm, &mut smallest);
         let named = match own.filter(|bad| bad.id as f64 == smallest[0]) {
             None => Ok(()),
             Some(bad) => {
                 let block = usize::from(self.model.block[bad.index]);
-                let hint = match bad.step {
-                    0 => "An expression without a value there, or points moved onto one another?",
-                    _ => "A time step beyond the stable one, or a load that grows without bound?",
-                };
-                Err(Error::run(format!(
-                    "step {} (t = {:.6e} s): the motion of point {} of body `{}` is not finite; \
-                     reference position {:?} m. {hint} (time step {:.3e} s, stable {:.3e} s)",
-                    bad.step,
-                    bad.time,
-                    bad.id,
-                    self.plan.bodies[block].name,
-                    &self.model.position(bad.index)[..D],
-                    self.clock.step(),
-                    self.stable_step,
-                )))
+                let body = &self.plan.bodies[block];
+                let position = self.model.position(bad.index);
+                Err(if bad.step == 0 {
+                    let message = format!(
+                        "[body.{}]: the force on its point {}, {:?} m, is not finite at the start; \
+                         do displacements move points onto one another?",
+                        body.name,
+                        bad.id,
+                        &position[..D],
+                    );
+                    self.plan.source.error(body.span.clone(), message)
+                } else {
+                    Error::run(format!(
+                        "step {} (t = {time:.6e} s): the motion of point {} of body `{}` is not \
+                         finite; reference position {:?} m. A time step beyond the stable one, or a \
+                         load that grows without bound? (time step {:.3e} s, stable {:.3e} s)",
+                        bad.step,
+                        bad.id,
+                        body.name,
+                        &position[..D],
+                        self.clock.step(),
+                        self.stable_step,
+                    ))
+                })
             }
         };
         agree(self.comm, named)
@@ -274,7 +293,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
 }
 
 /// The clock of a run. An automatic step divides the run evenly.
-fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
+///
+/// # Errors
+/// When there is no stable step, or there are more steps than can be counted.
+pub fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
     let end = plan.time.end;
     let (step, steps) = match plan.time.step {
         StepRule::Fixed(step) => (step, steps_to(end, step)),
@@ -300,21 +322,29 @@ fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
     Ok(Clock::new(step, end))
 }
 
-/// Breaks the bonds that cross a pre-crack. Both ends ask with the lower id first.
-fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<D>) {
+/// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id
+/// first.
+fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<D>) -> Vec<u64> {
     if plan.cracks.is_empty() {
-        return;
+        return Vec::new();
     }
+    let counts = vec![Cell::new(0); plan.cracks.len()];
     forces.cut(|here, there| {
         let (first, second) = match model.ids[here] < model.ids[there] {
             true => (here, there),
             false => (there, here),
         };
         let [from, to] = [first, second].map(|point| model.position(point));
-        plan.cracks
-            .iter()
-            .any(|crack| points::crack::crosses(crack, from, to))
+        let mut cut = false;
+        for (crack, count) in plan.cracks.iter().zip(&counts) {
+            if points::crack::crosses(&crack.surface, from, to) {
+                count.set(count.get() + 1);
+                cut = true;
+            }
+        }
+        cut
     });
+    counts.into_iter().map(Cell::into_inner).collect()
 }
 
 /// Makes the bonds of no-failure zones unbreakable.

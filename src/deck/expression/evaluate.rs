@@ -273,6 +273,49 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
+/// Whether the code's value is 0 or 1 because of how it is made.
+pub(super) fn is_truth(code: &[Instruction]) -> bool {
+    let mut truths = Vec::new();
+    let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);
+    for instruction in code {
+        let truth = match instruction {
+            Instruction::Constant(value) => *value == 0.0 || *value == 1.0,
+            Instruction::Variable(_) => false,
+            Instruction::Unary(operation) => {
+                let operand = take(&mut truths);
+                match operation {
+                    Unary::Not | Unary::Step => true,
+                    Unary::Absolute | Unary::Sign | Unary::Floor | Unary::Ceiling => operand,
+                    _ => false,
+                }
+            }
+            Instruction::Binary(operation) => {
+                let operands = [take(&mut truths), take(&mut truths)];
+                match operation {
+                    Binary::Less
+                    | Binary::LessOrEqual
+                    | Binary::Greater
+                    | Binary::GreaterOrEqual
+                    | Binary::Equal
+                    | Binary::NotEqual
+                    | Binary::And
+                    | Binary::Or => true,
+                    Binary::Multiply | Binary::Minimum | Binary::Maximum => {
+                        operands == [true, true]
+                    }
+                    _ => false,
+                }
+            }
+            Instruction::Ternary(operation) => {
+                let [third, second, _] = [(); 3].map(|()| take(&mut truths));
+                *operation == Ternary::Choose && second && third
+            }
+        };
+        truths.push(truth);
+    }
+    truths == [true]
+}
+
 /// The code's value with the variables x, y, z, t, where `stack_size` is what
 /// the function of that name says.
 pub(super) fn evaluate(code: &[Instruction], stack_size: usize, variables: [f64; 4]) -> f64 {

@@ -143,7 +143,9 @@ impl<const D: usize> Forces<D> {
         let instructions = Instructions::of_all(comm)?;
         // The same on all ranks, whatever bonds they have.
         let kind = |block: &BlockLaws| std::mem::discriminant(&block.law);
-        let mixed = blocks.windows(2).any(|pair| kind(&pair[0]) != kind(&pair[1]));
+        let mixed = blocks
+            .windows(2)
+            .any(|pair| kind(&pair[0]) != kind(&pair[1]));
         let numbers = PointNumbers::new(&blocks, mixed, model);
         let with_thresholds =
             (blocks.iter()).any(|block| block.damage.is_some_and(|law| law.alpha > 0.0));
@@ -240,6 +242,13 @@ impl<const D: usize> Forces<D> {
         all.filter(|bonds| matches!(bonds, BlockBonds::Lattice(_)))
             .map(BlockBonds::bonds)
             .sum()
+    }
+
+    /// The bonds of the rank's points from each block to each, counted from their ends here, broken ones
+    /// included.
+    pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
+        let all = self.interactions.iter().map(|i| &i.bonds);
+        all.map(|bonds| (bonds.blocks(), bonds.bonds()))
     }
 
     /// Memory of the bonds and of what they read of the points, bytes.

@@ -31,10 +31,10 @@ pub fn apply_initials<const D: usize>(
         for point in points {
             let position = model.position(point as usize);
             for d in 0..D {
-                if let Some(values) = &initial.displacement {
+                if let Some((values, _)) = &initial.displacement {
                     fields.displacement[d][point as usize] = values[d].evaluate(position, 0.0);
                 }
-                if let Some(values) = &initial.velocity {
+                if let Some((values, _)) = &initial.velocity {
                     fields.velocity[d][point as usize] = values[d].evaluate(position, 0.0);
                 }
             }

@@ -1,5 +1,6 @@
 //! Loads, supports and initial values on this rank's points.
 
+mod finite;
 mod initial;
 mod loads;
 mod supports;
@@ -14,6 +15,7 @@ use crate::points::set;
 
 use super::model::Model;
 use super::motion::Fields;
+pub use finite::are_finite;
 pub use initial::apply_initials;
 use loads::Load;
 use supports::{Motion, Support};

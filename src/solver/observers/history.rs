@@ -4,12 +4,13 @@ use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{self, Communicator};
+use crate::deck::plan::{self, Reaction};
 use crate::error::Result;
-use crate::points::distance_squared;
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
 use super::front::Front;
+use super::nearest::nearest;
 use super::snapshot::Snapshot;
 use super::tip::Tip;
 
@@ -93,15 +94,17 @@ impl HistoryObserver {
         vector("cracked_lower".to_owned(), "m");
         vector("cracked_upper".to_owned(), "m");
         let mut reactions = Vec::new();
-        for set in &plan.history.reactions {
+        for Reaction { set, span } in &plan.history.reactions {
             let points = members(plan, &simulation.model, *set);
-            not_empty(plan, comm, *set, &points, ("[history] reactions", 0..0))?;
+            let place = ("[history] reactions", span.clone());
+            not_empty(plan, comm, *set, &points, place)?;
             reactions.push(points);
             vector(format!("reaction_{}", plan.sets[*set].name), "N");
         }
         let mut probes = Vec::new();
-        for (name, at) in &plan.history.probes {
-            probes.push(nearest(simulation, *at));
+        for plan::Probe { name, at, .. } in &plan.history.probes {
+            let point = nearest(simulation, *at).own;
+            probes.push(Probe { point });
             vector(format!("probe_{name}_displacement"), "m");
             vector(format!("probe_{name}_velocity"), "m/s");
         }
@@ -323,27 +326,5 @@ impl Cracked {
             return ([f64::NAN; 3], [f64::NAN; 3]);
         }
         (self.lower, self.upper)
-    }
-}
-
-/// The point nearest to a place; of several, the one with the smallest id. Collective.
-fn nearest<const D: usize>(simulation: &Simulation<'_, D>, place: [f64; 3]) -> Probe {
-    let model = &simulation.model;
-    let own = (0..model.owned())
-        .map(|point| {
-            (
-                distance_squared(place, model.position(point)),
-                model.ids[point],
-                point,
-            )
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut distance = [own.map_or(f64::MAX, |own| own.0)];
-    comm::min(simulation.comm, &mut distance);
-    let own = own.filter(|own| own.0 == distance[0]);
-    let mut id = [own.map_or(f64::MAX, |own| own.1 as f64)];
-    comm::min(simulation.comm, &mut id);
-    Probe {
-        point: own.filter(|own| own.1 as f64 == id[0]).map(|own| own.2),
     }
 }

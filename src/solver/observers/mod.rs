@@ -2,11 +2,13 @@
 
 mod front;
 pub mod history;
+pub mod nearest;
 mod reach;
 pub mod schedule;
 pub mod snapshot;
 mod tip;
 
 pub use history::{Energies, HistoryObserver, HistoryRow};
+pub use nearest::{Nearest, nearest};
 pub use schedule::Schedule;
 pub use snapshot::Snapshot;

@@ -1,0 +1,236 @@
+//! The parts of what `fissure check` prints.
+
+use std::path::Path;
+
+use fissure::deck::Plan;
+use fissure::deck::plan::{Body, PointSource};
+use fissure::dimension::Dimension;
+use fissure::solver::assign::block_laws;
+use fissure::solver::motion::Clock;
+use fissure::survey::{BodyFigures, Cost, Interior, Survey};
+
+use super::format::{bytes, count, duration, si};
+use super::report::Report;
+
+/// The deck as a whole.
+pub fn heading(report: &mut Report, plan: &Plan, deck: &Path) {
+    report.say(format_args!(
+        "{} is a valid deck: {}",
+        deck.display(),
+        plan.title
+    ));
+    report.line("dimension", plan.dimension.name());
+    report.line("horizon", si(plan.horizon, "m"));
+}
+
+/// What the deck says of a body.
+pub fn body(report: &mut Report, plan: &Plan, body: &Body) {
+    report.say(format_args!("body {}", body.name));
+    report.line("material", &body.material_name);
+    report.line("density", format_args!("{} kg/m³", body.material.density));
+    let elastic = body.material.elastic;
+    report.line("Young's modulus", si(elastic.youngs_modulus, "Pa"));
+    report.line(
+        "Poisson's ratio",
+        format_args!("{:.4}", elastic.poisson_ratio),
+    );
+    let laws = block_laws(plan, body);
+    for (name, value) in laws.law.described() {
+        report.line(name, value);
+    }
+    match laws.damage {
+        None => report.line("damage", "none"),
+        Some(damage) => {
+            report.line("critical stretch", format_args!("{:.4e}", damage.critical));
+            report.line("alpha", damage.alpha);
+        }
+    }
+    if let PointSource::Lattice { spacing, .. } = body.points {
+        let multiples = spacing[..plan.dimension.count()]
+            .iter()
+            .map(|edge| format!("{:.3}", body.horizon / edge));
+        let mut multiples: Vec<String> = multiples.collect();
+        multiples.dedup();
+        report.line(
+            "horizon",
+            format_args!(
+                "{}, {} spacings",
+                si(body.horizon, "m"),
+                multiples.join(" × ")
+            ),
+        );
+    }
+}
+
+/// What the points of a body come to.
+pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimension: usize) {
+    report.line("points", count(figures.points));
+    let of_shape = figures.shape_volume.map(|volume| {
+        let share = 100.0 * figures.volume / volume;
+        format!(", {share:.2} % of its shape's")
+    });
+    report.line(
+        "volume",
+        format_args!("{:.4e} m³{}", figures.volume, of_shape.unwrap_or_default()),
+    );
+    if matches!(body.points, PointSource::File { .. }) {
+        report.line("distance of points", si(figures.spacing, "m"));
+    }
+    report.line("mass", format_args!("{:.4e} kg", figures.mass));
+    report.line("centre", place(&figures.centre[..dimension]));
+}
+
+/// A place in metres.
+fn place(position: &[f64]) -> String {
+    let entries: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
+    format!("[{}] m", entries.join(", "))
+}
+
+/// What a point within a body has, beside what is wanted.
+pub fn interior(report: &mut Report, plan: &Plan, interior: Option<&Interior>) {
+    let Some(interior) = interior else {
+        return;
+    };
+    report.line("neighbours inside", interior.neighbours);
+    let share = |found: f64, wanted: f64| format!("{:+.1} %", 100.0 * (found / wanted - 1.0));
+    let [bulk, shear] = interior.wanted;
+    let name = match plan.dimension {
+        Dimension::Space => "bulk modulus inside",
+        _ => "expansion inside",
+    };
+    report.line(
+        name,
+        format_args!(
+            "{}, wanted {} ({})",
+            si(interior.bulk, "Pa"),
+            si(bulk, "Pa"),
+            share(interior.bulk, bulk)
+        ),
+    );
+    if let Some([axes, diagonals]) = interior.shear {
+        report.line(
+            "shear modulus inside",
+            format_args!(
+                "{} along axes, {} along diagonals, wanted {} ({}, {})",
+                si(axes, "Pa"),
+                si(diagonals, "Pa"),
+                si(shear, "Pa"),
+                share(axes, shear),
+                share(diagonals, shear)
+            ),
+        );
+    }
+}
+
+/// The bonds between bodies.
+pub fn joints(report: &mut Report, plan: &Plan, survey: &Survey) {
+    if plan.bodies.len() < 2 {
+        return;
+    }
+    report.say("bonds between bodies");
+    if survey.joints.is_empty() {
+        report.line("none", "");
+    }
+    for (pair, bonds) in &survey.joints {
+        let [a, b] = pair.map(|body| &plan.bodies[body].name);
+        report.line(&format!("{a} and {b}"), count(*bonds));
+    }
+}
+
+/// Cracks and probes.
+pub fn places(report: &mut Report, plan: &Plan, survey: &Survey, dimension: usize) {
+    if !plan.cracks.is_empty() {
+        report.say("cracks");
+    }
+    for (crack, cut) in plan.cracks.iter().zip(&survey.cuts) {
+        report.line(&crack.name, format_args!("cuts {} bonds", count(*cut)));
+    }
+    if !plan.history.probes.is_empty() {
+        report.say("probes");
+    }
+    for (probe, found) in plan.history.probes.iter().zip(&survey.probes) {
+        report.line(
+            &probe.name,
+            format_args!(
+                "point {} at {}, {} away",
+                found.id,
+                place(&found.position[..dimension]),
+                si(found.distance, "m")
+            ),
+        );
+    }
+}
+
+/// The sets.
+pub fn sets(report: &mut Report, plan: &Plan, survey: &Survey) {
+    report.say("sets");
+    for (set, size) in plan.sets.iter().zip(&survey.sets) {
+        let note = if *size == 0 { "  (empty!)" } else { "" };
+        report.line(&set.name, format_args!("{} points{note}", count(*size)));
+    }
+}
+
+/// Points and bonds.
+pub fn size(report: &mut Report, points: u64, bonds: u64) {
+    report.line("points", count(points));
+    report.line("bonds", count(bonds));
+}
+
+/// Memory and files; `ghosts` as a share of a rank's own points, if that is known.
+pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: Option<f64>) {
+    let memory = cost.memory / f64::from(ranks) * (1.0 + ghosts.unwrap_or(0.0));
+    report.line(
+        "memory of each rank",
+        format_args!("about {} on {ranks} rank(s)", bytes(memory)),
+    );
+    report.line(
+        "result",
+        format_args!(
+            "about {}, {} outputs",
+            bytes(cost.result),
+            count(cost.outputs)
+        ),
+    );
+    report.line(
+        "checkpoints",
+        format_args!("two of about {} each", bytes(cost.checkpoint)),
+    );
+}
+
+/// End and stable step.
+pub fn time(report: &mut Report, plan: &Plan, stable: f64) {
+    report.say("time");
+    report.line("end", si(plan.time.end, "s"));
+    report.line("stable step", si(stable, "s"));
+}
+
+/// Step and number of steps.
+pub fn steps(report: &mut Report, clock: &Clock) {
+    report.line("time step", si(clock.step(), "s"));
+    report.line("steps", count(clock.last()));
+}
+
+/// How long the steps take, from the wall-clock time of one on this rank.
+pub fn run_time(report: &mut Report, seconds: f64, steps: u64, ranks: u32) {
+    let threads = rayon::current_num_threads();
+    let all = seconds * steps as f64 / f64::from(ranks);
+    report.line(
+        "run time",
+        format_args!(
+            "about {} for the steps, {ranks} rank(s) × {threads} thread(s) like these",
+            duration(all)
+        ),
+    );
+}
+
+/// Ghosts of a rank as a share of its own points, if the ranks' parts were cubes.
+pub fn ghost_share(plan: &Plan, survey: &Survey, ranks: u32) -> Option<f64> {
+    if ranks == 1 {
+        return None;
+    }
+    let volume: f64 = survey.bodies.iter().map(|body| body.volume).sum();
+    let extent = volume / plan.dimension.section() / f64::from(ranks);
+    let dimension = plan.dimension.count() as i32;
+    let edge = extent.powf(1.0 / f64::from(dimension));
+    Some((1.0 + 2.0 * plan.horizon / edge).powi(dimension) - 1.0)
+}

@@ -1,0 +1,183 @@
+//! What a deck may say but most likely does not mean: names that nothing uses, and conditions that are
+//! none.
+
+use indexmap::IndexSet;
+use toml::Value;
+
+use super::expression::Expression;
+use super::grammar::{Damage, Deck};
+use super::plan::{Plan, Selector};
+use super::source::Source;
+use crate::error::{Error, Result};
+
+/// A warning for each of them.
+///
+/// # Errors
+/// When the deck cannot be written out to look for names.
+pub fn doubts(source: &Source, deck: &Deck, plan: &Plan) -> Result<Vec<String>> {
+    let mut warnings = unused_parameters(source, deck)?;
+    let mut unused = |section: &str, name: &str, place: std::ops::Range<usize>| {
+        let message = format!("[{section}.{name}]: nothing in the deck uses it");
+        warnings.push(source.warning(place, message));
+    };
+    let bodies = || deck.body.values().map(|body| body.get_ref());
+    for (name, table) in &deck.material {
+        if bodies().all(|body| body.material.get_ref() != name) {
+            unused("material", name, table.span());
+        }
+    }
+    for (name, table) in &deck.damage {
+        let uses = |damage: Option<&str>| damage == Some(name);
+        let mut used = bodies().map(|body| body.damage.as_ref().map(|text| &text.get_ref()[..]));
+        if !used.any(uses) {
+            unused("damage", name, table.span());
+        }
+    }
+    let used = used_sets(deck);
+    for (name, table) in &deck.set {
+        if !used.contains(&name[..]) {
+            unused("set", name, table.span());
+        }
+    }
+    for set in &plan.sets {
+        if let Selector::Where(condition) = &set.selector
+            && !condition.is_condition()
+        {
+            let message = format!(
+                "[set.{}] where: is a number rather than a condition, and holds wherever it is not 0; \
+                 a comparison is missing",
+                set.name
+            );
+            warnings.push(source.warning(set.span.clone(), message));
+        }
+    }
+    Ok(warnings)
+}
+
+/// The names of the sets that anything in the deck asks for.
+fn used_sets(deck: &Deck) -> IndexSet<&str> {
+    let history = deck.history.get_ref();
+    let conditions = deck.condition.values().map(|table| &table.get_ref().set);
+    let initials = deck.initial.values().map(|table| &table.get_ref().set);
+    let tips = history.tip.values().map(|table| &table.get_ref().set);
+    let zones = deck.damage.values().flat_map(|table| {
+        let Damage::CriticalStretch(law) = table.get_ref();
+        &law.get_ref().no_failure
+    });
+    conditions
+        .chain(initials)
+        .chain(tips)
+        .chain(zones)
+        .chain(&history.reactions)
+        .map(|name| &name.get_ref()[..])
+        .collect()
+}
+
+fn unused_parameters(source: &Source, deck: &Deck) -> Result<Vec<String>> {
+    let mut used = IndexSet::new();
+    let mut rest = deck.clone();
+    // The title is no expression.
+    rest.title.get_mut().clear();
+    let written = Value::try_from(&rest)
+        .map_err(|error| Error::run(format!("cannot write the deck: {error}")))?;
+    names_in(&written, &mut used);
+    let unused = deck
+        .parameters
+        .keys()
+        .filter(|name| !used.contains(name.get_ref()));
+    let warning = |name: &super::grammar::Text| {
+        let message = format!("[parameters] {}: no expression uses it", name.get_ref());
+        source.warning(name.span(), message)
+    };
+    Ok(unused.map(warning).collect())
+}
+
+/// The names in all texts of a value, as if they were expressions.
+fn names_in(value: &Value, names: &mut IndexSet<String>) {
+    match value {
+        Value::String(text) => names.extend(Expression::names(text).unwrap_or_default()),
+        Value::Array(entries) => entries.iter().for_each(|entry| names_in(entry, names)),
+        Value::Table(table) => table.values().for_each(|entry| names_in(entry, names)),
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::deck::{Deck, Source};
+
+    fn doubts(extra: &str) -> Vec<String> {
+        let text = format!(
+            "title = 'dx and height'
+dimension = 'plane-stress'
+parameters = {{ dx = 0.5, edge = '8*dx', height = 2 }}
+grid = {{ spacing = 'dx', horizon = '3*dx' }}
+material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
+body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = ['edge', 'edge'] }} }}
+{extra}
+time.end = 1
+"
+        );
+        let deck = Deck::new(Source {
+            path: "a.toml".into(),
+            text,
+        });
+        let deck = deck.unwrap_or_else(|error| panic!("{error}"));
+        let plan = deck.plan().unwrap_or_else(|error| panic!("{error}"));
+        plan.warnings
+    }
+
+    #[test]
+    fn names_that_nothing_uses() {
+        let height = "a.toml:3: [parameters] height: no expression uses it".to_owned();
+        assert_eq!(doubts(""), [height.clone()]);
+        let steel = "material.steel.pmb = { density = 2, youngs_modulus = 'height' }";
+        let expected = ["a.toml:7: [material.steel]: nothing in the deck uses it"];
+        assert_eq!(doubts(steel), expected);
+        let others = "damage.brittle.critical_stretch = { fracture_energy = 1 }
+            set.left.where = 'x < 1'
+            set.right.where = 'x > height'
+            initial.push = { set = 'right', velocity = [1, 0] }";
+        let expected = [
+            "a.toml:7: [damage.brittle]: nothing in the deck uses it",
+            "a.toml:8: [set.left]: nothing in the deck uses it",
+        ];
+        assert_eq!(doubts(others), expected);
+    }
+
+    #[test]
+    fn conditions_that_are_none() {
+        let of = |condition: &str| {
+            let text = format!(
+                "set.some.where = '{condition}'
+                history.reactions = ['some']"
+            );
+            let warnings = doubts(&text);
+            warnings
+                .iter()
+                .any(|line| line.contains("a comparison is missing"))
+        };
+        for condition in [
+            "y < 1",
+            "not (x > 1 or y > 1)",
+            "(x > 1)*(y < 2)",
+            "max(x > 1, y > 1)",
+            "if(x > 1, y > 1, 0)",
+            "step(x - 1)",
+            "1",
+            "0 || 0",
+        ] {
+            assert!(!of(condition), "{condition}");
+        }
+        for condition in [
+            "y",
+            "x - 1",
+            "(x > 1) + (y > 1)",
+            "if(x > 1, y, 0)",
+            "-(x > 1)",
+            "2",
+        ] {
+            assert!(of(condition), "{condition}");
+        }
+    }
+}

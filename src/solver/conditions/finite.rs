@@ -1,0 +1,123 @@
+//! Whether loads, supports and initial values have a value at all their points.
+
+use std::ops::Range;
+
+use crate::comm::{self, Communicator, agree};
+use crate::deck::expression::Expression;
+use crate::deck::plan::{Action, Plan};
+use crate::deck::shown;
+use crate::error::Result;
+use crate::solver::model::Model;
+
+use super::members;
+
+/// Names of the components.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// An error if a condition has no finite value at one of its points at a time (s), or at the start an
+/// initial value. Collective.
+///
+/// # Errors
+/// Names the first such entry of the deck and its point with the smallest id; the same on all ranks.
+pub fn are_finite<const D: usize>(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+    time: f64,
+) -> Result<()> {
+    let looker = Looker {
+        plan,
+        comm,
+        model,
+        time,
+    };
+    if time == 0.0 {
+        for initial in &plan.initials {
+            for (quantity, values) in [
+                ("displacement", &initial.displacement),
+                ("velocity", &initial.velocity),
+            ] {
+                if let Some((values, place)) = values {
+                    let key = format!("[initial.{}] {quantity}", initial.name);
+                    let values = values.iter().map(Some).zip([1.0; D]);
+                    looker.look(&key, place, initial.set, values)?;
+                }
+            }
+        }
+    }
+    for condition in &plan.conditions {
+        let key = format!("[condition.{}] {}", condition.name, condition.quantity);
+        let (place, set) = (&condition.place, condition.set);
+        match &condition.action {
+            Action::Displacement(values) | Action::Velocity(values) => {
+                let values = values.iter().map(Option::as_ref).zip([1.0; D]);
+                looker.look(&key, place, set, values)?;
+            }
+            Action::BodyForce(values, factors) => {
+                let values = values.iter().map(Some).zip(factors.iter().copied());
+                looker.look(&key, place, set, values)?;
+            }
+            Action::Force(values) => {
+                let values = values.iter().map(Some).zip([1.0; D]);
+                looker.look(&key, place, set, values)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Looks at the values of one entry after the other.
+struct Looker<'a, const D: usize> {
+    plan: &'a Plan,
+    comm: &'a dyn Communicator,
+    model: &'a Model<D>,
+    time: f64,
+}
+
+impl<const D: usize> Looker<'_, D> {
+    /// An error if a component, times its factor, is not finite at a point of a set.
+    fn look<'e>(
+        &self,
+        key: &str,
+        place: &Range<usize>,
+        set: usize,
+        components: impl Iterator<Item = (Option<&'e Expression>, f64)>,
+    ) -> Result<()> {
+        let changing: Vec<(usize, &Expression, f64)> = components
+            .enumerate()
+            .filter_map(|(component, (value, factor))| Some((component, value?, factor)))
+            .filter(|(_, value, factor)| {
+                let constant = value.as_constant();
+                !constant.is_some_and(|constant| (constant * factor).is_finite())
+            })
+            .collect();
+        if changing.is_empty() {
+            return Ok(());
+        }
+        let wrong = |point: u32| {
+            let position = self.model.position(point as usize);
+            changing.iter().find_map(|(component, value, factor)| {
+                let value = factor * value.evaluate(position, self.time);
+                (!value.is_finite()).then_some((*component, value))
+            })
+        };
+        let found = members(self.plan, self.model, set)
+            .into_iter()
+            .filter_map(|point| Some((self.model.ids[point as usize], point, wrong(point)?)))
+            .min_by_key(|(id, ..)| *id);
+        let mut smallest = [found.map_or(f64::MAX, |(id, ..)| id as f64)];
+        comm::min(self.comm, &mut smallest);
+        let own = found.filter(|(id, ..)| *id as f64 == smallest[0]);
+        let named = own.map_or(Ok(()), |(id, point, (component, value))| {
+            let position = self.model.position(point as usize);
+            let message = format!(
+                "{key}: component {} is {value} at t = {} s at point {id}, {:?} m",
+                AXES[component],
+                shown(self.time),
+                &position[..D]
+            );
+            Err(self.plan.source.error(place.clone(), message))
+        });
+        agree(self.comm, named)
+    }
+}

@@ -1,0 +1,127 @@
+//! Mass, volume and centre of each body, and whether its points fill it.
+
+use crate::comm::ExactSum;
+use crate::comm::sum::reduce;
+use crate::deck::plan::{Plan, PointSource};
+use crate::points::{LatticeBody, distance_squared};
+use crate::solver::Simulation;
+
+/// The share of a shape's volume by which that of its points may differ without a warning.
+const VOLUME_SLACK: f64 = 5e-3;
+
+/// The factor by which the volume of a file's points may differ from the cube of their distance.
+const VOLUME_FACTOR: f64 = 10.0;
+
+/// What the points of a body come to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyFigures {
+    /// Number of points.
+    pub points: u64,
+    /// Volume, m³.
+    pub volume: f64,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass, m.
+    pub centre: [f64; 3],
+    /// Volume (m³) of its shape less that of later bodies, if it is made from one.
+    pub shape_volume: Option<f64>,
+    /// Mean distance of points from file to their nearest neighbours, m; 0 without neighbours.
+    pub spacing: f64,
+}
+
+/// The figures of all bodies, and warnings about volumes that do not fit. Collective.
+pub fn figures<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    warnings: &mut Vec<String>,
+) -> Vec<BodyFigures> {
+    let (plan, model) = (simulation.plan, &simulation.model);
+    let nearest = nearest_neighbours(simulation);
+    let mut counts = vec![0; 2 * plan.bodies.len()];
+    // Volume, its moments by direction, and the distance to the nearest neighbour.
+    let mut sums = vec![ExactSum::ZERO; 5 * plan.bodies.len()];
+    for point in 0..model.owned() {
+        let body = usize::from(model.block[point]);
+        let (volume, position) = (model.volume[point], model.position(point));
+        let sums = &mut sums[5 * body..];
+        sums[0].add(volume);
+        (0..3).for_each(|k| sums[1 + k].add(volume * position[k]));
+        counts[2 * body] += 1;
+        if let Some(distance) = nearest.get(point).filter(|distance| distance.is_finite()) {
+            sums[4].add(*distance);
+            counts[2 * body + 1] += 1;
+        }
+    }
+    simulation.comm.sum(&mut counts);
+    let sums = reduce(simulation.comm, &mut sums);
+    let bodies = plan.bodies.iter().zip(sums.chunks_exact(5)).enumerate();
+    let figures = bodies.map(|(index, (body, sums))| BodyFigures {
+        points: counts[2 * index],
+        volume: sums[0],
+        mass: body.material.density * sums[0],
+        centre: std::array::from_fn(|k| sums[1 + k] / sums[0]),
+        shape_volume: shape_volume(plan, index),
+        spacing: sums[4] / (counts[2 * index + 1].max(1)) as f64,
+    });
+    let figures: Vec<BodyFigures> = figures.collect();
+    for (index, body) in figures.iter().enumerate() {
+        warnings.extend(volume_doubt(plan, index, body));
+    }
+    figures
+}
+
+fn shape_volume(plan: &Plan, body: usize) -> Option<f64> {
+    let lattice = LatticeBody::new(plan, body).ok()??;
+    Some(lattice.shape_volume())
+}
+
+/// The distance (m) of each owned point to the nearest one that it is bonded to; of no point where no body
+/// has its points from a file.
+fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
+    let (plan, model) = (simulation.plan, &simulation.model);
+    let from_file =
+        |body: &crate::deck::plan::Body| matches!(body.points, PointSource::File { .. });
+    if !plan.bodies.iter().any(from_file) {
+        return Vec::new();
+    }
+    let mut squares = vec![f64::INFINITY; model.owned()];
+    simulation.forces.for_each_intact(|here, there| {
+        let square = distance_squared(model.position(here), model.position(there));
+        squares[here] = squares[here].min(square);
+    });
+    squares.into_iter().map(f64::sqrt).collect()
+}
+
+/// A warning if the points of a body do not fill it, or fill more.
+fn volume_doubt(plan: &Plan, index: usize, figures: &BodyFigures) -> Option<String> {
+    let body = &plan.bodies[index];
+    let message = if let Some(volume) = figures.shape_volume {
+        let excess = figures.volume / volume - 1.0;
+        if excess.abs() < VOLUME_SLACK {
+            return None;
+        }
+        let more = if excess > 0.0 { "more" } else { "less" };
+        format!(
+            "[body.{}]: its points have {:.2} % {more} volume, and mass, than its shape, of which later \
+             bodies take their part; do the cells not fit?",
+            body.name,
+            100.0 * excess.abs()
+        )
+    } else {
+        let cell = figures.spacing.powi(plan.dimension.count() as i32) * plan.dimension.section();
+        let mean = figures.volume / figures.points as f64;
+        let ratio = mean / cell;
+        if cell == 0.0 || (VOLUME_FACTOR.recip()..=VOLUME_FACTOR).contains(&ratio) {
+            return None;
+        }
+        format!(
+            "[body.{}] points: have {mean:.3e} m³ each on average, but a cell as wide as they are apart, \
+             {:.3e} m, has {cell:.3e} m³; are the volumes in m³?",
+            body.name, figures.spacing
+        )
+    };
+    let place = match &body.points {
+        PointSource::Lattice { .. } => &body.span,
+        PointSource::File { span, .. } => span,
+    };
+    Some(plan.source.warning(place.clone(), message))
+}

@@ -1,0 +1,173 @@
+//! What a body is like far from its surface: a small block of its lattice, bonded and stretched.
+
+use crate::comm::threads;
+use crate::deck::plan::{
+    History, Interface, InterfaceRule, Plan, PointSource, Selector, Set, Shape, StepRule, Time,
+};
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
+use crate::solver::Simulation;
+use crate::solver::assign::cutoffs;
+use crate::solver::bonds::Evolution;
+use crate::solver::observers::nearest;
+
+/// Blocks with more bonds than this are not made.
+const MOST_BONDS: f64 = 2e7;
+
+/// A strain so small that what is not linear in it does not count, and rounding does not either.
+const STRAIN: f64 = 1e-6;
+
+/// A point of a body that has all of its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interior {
+    /// Number of its bonds.
+    pub neighbours: u32,
+    /// The largest step that is sure to be stable there, s.
+    pub stable_step: f64,
+    /// Stiffness against expansion by its own strain energy, Pa: the bulk modulus in 3-D, in the plane
+    /// and in 1-D the modulus of an expansion in as many directions.
+    pub bulk: f64,
+    /// Shear modulus of a shear along the axes of the grid and along its diagonals, Pa; none in 1-D.
+    pub shear: Option<[f64; 2]>,
+    /// What both should be, Pa.
+    pub wanted: [f64; 2],
+}
+
+/// A point within a body of a lattice, with no other body near; `None` for points from a file and for
+/// families too large for a block of them.
+pub fn interior(plan: &Plan, body: usize) -> Option<Interior> {
+    let block = block(plan, body)?;
+    match plan.dimension.count() {
+        1 => measure::<1>(&block),
+        2 => measure::<2>(&block),
+        _ => measure::<3>(&block),
+    }
+}
+
+/// The plan of a block that has one point with all of its neighbours.
+fn block(plan: &Plan, body: usize) -> Option<Plan> {
+    let mut alone = plan.bodies[body].clone();
+    let PointSource::Lattice { spacing, .. } = alone.points else {
+        return None;
+    };
+    alone.damage = None;
+    let mut block = Plan {
+        bodies: vec![alone],
+        interface: Interface {
+            rule: InterfaceRule::Own,
+            pairs: Vec::new(),
+        },
+        sets: vec![Set {
+            name: "all".to_owned(),
+            span: 0..0,
+            selector: Selector::All,
+        }],
+        cracks: Vec::new(),
+        initials: Vec::new(),
+        conditions: Vec::new(),
+        history: History {
+            reactions: Vec::new(),
+            probes: Vec::new(),
+            fronts: Vec::new(),
+            tips: Vec::new(),
+            ..plan.history.clone()
+        },
+        time: Time {
+            end: 1.0,
+            step: StepRule::Fixed(1.0),
+        },
+        ..plan.clone()
+    };
+    let dimension = plan.dimension.count();
+    let cutoff = cutoffs(&block)[0];
+    let (mut upper, mut bonds) = ([0.0; 3], 1.0);
+    for k in 0..dimension {
+        let cells = 2.0 * (cutoff / spacing[k]).ceil() + 1.0;
+        upper[k] = cells * spacing[k];
+        bonds *= cells * cells * f64::from(plan.quadrature.points(1)).powi(2);
+    }
+    block.bodies[0].points = PointSource::Lattice {
+        shape: Shape::Box {
+            lower: [0.0; 3],
+            upper,
+        },
+        spacing,
+        origin: [0.0; 3],
+    };
+    (bonds < MOST_BONDS).then_some(block)
+}
+
+fn measure<const D: usize>(block: &Plan) -> Option<Interior> {
+    let comm = threads::alone();
+    let mut simulation = Simulation::<D>::new(block, &comm).ok()?;
+    let PointSource::Lattice {
+        shape: Shape::Box { upper, .. },
+        ..
+    } = &block.bodies[0].points
+    else {
+        return None;
+    };
+    let middle = nearest(&simulation, upper.map(|x| 0.5 * x)).own?;
+    let stable_step = simulation.stable_step;
+    let neighbours = stored(&mut simulation, middle, [[0.0; D]; D]).1;
+    // Both signs, so that what is odd in the strain drops out.
+    let mut energy = |gradient: [[f64; D]; D]| {
+        let turned = gradient.map(|row| row.map(|entry| -entry));
+        let [a, b] = [gradient, turned].map(|gradient| stored(&mut simulation, middle, gradient).0);
+        0.5 * (a + b) / (STRAIN * STRAIN)
+    };
+    let one = |row: usize, column: usize| f64::from(u8::from(row == column));
+    let expansion = energy(std::array::from_fn(|row| {
+        std::array::from_fn(|column| one(row, column))
+    }));
+    let shear = (D > 1).then(|| {
+        let mut along = [[0.0; D]; D];
+        (along[0][1], along[1][0]) = (0.5, 0.5);
+        let mut diagonal = [[0.0; D]; D];
+        (diagonal[0][0], diagonal[1][1]) = (0.5, -0.5);
+        [along, diagonal].map(|gradient| 2.0 * energy(gradient))
+    });
+    let elastic = block.bodies[0].material.elastic;
+    Some(Interior {
+        neighbours,
+        stable_step,
+        bulk: 2.0 * expansion / (D * D) as f64,
+        shear,
+        wanted: [
+            bulk_modulus(block.dimension, elastic),
+            elastic.shear_modulus(),
+        ],
+    })
+}
+
+/// Strain energy density (J/m³) and intact bonds of a point where the displacement gradient is
+/// everywhere the same multiple of the [`STRAIN`].
+fn stored<const D: usize>(
+    simulation: &mut Simulation<'_, D>,
+    point: usize,
+    gradient: [[f64; D]; D],
+) -> (f64, u32) {
+    let model = &simulation.model;
+    for (row, field) in gradient.iter().zip(&mut simulation.fields.displacement) {
+        for (entry, values) in field.iter_mut().enumerate() {
+            let place = model.position(entry);
+            *values = STRAIN * (0..D).map(|d| row[d] * place[d]).sum::<f64>();
+        }
+    }
+    simulation.evaluate(Evolution::None);
+    let stored = simulation.forces.stored(&simulation.model);
+    (stored.energy[point], stored.neighbours[point] as u32)
+}
+
+/// Twice the classical energy density of an expansion θ in the setting's directions, by θ² (Pa).
+fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
+    let (bulk, shear) = (elastic.bulk_modulus(), elastic.shear_modulus());
+    match dimension {
+        Dimension::Line { .. } => bulk + 4.0 / 3.0 * shear,
+        Dimension::PlaneStress { .. } => {
+            elastic.youngs_modulus / (2.0 * (1.0 - elastic.poisson_ratio))
+        }
+        Dimension::PlaneStrain { .. } => bulk + shear / 3.0,
+        Dimension::Space => bulk,
+    }
+}

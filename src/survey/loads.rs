@@ -1,0 +1,245 @@
+//! Loads and supports that do not do what they seem to.
+
+use std::collections::HashSet;
+
+use crate::comm::sum::reduce;
+use crate::comm::{ExactSum, total};
+use crate::deck::expression::Expression;
+use crate::deck::plan::{Action, Condition, Plan, PointSource};
+use crate::deck::shown;
+use crate::solver::Simulation;
+use crate::solver::conditions::members;
+
+/// Names of the components.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// How many times the depth of a load the layer that it acts on may be thick or thin: a round layer of
+/// one cell is π/2 cells thick.
+const THICKER: f64 = 1.8;
+
+/// Layers with more points than this are not looked at.
+const LARGE_LAYER: u64 = 4_000_000;
+
+/// Adds a warning for each of them. Collective.
+pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) {
+    let plan = simulation.plan;
+    let points: Vec<Vec<u32>> = plan
+        .conditions
+        .iter()
+        .map(|condition| members(plan, &simulation.model, condition.set))
+        .collect();
+    twice_prescribed(simulation, &points, warnings);
+    without_effect(simulation, &points, warnings);
+    for (condition, points) in plan.conditions.iter().zip(&points) {
+        if let Some(depth) = condition.default_depth {
+            layer(simulation, condition, depth, points, warnings);
+        }
+    }
+    against_the_surface(simulation, &points, warnings);
+}
+
+fn warn(plan: &Plan, condition: &Condition, words: &str, warnings: &mut Vec<String>) {
+    let message = format!(
+        "[condition.{}] {}: {words}",
+        condition.name, condition.quantity
+    );
+    warnings.push(plan.source.warning(condition.place.clone(), message));
+}
+
+/// What a condition prescribes of the motion, by component; `None` for loads.
+fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
+    match &condition.action {
+        Action::Displacement(values) | Action::Velocity(values) => Some(values),
+        Action::BodyForce(..) | Action::Force(_) => None,
+    }
+}
+
+/// Motions of which a later one takes the place, unless it is the same.
+fn twice_prescribed<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    points: &[Vec<u32>],
+    warnings: &mut Vec<String>,
+) {
+    let conditions = &simulation.plan.conditions;
+    for (later, second) in conditions.iter().enumerate() {
+        for (earlier, first) in conditions[..later].iter().enumerate() {
+            let (Some(old), Some(new)) = (motion(first), motion(second)) else {
+                continue;
+            };
+            let differs = |d: &usize| {
+                let same = old[*d] == new[*d] && first.quantity == second.quantity;
+                old[*d].is_some() && new[*d].is_some() && !same
+            };
+            let components: Vec<&str> = (0..D).filter(differs).map(|d| AXES[d]).collect();
+            if components.is_empty() {
+                continue;
+            }
+            let taken = |point: &&u32| points[earlier].binary_search(point).is_ok();
+            let common = points[later].iter().filter(taken).count();
+            let common = total(simulation.comm, common as u64);
+            if common > 0 {
+                let words = format!(
+                    "takes the place of [condition.{}] in {} at {common} point(s)",
+                    first.name,
+                    components.join(" and ")
+                );
+                warn(simulation.plan, second, &words, warnings);
+            }
+        }
+    }
+}
+
+/// Loads that are 0, or act only where the motion is prescribed.
+fn without_effect<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    points: &[Vec<u32>],
+    warnings: &mut Vec<String>,
+) {
+    let plan = simulation.plan;
+    for (condition, own) in plan.conditions.iter().zip(points) {
+        let acts: Vec<usize> = match &condition.action {
+            Action::BodyForce(values, factors) => (0..D)
+                .filter(|d| factors[*d] != 0.0 && values[*d].as_constant() != Some(0.0))
+                .collect(),
+            Action::Force(values) => (0..D)
+                .filter(|d| values[*d].as_constant() != Some(0.0))
+                .collect(),
+            Action::Displacement(_) | Action::Velocity(_) => continue,
+        };
+        if acts.is_empty() {
+            warn(plan, condition, "is 0, so it does nothing", warnings);
+            continue;
+        }
+        let is_held = |point: &u32, d: usize| {
+            plan.conditions.iter().zip(points).any(|(other, others)| {
+                let holds = motion(other).is_some_and(|motion| motion[d].is_some());
+                holds && others.binary_search(point).is_ok()
+            })
+        };
+        let is_free = |point: &&u32| acts.iter().any(|d| !is_held(point, *d));
+        let free = own.iter().filter(is_free).count();
+        if total(simulation.comm, free as u64) == 0 {
+            let words = "acts only where supports prescribe the motion, so it moves nothing";
+            warn(plan, condition, words, warnings);
+        }
+    }
+}
+
+/// A traction or pressure that is divided by another depth than that of the layer it acts on.
+fn layer<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    condition: &Condition,
+    depth: f64,
+    points: &[u32],
+    warnings: &mut Vec<String>,
+) {
+    let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
+    if total(comm, points.len() as u64) > LARGE_LAYER {
+        return;
+    }
+    // Rank 0 looks at all points of the layer: body and cell of each.
+    let mut cells = vec![Vec::new(); comm.size()];
+    for point in points {
+        let block = usize::from(model.block[*point as usize]);
+        let edges = edges(plan, block, depth);
+        let position = model.position(*point as usize);
+        let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edges[k]).floor() as i64);
+        cells[0].extend_from_slice(bytemuck::cast_slice(&[
+            block as i64,
+            cell[0],
+            cell[1],
+            cell[2],
+        ]));
+    }
+    let received = comm.all_to_all(cells).concat();
+    let cells: HashSet<[i64; 4]> = bytemuck::pod_collect_to_vec::<u8, i64>(&received)
+        .chunks_exact(4)
+        .map(|cell| [cell[0], cell[1], cell[2], cell[3]])
+        .collect();
+    let thickness = thickness::<D>(plan, &cells, depth);
+    let mut known = thickness.map_or(Vec::new(), |thickness| thickness.to_le_bytes().to_vec());
+    comm.broadcast(0, &mut known);
+    let Ok(bytes) = <[u8; 8]>::try_from(&known[..]) else {
+        return;
+    };
+    let thickness = f64::from_le_bytes(bytes);
+    if !(THICKER.recip()..THICKER).contains(&(thickness / depth)) {
+        let words = format!(
+            "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give \
+             the layer's `depth`",
+            shown(depth)
+        );
+        warn(plan, condition, &words, warnings);
+    }
+}
+
+/// The edges (m) of the cells of a body; of one from a file the given length.
+fn edges(plan: &Plan, body: usize, otherwise: f64) -> [f64; 3] {
+    match &plan.bodies[body].points {
+        PointSource::Lattice { spacing, .. } => *spacing,
+        PointSource::File { .. } => [otherwise; 3],
+    }
+}
+
+/// The mean length (m) of the rows of adjacent cells in the direction in which they are shortest, of the
+/// body for which it differs most from `depth` (m); `None` without cells.
+fn thickness<const D: usize>(plan: &Plan, cells: &HashSet<[i64; 4]>, depth: f64) -> Option<f64> {
+    let of_body = |body: usize| {
+        let own = || cells.iter().filter(move |cell| cell[0] == body as i64);
+        let row_length = |k: usize| {
+            let begins = |cell: &&[i64; 4]| {
+                let mut before = **cell;
+                before[1 + k] -= 1;
+                !cells.contains(&before)
+            };
+            let rows = own().filter(begins).count();
+            own().count() as f64 / rows as f64 * edges(plan, body, depth)[k]
+        };
+        let shortest = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
+        (own().next().is_some()).then_some(shortest)
+    };
+    let difference = |thickness: &f64| (thickness / depth).ln().abs();
+    (0..plan.bodies.len())
+        .filter_map(of_body)
+        .max_by(|a, b| difference(a).total_cmp(&difference(b)))
+}
+
+/// Pressures whose normal points into the body.
+fn against_the_surface<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    points: &[Vec<u32>],
+    warnings: &mut Vec<String>,
+) {
+    let (plan, model) = (simulation.plan, &simulation.model);
+    let is_pressure = |condition: &Condition| condition.quantity == "pressure";
+    if !plan.conditions.iter().any(is_pressure) {
+        return;
+    }
+    // Where the neighbours of each point lie: a sum of unit vectors.
+    let mut towards = vec![[0.0; 3]; model.owned()];
+    simulation.forces.for_each_intact(|here, there| {
+        let (a, b) = (model.position(here), model.position(there));
+        let along: [f64; 3] = std::array::from_fn(|k| b[k] - a[k]);
+        let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (0..3).for_each(|k| towards[here][k] += along[k] / length);
+    });
+    for (condition, points) in plan.conditions.iter().zip(points) {
+        let Action::BodyForce(_, factors) = &condition.action else {
+            continue;
+        };
+        if !is_pressure(condition) {
+            continue;
+        }
+        // The factors are the normal, turned round and divided by the depth.
+        let mut sum = [ExactSum::ZERO];
+        for point in points {
+            let towards = towards[*point as usize];
+            sum[0].add((0..D).map(|d| -factors[d] * towards[d]).sum());
+        }
+        if reduce(simulation.comm, &mut sum)[0] > 0.0 {
+            let words =
+                "its `normal` points into the body, so that it pulls; the outward one is meant";
+            warn(plan, condition, words, warnings);
+        }
+    }
+}

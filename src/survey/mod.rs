@@ -1,0 +1,205 @@
+//! What stands ready before the first step of a run: figures of its bodies, cracks, probes and sets, and
+//! warnings about what a deck may say but most likely does not mean. `check` and the start of a run say
+//! the same.
+
+mod bodies;
+mod cost;
+mod interior;
+mod loads;
+mod size;
+
+pub use bodies::BodyFigures;
+pub use cost::Cost;
+pub use interior::{Interior, interior};
+pub use size::{Size, size};
+
+use crate::comm::total;
+use crate::deck::plan::{Plan, PointSource, Selector};
+use crate::deck::shown;
+use crate::solver::Simulation;
+use crate::solver::assign::block_laws;
+use crate::solver::conditions::members;
+use crate::solver::observers::{Nearest, nearest};
+
+/// Fewest bonds of a point, by dimension, below which it is poorly held: half of a family at a horizon
+/// of two spacings.
+const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
+
+/// Horizons in spacings that are in common use.
+const USUAL_HORIZONS: std::ops::RangeInclusive<f64> = 1.999..=8.001;
+
+/// Runs of more steps than this take weeks, however small they are.
+const MANY_STEPS: u64 = 1_000_000_000;
+
+/// The largest stretch at which bonds of a solid are expected to break.
+const LARGEST_STRETCH: f64 = 1.0;
+
+/// The figures and warnings of a run; the same on all ranks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// Of each body.
+    pub bodies: Vec<BodyFigures>,
+    /// Bonds between each two bodies that have any, by the lower index first.
+    pub joints: Vec<([usize; 2], u64)>,
+    /// Bonds that each pre-crack cuts.
+    pub cuts: Vec<u64>,
+    /// The point that each probe follows.
+    pub probes: Vec<Nearest>,
+    /// Number of points of each set.
+    pub sets: Vec<u64>,
+    /// What is allowed but most likely not meant, most of it with file and line.
+    pub warnings: Vec<String>,
+}
+
+impl Survey {
+    /// Looks at a run before its first step. Collective.
+    pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
+        let (plan, comm) = (simulation.plan, simulation.comm);
+        let mut warnings = plan.warnings.clone();
+        let bodies = bodies::figures(simulation, &mut warnings);
+        horizons(plan, &bodies, &mut warnings);
+        stretches(plan, &mut warnings);
+        let joints = joints(simulation);
+        let mut cuts = simulation.cut.clone();
+        comm.sum(&mut cuts);
+        cuts.iter_mut().for_each(|ends| *ends /= 2);
+        for (crack, _) in plan.cracks.iter().zip(&cuts).filter(|(_, cut)| **cut == 0) {
+            let message = format!("[crack.{}]: cuts no bond", crack.name);
+            warnings.push(plan.source.warning(crack.span.clone(), message));
+        }
+        let sets = sets(simulation, &mut warnings);
+        let probes = probes(simulation, &mut warnings);
+        loads::doubts(simulation, &mut warnings);
+        few_neighbours(simulation, &mut warnings);
+        time(simulation, &mut warnings);
+        Self {
+            bodies,
+            joints,
+            cuts,
+            probes,
+            sets,
+            warnings,
+        }
+    }
+}
+
+/// Bonds between each two bodies, of all ranks; those within a body are left out.
+fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
+    let count = simulation.plan.bodies.len();
+    let mut bonds = vec![0; count * count];
+    for ([here, there], own) in simulation.forces.bonds_of_blocks() {
+        bonds[here * count + there] += own;
+    }
+    simulation.comm.sum(&mut bonds);
+    let pairs = (0..count).flat_map(|here| (here + 1..count).map(move |there| [here, there]));
+    pairs
+        .map(|[here, there]| ([here, there], bonds[here * count + there]))
+        .filter(|(_, bonds)| *bonds > 0)
+        .collect()
+}
+
+fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
+    for (body, figures) in plan.bodies.iter().zip(bodies) {
+        let spacing = match &body.points {
+            PointSource::Lattice { spacing, .. } => spacing[..plan.dimension.count()]
+                .iter()
+                .copied()
+                .fold(0.0, f64::max),
+            PointSource::File { .. } => figures.spacing,
+        };
+        let horizon = body.horizon / spacing;
+        if spacing > 0.0 && !USUAL_HORIZONS.contains(&horizon) {
+            let message = format!(
+                "[body.{}]: its horizon, {} m, is {} spacings; 3 to 6 are usual",
+                body.name,
+                shown(body.horizon),
+                shown((100.0 * horizon).round() / 100.0)
+            );
+            warnings.push(plan.source.warning(body.horizon_place.clone(), message));
+        }
+    }
+}
+
+fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
+    for body in &plan.bodies {
+        let critical = block_laws(plan, body).damage.map(|damage| damage.critical);
+        if let Some(critical) = critical.filter(|critical| *critical >= LARGEST_STRETCH) {
+            let message = format!(
+                "[body.{}] damage: its bonds break at a stretch of {critical:.3}, at {:.3} times their \
+                 length",
+                body.name,
+                1.0 + critical
+            );
+            warnings.push(plan.source.warning(body.span.clone(), message));
+        }
+    }
+}
+
+/// Number of points of each set.
+fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) -> Vec<u64> {
+    let (plan, comm) = (simulation.plan, simulation.comm);
+    let count = |set| members(plan, &simulation.model, set).len() as u64;
+    let mut sizes: Vec<u64> = (0..plan.sets.len()).map(count).collect();
+    comm.sum(&mut sizes);
+    for (set, size) in plan.sets.iter().zip(&sizes) {
+        let by_place = matches!(set.selector, Selector::Where(_) | Selector::Within(_));
+        if by_place && *size < D as u64 && simulation.model.total > 2 * D as u64 {
+            let message = format!("[set.{}]: has {size} point(s) only", set.name);
+            warnings.push(plan.source.warning(set.span.clone(), message));
+        }
+    }
+    sizes
+}
+
+fn probes<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    warnings: &mut Vec<String>,
+) -> Vec<Nearest> {
+    let plan = simulation.plan;
+    let follow = |probe: &crate::deck::plan::Probe| {
+        let found = nearest(simulation, probe.at);
+        if found.distance > 0.5 * plan.horizon {
+            let message = format!(
+                "[history.probe.{}] at: the nearest point is {:.3e} m away, at {:?} m",
+                probe.name,
+                found.distance,
+                &found.position[..D]
+            );
+            warnings.push(plan.source.warning(probe.span.clone(), message));
+        }
+        found
+    };
+    plan.history.probes.iter().map(follow).collect()
+}
+
+fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<String>) {
+    let few = FEW_NEIGHBOURS[D - 1];
+    let stored = simulation.forces.stored(&simulation.model);
+    let poor = stored.neighbours.iter().filter(|count| **count < few);
+    let poor = total(simulation.comm, poor.count() as u64);
+    if poor > 0 {
+        warnings.push(format!(
+            "{poor} point(s) have fewer than {few} intact bonds"
+        ));
+    }
+}
+
+fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) {
+    let plan = simulation.plan;
+    let mut warn = |message: String| {
+        warnings.push(plan.source.warning(plan.places.step.clone(), message));
+    };
+    let clock = simulation.clock;
+    let (step, stable) = (clock.step(), simulation.stable_step);
+    if step > stable {
+        warn(format!(
+            "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s"
+        ));
+    }
+    if clock.last() > MANY_STEPS {
+        warn(format!(
+            "[time] end: the run takes {:.1e} steps of {step:.4e} s",
+            clock.last() as f64
+        ));
+    }
+}

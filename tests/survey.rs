@@ -1,0 +1,401 @@
+//! What `check` and the start of a run say of a deck: figures of its bodies, and warnings about what it
+//! allows but most likely does not mean.
+
+use crate::support::{plan, simulate, simulate_on};
+use fissure::deck::plan::VolumeCorrection;
+use fissure::families::CellShare;
+use fissure::survey::{Survey, interior, size};
+
+/// A plate of 12 × 8 cells and what else is to be there.
+fn plate(extra: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        thickness = 0.5
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [12, 8] }} }}
+        {extra}
+        time.end = 1
+        "
+    )
+}
+
+/// The warnings of a deck in the plane, without file and line; the same on any number of ranks.
+fn warnings(text: &str) -> Vec<String> {
+    let alone = simulate::<2, _>(text, |mut simulation| Survey::new(&mut simulation).warnings);
+    for ranks in [2, 3] {
+        for warnings in simulate_on::<2, _>(ranks, text, |mut simulation| {
+            Survey::new(&mut simulation).warnings
+        }) {
+            assert_eq!(warnings, alone, "{ranks} ranks");
+        }
+    }
+    let bare = |line: String| match line.strip_prefix("test.toml:") {
+        Some(rest) => rest.split_once(": ").unwrap().1.to_owned(),
+        None => line,
+    };
+    alone.into_iter().map(bare).collect()
+}
+
+#[track_caller]
+fn warns(extra: &str, expected: &[&str]) {
+    assert_eq!(warnings(&plate(extra)), expected);
+}
+
+#[test]
+fn nothing_is_wrong_with_a_plain_deck() {
+    warns("", &[]);
+    warns(
+        "crack.notch.segment = { from = [0, 4], to = [6, 4] }
+        set.left.where = 'x < 1'
+        set.right.where = 'x > 11'
+        condition.hold = { set = 'left', displacement = [0, 'free'] }
+        condition.pull = { set = 'right', traction = ['t', 0] }
+        history.probe.tip.at = [6, 4]",
+        &[],
+    );
+}
+
+#[test]
+fn figures_of_bodies_cracks_and_probes() {
+    let text = plate(
+        "body.block = { material = 'glass', shape.box = { lower = [12, 0], upper = [14, 4] } }
+        crack.notch.segment = { from = [-1, 4], to = [1, 4] }
+        crack.other.segment = { from = [-1, 4], to = [2, 4] }
+        set.left.where = 'x < 3'
+        history.probe.near.at = [0.6, 0.4]
+        history.reactions = ['left']",
+    );
+    let survey =
+        |ranks| simulate_on::<2, _>(ranks, &text, |mut simulation| Survey::new(&mut simulation));
+    let found = &survey(1)[0];
+    let [plate, block] = [found.bodies[0], found.bodies[1]];
+    assert_eq!((plate.points, block.points), (96, 8));
+    assert_eq!((plate.volume, plate.mass), (48.0, 96.0));
+    assert_eq!(plate.centre, [6.0, 4.0, 0.0]);
+    assert_eq!(block.centre, [13.0, 2.0, 0.0]);
+    assert!((plate.shape_volume.unwrap() / 48.0 - 1.0).abs() < 1e-3);
+    // Between the columns x = 11.5 and 12.5 and farther ones, counted by hand for each row.
+    let mut joint = 0;
+    let mut cut = [0; 2];
+    let all: Vec<[i32; 2]> = (0..8)
+        .flat_map(|y| (0..14).map(move |x| [x, y]))
+        .filter(|[x, y]| *x < 12 || *y < 4)
+        .collect();
+    for (k, a) in all.iter().enumerate() {
+        for b in &all[k + 1..] {
+            let offset = [b[0] - a[0], b[1] - a[1]];
+            if offset[0].pow(2) + offset[1].pow(2) > 9 {
+                continue;
+            }
+            joint += u64::from((a[0] < 12) != (b[0] < 12));
+            // Where the bond crosses y = 4, from the half-integer centres.
+            let [ya, yb] = [a[1], b[1]].map(|y| f64::from(y) + 0.5 - 4.0);
+            if ya * yb < 0.0 {
+                let x = f64::from(a[0]) + 0.5 + f64::from(offset[0]) * ya / (ya - yb);
+                cut[0] += u64::from(x <= 1.0 + 1e-9);
+                cut[1] += u64::from(x <= 2.0 + 1e-9);
+            }
+        }
+    }
+    assert_eq!(found.joints, [([0, 1], joint)]);
+    assert_eq!(found.cuts, cut);
+    assert_eq!(found.probes[0].id, 0);
+    assert!((found.probes[0].distance - 0.02_f64.sqrt()).abs() < 1e-15);
+    assert_eq!(found.sets, [104, 96, 8, 24]);
+    for ranks in [2, 3] {
+        for other in survey(ranks) {
+            assert_eq!(other.bodies, found.bodies);
+            assert_eq!(other.joints, found.joints);
+            assert_eq!((&other.cuts, &other.sets), (&found.cuts, &found.sets));
+            assert_eq!(other.probes[0].id, found.probes[0].id);
+        }
+    }
+}
+
+#[test]
+fn motions_of_which_one_takes_the_place_of_the_other() {
+    let sets = "set.left.where = 'x < 1'\nset.low.where = 'y < 1'\n";
+    let both = |first: &str, second: &str| {
+        format!(
+            "{sets}condition.first = {{ set = 'left', {first} }}
+            condition.second = {{ set = 'low', {second} }}"
+        )
+    };
+    warns(
+        &both("displacement = [0, 0]", "velocity = ['free', 1]"),
+        &["[condition.second] velocity: takes the place of [condition.first] in y at 1 point(s)"],
+    );
+    warns(
+        &both("displacement = [0, 0]", "displacement = ['free', 0]"),
+        &[],
+    );
+    warns(
+        &both("displacement = [0, 'free']", "displacement = ['free', 1]"),
+        &[],
+    );
+}
+
+#[test]
+fn loads_on_a_layer_of_another_depth() {
+    let pulled = |set: &str, depth: &str| {
+        format!(
+            "set.end.where = '{set}'
+            condition.pull = {{ set = 'end', traction = [1, 0]{depth} }}"
+        )
+    };
+    warns(&pulled("x > 11", ""), &[]);
+    warns(&pulled("x > 11 && abs(y - 4) < 2", ""), &[]);
+    warns(
+        &pulled("hypot(x - 6, y - 4) > 3 && hypot(x - 6, y - 4) < 4", ""),
+        &[],
+    );
+    warns(
+        &pulled("x > 9", ""),
+        &[
+            "[condition.pull] traction: acts on a layer about 3.00e0 m thick but is divided by the \
+             spacing, 1 m; give the layer's `depth`",
+        ],
+    );
+    warns(&pulled("x > 9", ", depth = 3"), &[]);
+}
+
+#[test]
+fn loads_without_effect_and_against_the_surface() {
+    let sets = "set.end.where = 'x > 11'\n";
+    let load = |load: &str| format!("{sets}condition.load = {{ set = 'end', {load} }}");
+    let nothing = "is 0, so it does nothing";
+    warns(
+        &load("force = [0, '0*2']"),
+        &[&format!("[condition.load] force: {nothing}")],
+    );
+    let held = "\ncondition.hold = { set = 'end', displacement = [0, 'free'] }";
+    warns(
+        &(load("body_force = [1, 0]") + held),
+        &[
+            "[condition.load] body_force: acts only where supports prescribe the motion, so it moves \
+             nothing",
+        ],
+    );
+    warns(&(load("body_force = [1, 't']") + held), &[]);
+    warns(&load("pressure = 1, normal = [1, 0]"), &[]);
+    warns(
+        &load("pressure = 1, normal = [-1, 0]"),
+        &[
+            "[condition.load] pressure: its `normal` points into the body, so that it pulls; the \
+             outward one is meant",
+        ],
+    );
+}
+
+#[test]
+fn cracks_and_probes_far_from_the_points() {
+    warns(
+        "crack.notch.segment = { from = [20, 4], to = [26, 4] }",
+        &["[crack.notch]: cuts no bond"],
+    );
+    warns(
+        "history.probe.tip.at = [12, 14]",
+        &["[history.probe.tip] at: the nearest point is 6.519e0 m away, at [11.5, 7.5] m"],
+    );
+}
+
+#[test]
+fn sets_that_hold_next_to_nothing() {
+    warns(
+        "set.corner.where = 'x < 1 && y < 1'
+        initial.push = { set = 'corner', velocity = [1, 0] }",
+        &["[set.corner]: has 1 point(s) only"],
+    );
+    warns(
+        "set.corner.ids = [0]
+        initial.push = { set = 'corner', velocity = [1, 0] }",
+        &[],
+    );
+}
+
+#[test]
+fn numbers_that_no_solid_has() {
+    let brittle = |stretch: f64| {
+        plate("").replace(
+            "material = 'glass',",
+            "material = 'glass', damage = 'brittle',",
+        ) + &format!("damage.brittle.critical_stretch.critical_stretch = {stretch}\n")
+    };
+    let expected = "[body.plate] damage: its bonds break at a stretch of 2.500, at 3.500 times their \
+                    length";
+    assert_eq!(warnings(&brittle(2.5)), [expected]);
+    assert!(warnings(&brittle(0.5)).is_empty());
+    let wide = plate("").replace("horizon = 3", "horizon = 9");
+    let expected = "[body.plate]: its horizon, 9 m, is 9 spacings; 3 to 6 are usual";
+    assert_eq!(warnings(&wide), [expected]);
+    let long = plate("").replace("time.end = 1", "time.end = 4e12");
+    let found = warnings(&long);
+    assert_eq!(found.len(), 1);
+    assert!(
+        found[0].starts_with("[time] end: the run takes "),
+        "{found:?}"
+    );
+    let fast = plate("").replace("time.end = 1", "time = { end = 10, step = 5 }");
+    let found = warnings(&fast);
+    assert!(found[0].starts_with("[time] step: 5.0000e0 s is larger than the stable one"));
+}
+
+#[test]
+fn volume_that_is_lost() {
+    let cut = plate("").replace("upper = [12, 8]", "upper = [12.4, 8]");
+    let found = warnings(&cut);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].starts_with("[body.plate]: its points have 3.2"),
+        "{found:?}"
+    );
+    assert!(
+        found[0].contains("% less volume, and mass, than its shape"),
+        "{found:?}"
+    );
+    // A finer body takes 2.25 rows and columns of the other.
+    let overlap = plate(
+        "body.fine = { material = 'glass', spacing = 0.75, shape.box = { lower = [0, 0], upper = [2.25, 2.25] } }",
+    );
+    let found = warnings(&overlap);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].starts_with("[body.plate]: its points have 1.1"),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn areas_for_volumes() {
+    let folder = crate::support::command::Folder::new("areas");
+    let rows = |volume: f64| {
+        let row = |k: i32| format!("{} {} {volume} 1\n", k % 10, k / 10);
+        (0..100).map(row).collect::<String>()
+    };
+    let of = |volume: f64| {
+        let file = folder.write("points.txt", &rows(volume));
+        warnings(&format!(
+            "dimension = 'plane-stress'
+            thickness = 1e-3
+            grid.horizon = 3
+            material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.plate = {{ material = 'glass', points.file = '{}' }}
+            time.end = 1e-2
+            ",
+            file.display()
+        ))
+    };
+    assert!(of(1e-3).is_empty(), "{:?}", of(1e-3));
+    let found = of(1.0);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].contains("are the volumes in m³?"), "{found:?}");
+}
+
+#[test]
+fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
+    let body = |dimension: &str, law: &str, corners: &str, grid: &str| {
+        plan(&format!(
+            "dimension = '{dimension}'
+            grid = {{ spacing = 0.1, horizon = 0.3{grid} }}
+            material.solid.{law} = {{ density = 2, youngs_modulus = 5 {} }}
+            body.block = {{ material = 'solid', shape.box = {{ {corners} }} }}
+            time.end = 1
+            ",
+            if law == "ordinary" {
+                ", poisson_ratio = 0.3"
+            } else {
+                ""
+            }
+        ))
+    };
+    let space = "lower = [0, 0, 0], upper = [1, 1, 1]";
+    // Σ |ξ| V over the 122 neighbours, against the integral over the ball, π δ⁴.
+    let mut sum = 0.0;
+    for x in -3..=3_i32 {
+        for y in -3..=3_i32 {
+            for z in -3..=3_i32 {
+                let square = f64::from(x * x + y * y + z * z);
+                if square <= 9.0 {
+                    sum += square.sqrt();
+                }
+            }
+        }
+    }
+    let expected = sum / (std::f64::consts::PI * 81.0);
+    let found = interior(&body("3d", "pmb", space, ""), 0).unwrap();
+    assert_eq!(found.neighbours, 122);
+    assert!((found.wanted[0] / (10.0 / 3.0) - 1.0).abs() < 1e-12);
+    assert!((found.bulk / found.wanted[0] / expected - 1.0).abs() < 1e-6);
+    // The ordinary law has the exact bulk modulus, and shear moduli 11 % above and 16.5 % below.
+    let found = interior(&body("3d", "ordinary", space, ""), 0).unwrap();
+    assert!((found.bulk / found.wanted[0] - 1.0).abs() < 1e-6);
+    let shear = found
+        .shear
+        .unwrap()
+        .map(|modulus| modulus / found.wanted[1] - 1.0);
+    assert!((shear[0] - 0.11).abs() < 5e-3, "{shear:?}");
+    assert!((shear[1] + 0.165).abs() < 5e-3, "{shear:?}");
+    for (dimension, corners) in [
+        ("1d", "lower = [0], upper = [1]"),
+        ("plane-stress", "lower = [0, 0], upper = [1, 1]"),
+        ("plane-strain", "lower = [0, 0], upper = [1, 1]"),
+        ("3d", space),
+    ] {
+        let exact = body(dimension, "pmb", corners, ", volume_correction = 'exact'");
+        let found = interior(&exact, 0).unwrap();
+        // Σ |ξ| Ṽ against the integral.
+        let count = exact.dimension.count();
+        let share = CellShare::new(VolumeCorrection::Exact, 3.0, 1.0, count);
+        let range = |k: usize| if k < count { -5..=5 } else { 0..=0 };
+        let mut sum = 0.0;
+        for [x, y, z] in range(0)
+            .flat_map(|x| range(1).flat_map(move |y| range(2).map(move |z| [x, y, z])))
+            .map(|cell: [i32; 3]| cell.map(f64::from))
+        {
+            sum += (x * x + y * y + z * z).sqrt() * share.at([x, y, z]);
+        }
+        let pi = std::f64::consts::PI;
+        let whole = [9.0, 18.0 * pi, 81.0 * pi][count - 1];
+        let bulk = found.bulk / found.wanted[0];
+        assert!(
+            (bulk / (sum / whole) - 1.0).abs() < 1e-6,
+            "{dimension}: {bulk}"
+        );
+        assert!((bulk - 1.0).abs() < 0.015, "{dimension}: {bulk}");
+    }
+}
+
+#[test]
+fn the_size_of_a_run_without_making_it() {
+    let decks = [
+        plate("body.fine = { material = 'glass', spacing = 0.5, shape.disc = { centre = [16, 4], radius = 4 } }"),
+        plate("").replace("shape.box = { lower = [0, 0], upper = [12, 8] }", "shape.union = [ { box = { lower = [0, 0], upper = [40, 40] } }, { box = { lower = [1e5, 0], upper = [100040, 40] } } ]"),
+    ];
+    for text in &decks {
+        let estimate = size(&plan(text)).unwrap();
+        simulate::<2, _>(text, |simulation| {
+            let points = simulation.model.total as f64;
+            let bonds = simulation.forces.directed_bonds() as f64;
+            assert!(
+                (estimate.all_points() / points - 1.0).abs() < 0.01,
+                "{estimate:?} {points}"
+            );
+            assert!(
+                (estimate.directed_bonds / bonds - 1.0).abs() < 0.1,
+                "{estimate:?} {bonds}"
+            );
+        });
+    }
+    let large = "dimension = '3d'
+        grid = { spacing = 5e-4, horizon = 1.5e-3 }
+        material.glass.pmb = { density = 2, youngs_modulus = 5 }
+        body.cube = { material = 'glass', shape.box = { lower = [0, 0, 0], upper = [1, 1, 1] } }
+        time.end = 1";
+    let found = size(&plan(large)).unwrap();
+    assert_eq!(found.all_points(), 8e9);
+    assert!(
+        (found.directed_bonds / (122.0 * 8e9) - 1.0).abs() < 0.01,
+        "{found:?}"
+    );
+}
