@@ -11,7 +11,7 @@ use fissure::deck;
 use fissure::error::Result;
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Signals, View};
 
-use super::format::si;
+use super::format::{count, si};
 use super::progress::Progress;
 use super::{RunArguments, Verbosity, launch, summary};
 
@@ -72,11 +72,13 @@ fn run_deck(
     let mut log = Log {
         rank: world.rank(),
         speaks,
+        verbose: verbosity == Verbosity::Verbose,
         title: format!(
             "{}\n{} ranks × {threads} threads on {hosts} host(s)",
             plan.title,
             world.size()
         ),
+        started,
         progress: Progress::Silent,
     };
     let outcome = fissure::run(&plan, world, options, &mut log)?;
@@ -94,7 +96,10 @@ struct Log {
     rank: usize,
     /// Whether this rank prints more than errors and warnings.
     speaks: bool,
+    /// Whether that is a lot.
+    verbose: bool,
     title: String,
+    started: Instant,
     progress: Progress,
 }
 
@@ -121,12 +126,26 @@ impl Observer for Log {
                 let path = path.display();
                 say!("other outputs are asked for, or the result is gone: it is kept as {path}");
             }
-            Message::Warning(text) if self.rank == 0 => tell!("warning: {text}"),
+            Message::Decided(decided) if self.speaks && self.verbose => {
+                say!("decided");
+                for (name, what) in decided {
+                    say!("  {name:<17}{what}");
+                }
+            }
+            Message::Warning(text) if self.rank == 0 => {
+                self.progress.aside(|| tell!("warning: {text}"));
+            }
             _ => {}
         }
     }
 
     fn begin(&mut self, now: &dyn View) {
+        let left = now.last() - now.number();
+        if self.speaks && left > 0 {
+            let step = si(now.step(), "s");
+            let set_up = si(self.started.elapsed().as_secs_f64(), "s");
+            say!("{} steps of {step} to go, after {set_up}", count(left));
+        }
         self.progress = Progress::new(self.speaks, now.number(), now.last());
     }
 

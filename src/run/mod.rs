@@ -20,6 +20,7 @@
 //! its plan.
 
 mod checkpoints;
+mod decisions;
 mod files;
 mod observer;
 mod options;
@@ -48,6 +49,7 @@ use crate::solver::Simulation;
 use crate::solver::observers::HistoryRow;
 
 use checkpoints::CheckpointWriter;
+use decisions::decisions;
 use recorder::{Recorder, Start, can_continue};
 use restart::{Restart, restart};
 use watch::Watch;
@@ -156,6 +158,8 @@ impl<'a> Job<'a> {
                            so results differ in the last digits from those of other machines";
             self.observer.message(&Message::Warning(message.to_owned()));
         }
+        let decided = decisions(&simulation);
+        self.observer.message(&Message::Decided(decided));
         self.look_before_the_first_step()?;
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(&mut simulation)?,

@@ -29,7 +29,7 @@ pub struct Unobserved;
 
 impl Observer for Unobserved {}
 
-/// What a run tells before its first step.
+/// What a run tells, most of it before its first step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
     /// The folder is taken, and points and bonds are about to be made.
@@ -41,6 +41,8 @@ pub enum Message {
         /// The largest step that is known to be stable, s.
         stable_step: f64,
     },
+    /// What the run has decided by itself, such as the partition: names and what was decided.
+    Decided(Vec<(&'static str, String)>),
     /// The run goes on from a checkpoint.
     Continued {
         /// Number of the step that it was written after.
