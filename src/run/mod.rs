@@ -46,7 +46,7 @@ use crate::deck::Plan;
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
-use crate::solver::observers::HistoryRow;
+use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
@@ -226,6 +226,7 @@ impl<'a> Job<'a> {
             limit,
             simulation.clock.number(),
         );
+        let mut contact = Some(ContactWatch::new(simulation));
         while !simulation.clock.is_over() {
             simulation.advance();
             let clock = simulation.clock;
@@ -236,6 +237,12 @@ impl<'a> Job<'a> {
                     // The reader of the result should see where it went wrong.
                     recorder.write(simulation, true, true)?;
                     return Ok(Left::Failed(error));
+                }
+                if recorder.is_due(&clock)
+                    && let Some(found) = contact.as_ref().and_then(|watch| watch.look(simulation))
+                {
+                    self.warn_of_contact(&found, clock.time());
+                    contact = None;
                 }
                 recorder.record(simulation, self.observer)?;
                 let decision = watch.look(self.comm, &clock);
@@ -250,6 +257,19 @@ impl<'a> Job<'a> {
             }
         }
         Ok(Left::Complete)
+    }
+
+    /// Says that bodies go through one another.
+    fn warn_of_contact(&mut self, contact: &Contact, time: f64) {
+        let [a, b] = contact.bodies.map(|body| &self.plan.bodies[body].name);
+        let place = &contact.place[..self.plan.dimension.count()];
+        let place: Vec<String> = place.iter().map(|x| format!("{x:.4e}")).collect();
+        let text = format!(
+            "at t = {time:.4e} s points of `{a}` and `{b}` have come nearer than their spacing, at ({}) m; \
+             there is no contact between bodies: where no bond joins them they go through one another",
+            place.join(", ")
+        );
+        self.observer.message(&Message::Warning(text));
     }
 
     fn begin_run<const D: usize>(

@@ -242,6 +242,13 @@ impl<const D: usize> Forces<D> {
             .sum()
     }
 
+    /// The bonds of the rank's points from each block to each, counted from their ends here, broken ones
+    /// included.
+    pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
+        let all = self.interactions.iter().map(|i| &i.bonds);
+        all.map(|bonds| (bonds.blocks(), bonds.bonds()))
+    }
+
     /// Memory of the bonds and of what they read of the points, bytes.
     pub fn bytes(&self) -> usize {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
