@@ -87,6 +87,35 @@ fn the_version_says_what_the_program_is_made_of() {
 }
 
 #[test]
+fn a_verbose_run_says_what_it_has_decided() {
+    let folder = Folder::new("verbose");
+    let deck = folder.join("plate.toml");
+    succeed(fissure(1).arg("init").arg(&deck));
+    let printed = |ranks, options: &[&str]| {
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).args(["--set", "dx=2e-3"]);
+        command.arg("--overwrite").args(options);
+        succeed(command.arg("--output").arg(folder.join("out")))
+    };
+    let verbose = printed(2, &["-v"]);
+    let (_, decided) = verbose.split_once("decided\n").unwrap();
+    let (decided, _) = decided.split_once(" to go").unwrap();
+    for words in [
+        "partition        each rank has ",
+        " ghosts of 1 other rank(s)",
+        " as bits of lattices, 0 in lists",
+        "instructions     ",
+        "s (chosen), 0.80 of the stable one",
+        "volume correction none, quadrature midpoint",
+    ] {
+        assert!(decided.contains(words), "{words}: {verbose}");
+    }
+    let normal = printed(1, &[]);
+    assert!(!normal.contains("partition"), "{normal}");
+    assert_eq!(normal.matches(" to go, after ").count(), 1, "{normal}");
+}
+
+#[test]
 fn no_result_and_no_deck() {
     let folder = Folder::new("nothing");
     let file = folder.write("notes.txt", "no deck and no result");

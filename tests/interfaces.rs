@@ -69,6 +69,40 @@ fn each_pair_has_its_rule() {
     }
 }
 
+#[test]
+fn bodies_with_the_rule_none_do_not_feel_each_other() {
+    // Three blocks side by side, the last of a law whose bonds none of the others can have.
+    let force = |family: &str, interface: &str| {
+        let text = format!(
+            "dimension = 'plane-strain'
+            grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
+            {interface}
+            material.soft.pmb = {{ density = 1, youngs_modulus = 2 }}
+            material.other.linear_microelastic = {{ density = 1, youngs_modulus = 2 }}
+            body.left = {{ material = 'soft', shape.box = {{ lower = [0, 0], upper = [5, 6] }} }}
+            body.middle = {{ material = 'soft', shape.box = {{ lower = [5, 0], upper = [10, 6] }} }}
+            body.right = {{ material = 'other', shape.box = {{ lower = [10, 0], upper = [15, 6] }} }}
+            time = {{ end = 1 }}
+            "
+        );
+        simulate::<2, _>(&text, |mut simulation| {
+            // Each moves as a whole; the middle one comes nearer to the left one.
+            displace(&mut simulation, |[x, y, z]| {
+                let shift = [0.0, -0.5, 0.7][(x / 5.0) as usize];
+                [x + shift, y, z]
+            });
+            largest_force(&simulation)
+        })
+    };
+    let pair = |bodies: &str| format!("interface.pair.p = {{ bodies = {bodies}, rule = 'own' }}");
+    for family in ["lattice", "list"] {
+        let none = "interface.rule = 'none'";
+        assert!(force(family, none) < 1e-14);
+        let bonded = format!("{none}\n{}", pair("['middle', 'left']"));
+        assert!(force(family, &bonded) > 1e-3);
+    }
+}
+
 /// Three blocks of three moduli, horizons and spacings with a rule for each pair; two of them can break.
 fn blocks(law: [&str; 3], correction: &str, rules: [&str; 3]) -> String {
     let [soft, firm, hard] = law;

@@ -3,6 +3,7 @@
 
 mod commands;
 mod communicator;
+mod contact;
 mod crack_branching;
 mod decks;
 mod decomposition;

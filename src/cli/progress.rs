@@ -1,5 +1,5 @@
-//! How far a run has come: a moving bar on a terminal, a line every tenth of the way elsewhere
-//! (mpirun and Slurm pass output through pipes and files).
+//! How far a run has come: a moving bar on a terminal, a line now and then elsewhere (mpirun and Slurm
+//! pass output through pipes and files).
 
 use crate::cli::tell;
 use std::io::IsTerminal;
@@ -9,8 +9,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::format::si;
 
-/// Lines printed over a run where there is no terminal.
-const LINES: u64 = 10;
+/// The first line comes after so many seconds, the others a minute apart and, in long runs, a tenth of
+/// the time that has gone by: some sixty lines a day.
+const FIRST_LINE: f64 = 5.0;
+const MINUTE: f64 = 60.0;
+const SHARE: f64 = 0.1;
 
 /// Width of the bar in characters.
 const WIDTH: usize = 30;
@@ -29,8 +32,8 @@ pub enum Progress {
         first: u64,
         /// Number of the last step.
         last: u64,
-        /// Lines printed.
-        printed: u64,
+        /// When the next line is due, s.
+        due: f64,
     },
 }
 
@@ -45,7 +48,7 @@ impl Progress {
                 start: Instant::now(),
                 first,
                 last,
-                printed: first * LINES / last,
+                due: FIRST_LINE,
             };
         }
         let bar = ProgressBar::new(last).with_position(first);
@@ -69,24 +72,31 @@ impl Progress {
                 start,
                 first,
                 last,
-                printed,
+                due,
             } => {
-                if step * LINES / *last > *printed {
-                    *printed = step * LINES / *last;
-                    let full = (step as usize * WIDTH) / *last as usize;
-                    let left = start
-                        .elapsed()
-                        .mul_f64((*last - step) as f64 / (step - *first) as f64);
-                    tell!(
-                        "[{}{}] {:>3} %  step {step}/{last}  t = {}  eta {:.0} s",
-                        "█".repeat(full),
-                        "·".repeat(WIDTH - full),
-                        100 * step / *last,
-                        si(time, "s"),
-                        left.as_secs_f64(),
-                    );
+                let elapsed = start.elapsed().as_secs_f64();
+                if elapsed < *due || step >= *last {
+                    return;
                 }
+                *due = next_line(elapsed);
+                let full = (step as usize * WIDTH) / *last as usize;
+                let left = elapsed * (*last - step) as f64 / (step - *first).max(1) as f64;
+                tell!(
+                    "[{}{}] {:>3} %  step {step}/{last}  t = {}  eta {left:.0} s",
+                    "█".repeat(full),
+                    "·".repeat(WIDTH - full),
+                    100 * step / *last,
+                    si(time, "s"),
+                );
             }
+        }
+    }
+
+    /// Prints something else, clear of the bar.
+    pub fn aside(&self, print: impl FnOnce()) {
+        match self {
+            Self::Bar(bar) => bar.suspend(print),
+            Self::Silent | Self::Lines { .. } => print(),
         }
     }
 
@@ -97,5 +107,28 @@ impl Progress {
             Self::Bar(bar) => bar.abandon(),
             Self::Silent | Self::Lines { .. } => {}
         }
+    }
+}
+
+/// When the line after one that is printed now is due, s.
+fn next_line(elapsed: f64) -> f64 {
+    if elapsed < MINUTE {
+        MINUTE
+    } else {
+        elapsed + MINUTE.max(SHARE * elapsed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_a_minute_apart_and_sparser_in_long_runs() {
+        let due: Vec<f64> = std::iter::successors(Some(FIRST_LINE), |due| Some(next_line(*due)))
+            .take_while(|due| *due < 86_400.0)
+            .collect();
+        assert_eq!(due[..4], [5.0, 60.0, 120.0, 180.0]);
+        assert!((50..80).contains(&due.len()), "{} lines a day", due.len());
     }
 }

@@ -72,12 +72,14 @@ fn run_deck(
     let mut log = Log {
         rank: world.rank(),
         speaks,
+        verbose: verbosity == Verbosity::Verbose,
         title: format!(
             "{}\n{} ranks × {threads} threads on {hosts} host(s)",
             plan.title,
             world.size()
         ),
         bodies: plan.bodies.iter().map(|body| body.name.clone()).collect(),
+        started,
         progress: Progress::Silent,
     };
     let outcome = fissure::run(&plan, world, options, &mut log)?;
@@ -95,9 +97,12 @@ struct Log {
     rank: usize,
     /// Whether this rank prints more than errors and warnings.
     speaks: bool,
+    /// Whether that is a lot.
+    verbose: bool,
     title: String,
     /// Their names.
     bodies: Vec<String>,
+    started: Instant,
     progress: Progress,
 }
 
@@ -128,12 +133,26 @@ impl Observer for Log {
                 let path = path.display();
                 say!("other outputs are asked for, or the result is gone: it is kept as {path}");
             }
-            Message::Warning(text) if self.rank == 0 => tell!("warning: {text}"),
+            Message::Decided(decided) if self.speaks && self.verbose => {
+                say!("decided");
+                for (name, what) in decided {
+                    say!("  {name:<17}{what}");
+                }
+            }
+            Message::Warning(text) if self.rank == 0 => {
+                self.progress.aside(|| tell!("warning: {text}"));
+            }
             _ => {}
         }
     }
 
     fn begin(&mut self, now: &dyn View) {
+        let left = now.last() - now.number();
+        if self.speaks && left > 0 {
+            let step = si(now.step(), "s");
+            let set_up = si(self.started.elapsed().as_secs_f64(), "s");
+            say!("{} steps of {step} to go, after {set_up}", count(left));
+        }
         self.progress = Progress::new(self.speaks, now.number(), now.last());
     }
 

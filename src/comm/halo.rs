@@ -58,6 +58,11 @@ impl Halo {
         }
     }
 
+    /// Number of ranks that it exchanges with.
+    pub fn neighbours(&self) -> usize {
+        self.neighbours.len()
+    }
+
     /// Follows the owned points to another order; `place` has the new local index of each.
     pub fn renumber(&mut self, place: &[u32]) {
         for neighbour in &mut self.neighbours {

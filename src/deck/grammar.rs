@@ -171,7 +171,8 @@ pub enum Quadrature {
 #[serde(deny_unknown_fields)]
 pub struct Interface {
     /// What constants they have: `"own"`, `"average"` or `"minimum"`. With `"own"` each end exerts its
-    /// half with its own modulus and horizon; else both have the mean or the smaller of each.
+    /// half with its own modulus and horizon; else both have the mean or the smaller of each. `"none"`:
+    /// there are none, however near the bodies are.
     #[serde(default = "own")]
     pub rule: Spanned<Rule>,
     /// Pairs of bodies with a rule of their own, by any name.
@@ -202,10 +203,12 @@ pub struct Pair {
     pub rule: Spanned<Rule>,
 }
 
-/// What constants bonds between blocks have.
+/// What constants bonds between blocks have, if there are any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
+    /// No bonds.
+    None,
     /// Means.
     Average,
     /// The smaller.

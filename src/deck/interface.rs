@@ -13,8 +13,7 @@ use crate::error::Result;
 /// On bodies whose laws no bond can have, a rule that the laws of a pair do not allow, and on pairs that
 /// are none or are given twice.
 pub fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::Interface> {
-    no_two_directions(scope, bodies)?;
-    let mut pairs: Vec<(&str, [usize; 2])> = Vec::new();
+    let mut pairs: Vec<(String, [usize; 2], &Spanned<Rule>)> = Vec::new();
     let mut interface = plan::Interface {
         rule: rule(&deck.interface.rule),
         pairs: Vec::new(),
@@ -23,29 +22,28 @@ pub fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<pl
         let key = format!("[interface.pair.{name}]");
         let table = table.get_ref();
         let pair = pair(scope, &key, table, bodies)?;
-        if let Some((earlier, _)) = pairs.iter().find(|(_, other)| *other == pair) {
+        if let Some((earlier, ..)) = pairs.iter().find(|(_, other, _)| *other == pair) {
             let [a, b] = pair.map(|body| &bodies[body].name);
-            let message = format!(
-                "{key} bodies: [interface.pair.{earlier}] has the bonds between `{a}` and `{b}` already"
-            );
+            let message =
+                format!("{key} bodies: {earlier} has the bonds between `{a}` and `{b}` already");
             return Err(scope.error(table.bodies.span(), message));
         }
-        suits(scope, &format!("{key} rule"), &table.rule, pair, bodies)?;
-        pairs.push((name, pair));
         let names = pair.map(|body| bodies[body].name.clone());
         interface.pairs.push((names, rule(&table.rule)));
+        pairs.push((key, pair, &table.rule));
     }
     for second in 1..bodies.len() {
         for first in 0..second {
             let pair = [first, second];
-            if pairs.iter().all(|(_, other)| *other != pair) {
-                suits(
-                    scope,
-                    "[interface] rule",
-                    &deck.interface.rule,
-                    pair,
-                    bodies,
-                )?;
+            let own = pairs.iter().find(|(_, other, _)| *other == pair);
+            let (key, rule) = own
+                .map_or(("[interface]", &deck.interface.rule), |(key, _, rule)| {
+                    (key.as_str(), *rule)
+                });
+            if *rule.get_ref() != Rule::None {
+                let pair = pair.map(|body| &bodies[body]);
+                one_direction(scope, pair)?;
+                one_micromodulus(scope, &format!("{key} rule"), rule, pair)?;
             }
         }
     }
@@ -54,6 +52,7 @@ pub fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<pl
 
 fn rule(rule: &Spanned<Rule>) -> plan::InterfaceRule {
     match rule.get_ref() {
+        Rule::None => plan::InterfaceRule::None,
         Rule::Own => plan::InterfaceRule::Own,
         Rule::Average => plan::InterfaceRule::Average,
         Rule::Minimum => plan::InterfaceRule::Minimum,
@@ -87,35 +86,30 @@ fn pair(
 }
 
 /// An error if the laws of two bodies exert forces in different directions on their bonds.
-fn no_two_directions(scope: &Scope, bodies: &[plan::Body]) -> Result<()> {
+fn one_direction(scope: &Scope, pair: [&plan::Body; 2]) -> Result<()> {
     let law = |body: &plan::Body| body.material.law.declaration;
-    let Some(linear) = bodies.iter().find(|body| law(body).linear) else {
+    let linear = pair.into_iter().find(|body| law(body).linear);
+    let other = pair.into_iter().find(|body| !law(body).linear);
+    let (Some(linear), Some(other)) = (linear, other) else {
         return Ok(());
     };
-    match bodies.iter().find(|other| !law(other).linear) {
-        None => Ok(()),
-        Some(other) => {
-            let message = format!(
-                "[body.{}] material: the forces of `{}` and of `{}` have different directions, so \
-                 that no bond can have both",
-                other.name,
-                law(other).name,
-                law(linear).name,
-            );
-            Err(scope.error(other.span.clone(), message))
-        }
-    }
+    let message = format!(
+        "[body.{}] material: the forces of `{}` and of `{}` have different directions, so that no bond \
+         can have both; `rule = \"none\"` leaves the bonds between the bodies out",
+        other.name,
+        law(other).name,
+        law(linear).name,
+    );
+    Err(scope.error(other.span.clone(), message))
 }
 
 /// An error if a rule needs one micromodulus for both ends and the laws of two bodies cannot have it.
-fn suits(
+fn one_micromodulus(
     scope: &Scope,
     key: &str,
     rule: &Spanned<Rule>,
-    pair: [usize; 2],
-    bodies: &[plan::Body],
+    pair: [&plan::Body; 2],
 ) -> Result<()> {
-    let pair = pair.map(|body| &bodies[body]);
     let [first, second] = pair.map(|body| body.material.law.declaration.name);
     let has_micromodulus = |body: &plan::Body| {
         let law = &body.material.law;

@@ -161,9 +161,11 @@ impl Interface {
     }
 }
 
-/// What constants the bonds between two blocks have.
+/// What constants the bonds between two blocks have, if there are any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InterfaceRule {
+    /// No bonds join the blocks.
+    None,
     /// Means of the moduli and of the horizons.
     Average,
     /// The smaller of the moduli and of the horizons.

@@ -20,6 +20,7 @@
 //! its plan.
 
 mod checkpoints;
+mod decisions;
 mod files;
 mod observer;
 mod options;
@@ -45,10 +46,11 @@ use crate::deck::Plan;
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
-use crate::solver::observers::HistoryRow;
+use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
 use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
+use decisions::decisions;
 use recorder::{Recorder, Start, can_continue};
 use restart::{Restart, restart};
 use watch::Watch;
@@ -158,6 +160,8 @@ impl<'a> Job<'a> {
                            so results differ in the last digits from those of other machines";
             self.observer.message(&Message::Warning(message.to_owned()));
         }
+        let decided = decisions(&simulation);
+        self.observer.message(&Message::Decided(decided));
         self.look_before_the_first_step()?;
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(&mut simulation)?,
@@ -224,6 +228,7 @@ impl<'a> Job<'a> {
             limit,
             simulation.clock.number(),
         );
+        let mut contact = Some(ContactWatch::new(simulation));
         while !simulation.clock.is_over() {
             simulation.advance();
             let clock = simulation.clock;
@@ -234,6 +239,12 @@ impl<'a> Job<'a> {
                     // The reader of the result should see where it went wrong.
                     recorder.write(simulation, true, true)?;
                     return Ok(Left::Failed(error));
+                }
+                if recorder.is_due(&clock)
+                    && let Some(found) = contact.as_ref().and_then(|watch| watch.look(simulation))
+                {
+                    self.warn_of_contact(&found, clock.time());
+                    contact = None;
                 }
                 recorder.record(simulation, self.observer)?;
                 let decision = watch.look(self.comm, &clock);
@@ -248,6 +259,19 @@ impl<'a> Job<'a> {
             }
         }
         Ok(Left::Complete)
+    }
+
+    /// Says that bodies go through one another.
+    fn warn_of_contact(&mut self, contact: &Contact, time: f64) {
+        let [a, b] = contact.bodies.map(|body| &self.plan.bodies[body].name);
+        let place = &contact.place[..self.plan.dimension.count()];
+        let place: Vec<String> = place.iter().map(|x| format!("{x:.4e}")).collect();
+        let text = format!(
+            "at t = {time:.4e} s points of `{a}` and `{b}` have come nearer than their spacing, at ({}) m; \
+             there is no contact between bodies: where no bond joins them they go through one another",
+            place.join(", ")
+        );
+        self.observer.message(&Message::Warning(text));
     }
 
     fn begin_run<const D: usize>(

@@ -30,7 +30,7 @@ pub struct Unobserved;
 
 impl Observer for Unobserved {}
 
-/// What a run tells before its first step.
+/// What a run tells, most of it before its first step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
     /// The folder is taken, and points and bonds are about to be made.
@@ -44,6 +44,8 @@ pub enum Message {
         /// What there is, and what is most likely not meant.
         survey: Survey,
     },
+    /// What the run has decided by itself, such as the partition: names and what was decided.
+    Decided(Vec<(&'static str, String)>),
     /// The run goes on from a checkpoint.
     Continued {
         /// Number of the step that it was written after.

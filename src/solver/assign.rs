@@ -31,7 +31,8 @@ fn constants(plan: &Plan, here: &Body, there: &Body) -> Constants {
         horizon: of(own.1, other.1),
     };
     match plan.interface.between(here, there) {
-        InterfaceRule::Own => combine(|own, _| own),
+        // Where there are no bonds, these are asked for none.
+        InterfaceRule::Own | InterfaceRule::None => combine(|own, _| own),
         InterfaceRule::Average => combine(|own, other| 0.5 * (own + other)),
         InterfaceRule::Minimum => combine(f64::min),
     }
@@ -94,6 +95,9 @@ fn cell_share(plan: &Plan, neighbours: &Body, horizon: f64) -> CellShare {
 /// The longest bond (m) of each pair of blocks, row by row.
 pub fn cutoffs(plan: &Plan) -> Vec<f64> {
     let reach = |here: &Body, there: &Body| {
+        if here.name != there.name && plan.interface.between(here, there) == InterfaceRule::None {
+            return 0.0;
+        }
         let horizon = constants(plan, here, there).horizon;
         cell_share(plan, there, horizon).cutoff()
     };

@@ -1,0 +1,84 @@
+//! What a run has decided by itself, for the reader of a log.
+
+use crate::comm;
+use crate::deck::plan::StepRule;
+use crate::solver::Simulation;
+
+/// Names and what was decided; the same on all ranks. Collective.
+pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'static str, String)> {
+    let plan = simulation.plan;
+    let lower = |rule: &dyn std::fmt::Debug| format!("{rule:?}").to_lowercase();
+    let mut decided = vec![
+        ("partition", partition(simulation)),
+        ("bonds", bonds(simulation)),
+        (
+            "instructions",
+            simulation.forces.instructions().name().to_owned(),
+        ),
+        ("time step", step(simulation)),
+        (
+            "volumes",
+            format!(
+                "volume correction {}, quadrature {}",
+                lower(&plan.volume_correction),
+                lower(&plan.quadrature)
+            ),
+        ),
+    ];
+    if plan.bodies.len() > 1 {
+        let rule = lower(&plan.interface.rule);
+        let own = plan.interface.pairs.len();
+        decided.push((
+            "interface",
+            format!("rule {rule}, {own} pair(s) with their own"),
+        ));
+    }
+    decided
+}
+
+fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
+    let (comm, model) = (simulation.comm, &simulation.model);
+    let own = [
+        model.owned(),
+        model.volume.len() - model.owned(),
+        simulation.forces.halo().neighbours(),
+    ]
+    .map(|count| count as f64);
+    let (mut most, mut least) = (own, own);
+    comm.max(&mut most);
+    comm::min(comm, &mut least);
+    let interior = comm::total(comm, model.interior as u64) as f64 / model.total as f64;
+    let range = |k: usize| match least[k] == most[k] {
+        true => most[k].to_string(),
+        false => format!("{} to {}", least[k], most[k]),
+    };
+    format!(
+        "each rank has {} points, {} ghosts of {} other rank(s); {:.0} % of all points are interior",
+        range(0),
+        range(1),
+        range(2),
+        100.0 * interior
+    )
+}
+
+fn bonds<const D: usize>(simulation: &Simulation<'_, D>) -> String {
+    let total = |directed: u64| comm::total(simulation.comm, directed) / 2;
+    let all = total(simulation.forces.directed_bonds());
+    let lattice = total(simulation.forces.lattice_bonds());
+    format!(
+        "{all}: {lattice} as bits of lattices, {} in lists",
+        all - lattice
+    )
+}
+
+fn step<const D: usize>(simulation: &Simulation<'_, D>) -> String {
+    let (step, stable) = (simulation.clock.step(), simulation.stable_step);
+    let source = match simulation.plan.time.step {
+        StepRule::Automatic(_) => "chosen",
+        StepRule::Fixed(_) => "of the deck",
+    };
+    format!(
+        "{step:.4e} s ({source}), {:.2} of the stable one",
+        step / stable
+    )
+}

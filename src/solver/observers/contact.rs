@@ -1,0 +1,304 @@
+//! Contact is not computed: bodies that no bond joins go through one another. This finds whether points
+//! of such bodies have come nearer than their spacing, so that the user is told.
+//!
+//! Where the boxes around two bodies meet, their points are dealt out to the ranks by cells of space, the
+//! points of one body to all cells that they may meet others in; so each rank compares a part.
+
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+use crate::comm::{self, Communicator};
+use crate::points::bins::Bins;
+use crate::points::distance_squared;
+use crate::solver::Simulation;
+use crate::solver::model::Model;
+
+/// Edge of a cell in largest distances: few points are near a border then.
+const CELL: f64 = 8.0;
+
+/// Points that begin nearer to one another than their spacing have come nearer if this share of their
+/// distance is left.
+const NEARER: f64 = 0.9;
+
+/// Points handled by one task.
+const CHUNK: usize = 1 << 15;
+
+/// Two points of bodies that no bond joins, nearer to one another than their spacing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Their bodies, the lower index first.
+    pub bodies: [usize; 2],
+    /// Their ids.
+    pub ids: [u64; 2],
+    /// The middle between them, m.
+    pub place: [f64; 3],
+    /// How far they are apart, m.
+    pub distance: f64,
+}
+
+/// The bodies that may come into contact.
+pub struct ContactWatch {
+    /// Pairs of bodies that no bond joins, the lower index first.
+    pairs: Vec<[usize; 2]>,
+    /// Largest spacing of each body, m.
+    spacing: Vec<f64>,
+}
+
+/// A pair of bodies whose boxes meet.
+#[derive(Clone, Copy)]
+struct Meeting {
+    pair: [usize; 2],
+    /// The largest distance that counts, m.
+    radius: f64,
+    /// Where points of both can be, m.
+    lower: [f64; 3],
+    upper: [f64; 3],
+}
+
+/// A point on its way to the ranks that compare it.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Candidate {
+    /// Number of the meeting, twice, and 1 more for the second body.
+    side: u64,
+    id: u64,
+    place: [f64; 3],
+    reference: [f64; 3],
+    spacing: f64,
+}
+
+impl ContactWatch {
+    /// For the bodies of a run. Collective.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
+        let (comm, model) = (simulation.comm, &simulation.model);
+        let bodies = simulation.plan.bodies.len();
+        if bodies < 2 {
+            return Self {
+                pairs: Vec::new(),
+                spacing: Vec::new(),
+            };
+        }
+        let mut bonds = vec![0; bodies * bodies];
+        for ([here, there], count) in simulation.forces.bonds_of_blocks() {
+            bonds[here * bodies + there] += count;
+        }
+        comm.sum(&mut bonds);
+        let pairs = (0..bodies).flat_map(|a| (a + 1..bodies).map(move |b| [a, b]));
+        let pairs = pairs.filter(|[a, b]| bonds[a * bodies + b] == 0).collect();
+        let mut spacing = vec![0.0_f64; bodies];
+        for (point, block) in model.block.iter().enumerate() {
+            let largest = &mut spacing[usize::from(*block)];
+            *largest = largest.max(spacing_of(simulation, point));
+        }
+        comm.max(&mut spacing);
+        Self { pairs, spacing }
+    }
+
+    /// The nearest two points of bodies that no bond joins, if they have come nearer than the mean of
+    /// their spacings; the same on all ranks. Collective.
+    pub fn look<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
+        let meetings = self.meetings(simulation);
+        if meetings.is_empty() {
+            return None;
+        }
+        let comm = simulation.comm;
+        let incoming = comm.all_to_all(candidates(simulation, &meetings));
+        let mut sides = vec![[Vec::new(), Vec::new()]; meetings.len()];
+        for bytes in incoming {
+            for candidate in bytemuck::pod_collect_to_vec::<u8, Candidate>(&bytes) {
+                let (meeting, second) = (candidate.side / 2, candidate.side % 2);
+                sides[meeting as usize][second as usize].push(candidate);
+            }
+        }
+        let nearest = meetings
+            .iter()
+            .zip(&sides)
+            .filter_map(|(meeting, sides)| nearest(meeting, sides))
+            .min_by(|a, b| (a.distance.total_cmp(&b.distance)).then(a.ids.cmp(&b.ids)));
+        agree_on_nearest(comm, nearest)
+    }
+
+    /// The pairs whose boxes are nearer than their points may be.
+    fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
+        if self.pairs.is_empty() {
+            return Vec::new();
+        }
+        // Lower corners and, with the sign turned, upper ones.
+        let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
+        let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
+        let include = |mut corners: Vec<f64>, point: usize| {
+            let first = 6 * usize::from(model.block[point]);
+            for (k, x) in place_of(model, displacement, point).into_iter().enumerate() {
+                corners[first + k] = corners[first + k].min(x);
+                corners[first + 3 + k] = corners[first + 3 + k].min(-x);
+            }
+            corners
+        };
+        let join = |mut corners: Vec<f64>, others: Vec<f64>| {
+            for (corner, other) in corners.iter_mut().zip(others) {
+                *corner = corner.min(other);
+            }
+            corners
+        };
+        let points = (0..model.owned()).into_par_iter();
+        let found = points.with_min_len(CHUNK).fold(none, include);
+        let mut corners = found.reduce(none, join);
+        comm::min(simulation.comm, &mut corners);
+        let corner = |body: usize, k: usize| corners[6 * body + k];
+        let meeting = |pair: &[usize; 2]| {
+            let [a, b] = *pair;
+            let radius = 0.5 * (self.spacing[a] + self.spacing[b]);
+            let lower = |k: usize| corner(a, k).max(corner(b, k)) - radius;
+            let upper = |k: usize| (-corner(a, 3 + k)).min(-corner(b, 3 + k)) + radius;
+            let meeting = Meeting {
+                pair: *pair,
+                radius,
+                lower: std::array::from_fn(lower),
+                upper: std::array::from_fn(upper),
+            };
+            (0..3)
+                .all(|k| meeting.upper[k] - meeting.lower[k] >= radius)
+                .then_some(meeting)
+        };
+        self.pairs.iter().filter_map(meeting).collect()
+    }
+}
+
+/// Edge of a cube, square or line of a point's volume, m.
+fn spacing_of<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    let extent = simulation.model.volume[point] / simulation.plan.dimension.section();
+    extent.powf(1.0 / D as f64)
+}
+
+/// Present place of an owned point, m.
+fn place_of<const D: usize>(
+    model: &Model<D>,
+    displacement: &[Vec<f64>; D],
+    point: usize,
+) -> [f64; 3] {
+    let mut place = model.position(point);
+    for d in 0..D {
+        place[d] += displacement[d][point];
+    }
+    place
+}
+
+/// The own points where bodies meet, packed for each rank.
+fn candidates<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    meetings: &[Meeting],
+) -> Vec<Vec<u8>> {
+    let ranks = simulation.comm.size();
+    let mut outgoing = vec![Vec::new(); ranks];
+    let mut of_body = vec![Vec::new(); simulation.plan.bodies.len()];
+    for (number, meeting) in meetings.iter().enumerate() {
+        for (second, body) in meeting.pair.into_iter().enumerate() {
+            of_body[body].push((number, second));
+        }
+    }
+    let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
+    for (point, block) in model.block.iter().enumerate() {
+        let place = place_of(model, displacement, point);
+        for (number, second) in &of_body[usize::from(*block)] {
+            let meeting = &meetings[*number];
+            if (0..3).any(|k| place[k] < meeting.lower[k] || place[k] > meeting.upper[k]) {
+                continue;
+            }
+            let candidate = Candidate {
+                side: (2 * number + second) as u64,
+                id: model.ids[point],
+                place,
+                reference: model.position(point),
+                spacing: spacing_of(simulation, point),
+            };
+            let reach = *second as f64 * meeting.radius;
+            for rank in homes::<D>(place, reach, CELL * meeting.radius, ranks) {
+                outgoing[rank].extend_from_slice(bytemuck::bytes_of(&candidate));
+            }
+        }
+    }
+    outgoing
+}
+
+/// The ranks that compare the points in the cells within reach of a place.
+fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
+    let mut homes = Vec::with_capacity(1);
+    for corner in 0..1_u32 << D {
+        let hash = (0..D).fold(0_u64, |hash, k| {
+            let side = f64::from(2 * (corner >> k & 1)) - 1.0;
+            let cell = ((place[k] + side * reach) / edge).floor() as i64;
+            let mixed = (hash ^ cell as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            mixed ^ mixed >> 29
+        });
+        let home = (hash % ranks as u64) as usize;
+        if !homes.contains(&home) {
+            homes.push(home);
+        }
+    }
+    homes
+}
+
+/// The nearest points of two bodies that have come nearer than their spacing, of those given.
+fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
+    if first.is_empty() || second.is_empty() {
+        return None;
+    }
+    let places: Vec<[f64; 3]> = first.iter().map(|candidate| candidate.place).collect();
+    let bins = Bins::new(&places, meeting.radius);
+    let mut nearest: Option<Contact> = None;
+    for b in second {
+        bins.within(b.place, |index, squared| {
+            let a = &first[index as usize];
+            let spacing = 0.5 * (a.spacing + b.spacing);
+            let reference = distance_squared(a.reference, b.reference).sqrt();
+            let found = Contact {
+                bodies: meeting.pair,
+                ids: [a.id, b.id],
+                place: std::array::from_fn(|k| 0.5 * (a.place[k] + b.place[k])),
+                distance: squared.sqrt(),
+            };
+            let is_nearer = |than: &Contact| {
+                let order = found.distance.total_cmp(&than.distance);
+                order.then(found.ids.cmp(&than.ids)).is_lt()
+            };
+            if found.distance < spacing.min(NEARER * reference)
+                && nearest.as_ref().is_none_or(is_nearer)
+            {
+                nearest = Some(found);
+            }
+        });
+    }
+    nearest
+}
+
+/// The nearest of what the ranks have found, by distance and then by ids. Collective.
+fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Contact> {
+    let mut best = own;
+    let mut smallest = |of: fn(&Contact) -> f64| {
+        let mut value = [best.as_ref().map_or(f64::INFINITY, of)];
+        comm::min(comm, &mut value);
+        best = best.filter(|contact| of(contact) == value[0]);
+        value[0]
+    };
+    let distance = smallest(|contact| contact.distance);
+    // Ids are below 2⁵³.
+    let ids = [
+        smallest(|contact| contact.ids[0] as f64),
+        smallest(|contact| contact.ids[1] as f64),
+    ];
+    if distance == f64::INFINITY {
+        return None;
+    }
+    let mut rest = [f64::NEG_INFINITY; 5];
+    if let Some(contact) = best {
+        let [x, y, z] = contact.place;
+        rest = [x, y, z, contact.bodies[0] as f64, contact.bodies[1] as f64];
+    }
+    comm.max(&mut rest);
+    Some(Contact {
+        bodies: [rest[3] as usize, rest[4] as usize],
+        ids: ids.map(|id| id as u64),
+        place: [rest[0], rest[1], rest[2]],
+        distance,
+    })
+}

@@ -1,0 +1,79 @@
+//! Bodies that no bond joins go through one another, and the user is told, once, the same on any number
+//! of ranks.
+
+use crate::support::command::{Folder, finish, fissure, text};
+
+/// A ball above a plate, both in motion; no bond joins them.
+fn ball_and_plate(velocity: &str, interface: &str) -> String {
+    format!(
+        "dimension = 'plane-strain'
+        grid = {{ spacing = 1, horizon = 3 }}
+        {interface}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        [body]
+        plate = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [20, 4] }} }}
+        far = {{ material = 'rubber', shape.box = {{ lower = [40, 0], upper = [44, 4] }} }}
+        ball = {{ material = 'rubber', shape.disc = {{ centre = [10, 12], radius = 3 }} }}
+        [initial.fall]
+        set = 'ball'
+        velocity = {velocity}
+        [time]
+        step = 0.25
+        end = 9
+        [history]
+        every_steps = 1
+        "
+    )
+}
+
+/// The warnings of a run.
+fn warnings(ranks: usize, deck: &str) -> Vec<String> {
+    let folder = Folder::new("contact");
+    let deck = folder.write("deck.toml", deck);
+    let mut command = fissure(ranks);
+    command.arg("run").arg(&deck).args(["--threads", "1"]);
+    command.arg("--output").arg(folder.join("out"));
+    let output = finish(&mut command);
+    let printed = text(&output);
+    assert!(output.status.success(), "{printed}");
+    let lines = printed.lines().filter(|line| line.contains("nearer than"));
+    lines.map(str::to_owned).collect()
+}
+
+#[test]
+fn a_ball_that_goes_through_a_plate_is_told_once() {
+    let deck = ball_and_plate("[0, -1]", "");
+    let alone = warnings(1, &deck);
+    assert_eq!(alone.len(), 1, "{alone:?}");
+    // The lowest points of the ball, at y = 9.5, are a spacing above those of the plate, at 3.5, after
+    // 5 s; then they are nearer.
+    let expected = "warning: at t = 5.2500e0 s points of `plate` and `ball` have come nearer";
+    assert!(alone[0].starts_with(expected), "{alone:?}");
+    let place = alone[0].split(['(', ')']).nth(1).unwrap();
+    let place: Vec<f64> = place.split(", ").map(|x| x.parse().unwrap()).collect();
+    assert!((7.0..13.0).contains(&place[0]), "{place:?}");
+    assert!((place[1] - 3.875).abs() < 1e-3, "{place:?}");
+    for ranks in [2, 3] {
+        assert_eq!(warnings(ranks, &deck), alone);
+    }
+}
+
+#[test]
+fn bodies_that_stay_apart_or_are_bonded_are_not_told() {
+    let apart = ball_and_plate("[0, 1]", "");
+    assert_eq!(warnings(2, &apart), [""; 0]);
+    // So high a horizon joins the ball and the plate.
+    let bonded = ball_and_plate("[0, -1]", "").replace("horizon = 3", "horizon = 7");
+    assert_eq!(warnings(1, &bonded), [""; 0]);
+}
+
+#[test]
+fn bodies_kept_apart_by_the_interface_are_watched() {
+    // The ball lies on the plate, its points a spacing above those of the plate.
+    let rest = "interface.rule = 'none'";
+    let lying = |velocity| ball_and_plate(velocity, rest).replace("[10, 12]", "[10, 7]");
+    assert_eq!(warnings(2, &lying("[0, 0]")), [""; 0]);
+    let pressed = warnings(2, &lying("[0, -0.1]"));
+    assert_eq!(pressed.len(), 1, "{pressed:?}");
+    assert!(pressed[0].contains("`plate` and `ball`"), "{pressed:?}");
+}
