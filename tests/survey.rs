@@ -362,7 +362,8 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
             (bulk / (sum / whole) - 1.0).abs() < 1e-6,
             "{dimension}: {bulk}"
         );
-        assert!((bulk - 1.0).abs() < 0.015, "{dimension}: {bulk}");
+        // In space the sum over three spacings is 1.8 % above the integral, in less dimensions nearer.
+        assert!((bulk - 1.0).abs() < 0.018, "{dimension}: {bulk}");
     }
 }
 

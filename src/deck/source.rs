@@ -75,7 +75,7 @@ impl Source {
     }
 
     /// An error that names file, line and column and shows what stands there, with a caret below the
-    /// bytes of `span`; without a deck, the message alone. All of it has about [`MOST_SHOWN`] characters
+    /// bytes of `span`; without a deck, the message alone. All of it has about 400 characters
     /// at most.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
         let message = shortened(message.as_ref(), MOST_SAID);

@@ -98,7 +98,8 @@ mod tests {
     fn a_horizon_far_beyond_a_body_bonds_all_its_points() {
         let (domain, frame) = cube(3);
         for cutoff in [3.0, 1e30] {
-            let (families, _) = find(&domain, &[frame.clone()], 1, &[cutoff], 3).unwrap();
+            let (families, _) =
+                find(&domain, std::slice::from_ref(&frame), 1, &[cutoff], 3).unwrap();
             let bonds: u64 = families.iter().map(BlockBonds::bonds).sum();
             assert_eq!(bonds, 27 * 26);
             assert!(families[0].bytes() < 10_000, "{}", families[0].bytes());

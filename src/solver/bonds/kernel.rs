@@ -8,7 +8,7 @@ use crate::material::Bond;
 use crate::material::bond::{NEAR, Wanted, Weights};
 
 /// Eight bonds: what is read of both ends, and what is kept of the bonds.
-pub struct Group<K: Kernel<D> + ?Sized, const D: usize> {
+pub struct Group<K: Kernel<D>, const D: usize> {
     /// What laws see.
     pub bond: Bond<D>,
     /// Volumes of the own ends, m³.

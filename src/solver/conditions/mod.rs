@@ -152,10 +152,11 @@ impl<const D: usize> Conditions<D> {
     /// Gives supported points their velocity at `time` (s), and finds the reactions. `step` is the time
     /// step (s). Returns whether all of that is finite.
     pub fn guide(&self, model: &Model<D>, fields: &mut Fields<D>, time: f64, step: f64) -> bool {
-        let supports = self.supports.iter();
-        supports.fold(true, |finite, support| {
-            support.guide(model, fields, time, step) && finite
-        })
+        let mut finite = true;
+        for support in &self.supports {
+            finite &= support.guide(model, fields, time, step);
+        }
+        finite
     }
 
     /// After forces and reactions are known at the new place: adds up the work of the step, by the

@@ -40,7 +40,8 @@ impl<const D: usize> Simulation<'_, D> {
         let width = columns.len();
         let mut values = vec![0.0; owned * width];
         for (k, column) in columns.into_iter().enumerate() {
-            for (value, number) in values[k..].iter_mut().step_by(width).zip(column) {
+            let places = values.iter_mut().skip(k).step_by(width);
+            for (value, number) in places.zip(column) {
                 *value = *number;
             }
         }
@@ -82,7 +83,8 @@ impl<const D: usize> Simulation<'_, D> {
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);
         let columns = fields.flat_map(|(_, columns)| columns);
         for (k, column) in columns.enumerate() {
-            for (number, value) in column.iter_mut().zip(values[k..].iter().step_by(width)) {
+            let saved = values.iter().skip(k).step_by(width);
+            for (number, value) in column.iter_mut().zip(saved) {
                 *number = *value;
             }
         }

@@ -78,7 +78,8 @@ impl Snapshot {
 fn rows(columns: &[Vec<f64>], count: usize, components: usize) -> Vec<f64> {
     let mut values = vec![0.0; components * count];
     for (d, column) in columns.iter().enumerate() {
-        for (value, number) in values[d..].iter_mut().step_by(components).zip(column) {
+        let places = values.iter_mut().skip(d).step_by(components);
+        for (value, number) in places.zip(column) {
             *value = *number;
         }
     }
