@@ -102,8 +102,8 @@ Examples:
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
-The loops use the best vector instructions that all ranks have. On machines of several kinds set
-FISSURE_INSTRUCTIONS to baseline, avx2 or avx512, the most to use, to get the same bits everywhere.
+The loops use the best vector instructions that all ranks have; AVX-512 and AVX2 give the same bits.
+FISSURE_INSTRUCTIONS (baseline, avx2, avx512) names the most to use.
 
 SIGTERM, SIGINT or SIGUSR1 to any rank: all finish the step, write a checkpoint and leave with exit
 code 75; a second signal ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
