@@ -94,8 +94,8 @@ fn one_direction(scope: &Scope, pair: [&plan::Body; 2]) -> Result<()> {
         return Ok(());
     };
     let message = format!(
-        "[body.{}] material: the forces of `{}` and of `{}` have different directions, so that no bond \
-         can have both; `rule = \"none\"` leaves the bonds between the bodies out",
+        "[body.{}] material: the forces of `{}` and `{}` have different directions; \
+         `rule = \"none\"` keeps the bodies apart",
         other.name,
         law(other).name,
         law(linear).name,
