@@ -388,6 +388,10 @@ fn the_size_of_a_run_without_making_it() {
             );
         });
     }
+    // A horizon far beyond the body is no more work than the body.
+    let wide = plate("").replace("horizon = 3", "horizon = 3e12");
+    let found = size(&plan(&wide)).unwrap();
+    assert_eq!(found.directed_bonds, 96.0 * 95.0);
     let large = "dimension = '3d'
         grid = { spacing = 5e-4, horizon = 1.5e-3 }
         material.glass.pmb = { density = 2, youngs_modulus = 5 }

@@ -55,7 +55,7 @@ use fissure::error::{Error, Result};
 #[command(after_help = "\
 Examples:
   fissure init plate.toml                       write a commented example deck
-  fissure check plate.toml                      validate it; show points, bonds, step, memory
+  fissure check plate.toml                      validate it; show mass, bonds, step, memory, time
   fissure run plate.toml                        run it; the result goes to out/plate/
   mpirun -n 4 fissure run plate.toml            the same on 4 ranks
   fissure plot out/plate/result.vtkhdf          a picture of the damage at the end

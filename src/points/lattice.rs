@@ -132,21 +132,26 @@ impl<'a> LatticeBody<'a> {
         centres.take(count as usize).collect()
     }
 
-    /// Number of cells of the lattice within a distance (m), about.
+    /// Number of cells that are at most a distance (m) from a place, about.
     pub fn cells_within(&self, distance: f64) -> f64 {
-        let widths = (0..self.dimension).map(|k| 2.0 * (distance / self.spacing[k]).floor() + 1.0);
-        widths.product()
+        let width = |k: usize| {
+            let all = self.region.range(k).count() as f64;
+            all.min(2.0 * (distance / self.spacing[k]).floor() + 1.0)
+        };
+        (0..self.dimension).map(width).product()
     }
 
     /// Number of the body's points in cells whose centres are at most a distance (m) from a place (m).
     pub fn count_near(&self, place: [f64; 3], distance: f64) -> u64 {
         let range = |k: usize| {
+            let all = self.region.range(k);
             if k >= self.dimension {
-                return 0..=0;
+                return all;
             }
             let cell = |x: f64| (x - self.origin[k]) / self.spacing[k] - 0.5;
             let first = cell(place[k] - distance).ceil() as i64;
-            first..=cell(place[k] + distance).floor() as i64
+            let last = cell(place[k] + distance).floor() as i64;
+            first.max(*all.start())..=last.min(*all.end())
         };
         let mut count = 0;
         for z in range(2) {

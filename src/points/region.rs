@@ -3,6 +3,8 @@
 //!
 //! Where the parts of a union are far apart, the cells between them are left out.
 
+use std::ops::RangeInclusive;
+
 use crate::deck::plan::Shape;
 
 use super::shape;
@@ -20,6 +22,8 @@ const MANY_PARTS: usize = 32;
 pub struct Region {
     layers: Vec<Stretch>,
     total: u64,
+    /// The first cell by direction, and one more than the last.
+    hull: CellBox,
 }
 
 /// The cells from `first` to `end` − 1 by direction.
@@ -57,10 +61,23 @@ impl Region {
         let has_cells = |cells: &&CellBox| (0..3).all(|k| cells.first[k] < cells.end[k]);
         let boxes: Vec<&CellBox> = boxes.iter().filter(has_cells).collect();
         let layers = stretches(&boxes, 2);
+        let most = |pick: fn(i64, i64) -> i64, of: fn(&CellBox) -> [i64; 3]| {
+            let all = boxes.iter().map(|cells| of(cells));
+            all.reduce(|a, b| std::array::from_fn(|k| pick(a[k], b[k])))
+        };
         Some(Self {
             total: sum(&layers),
             layers,
+            hull: CellBox {
+                first: most(i64::min, |cells| cells.first).unwrap_or_default(),
+                end: most(i64::max, |cells| cells.end).unwrap_or_default(),
+            },
         })
+    }
+
+    /// The first and the last of all cells in a direction.
+    pub fn range(&self, direction: usize) -> RangeInclusive<i64> {
+        self.hull.first[direction]..=self.hull.end[direction] - 1
     }
 
     /// Number of cells, at most the largest number there is.
