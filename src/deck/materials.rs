@@ -178,9 +178,8 @@ impl Section<'_> {
         }
         // A ratio given as 0.33 or 0.333 means 1/3.
         if (found.poisson_ratio - own).abs() > 0.005 {
-            let others = declarations().filter(|law| {
-                law.any_poisson_ratio && plan::Law::of(law).fault(dimension).is_none()
-            });
+            let others =
+                declarations().filter(|law| law.any_poisson_ratio && law.is_for(dimension));
             let other = match others.clone().count() {
                 0 => String::new(),
                 _ => format!(

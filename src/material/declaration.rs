@@ -54,6 +54,11 @@ impl Declaration {
         }
     }
 
+    /// Whether the law is there in this setting, with the defaults of its keys.
+    pub fn is_for(&self, dimension: Dimension) -> bool {
+        self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
+    }
+
     /// The key of this name, if the law has it.
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys.iter().find(|key| key.name == name)
@@ -156,9 +161,9 @@ impl From<&str> for Value {
     }
 }
 
-/// The values of a law's own keys.
-#[derive(Debug, Clone, Default)]
-pub struct Values(Vec<(&'static str, Value)>);
+/// The values of a law's own keys, in the order in which it declares them.
+#[derive(Debug, Clone)]
+pub struct Values(Vec<(&'static str, Option<Value>)>);
 
 impl Values {
     /// The defaults of these keys.
@@ -168,22 +173,20 @@ impl Values {
             Kind::Word(words) => words.first().map(|first| first.word.into()),
             Kind::OfLength => None,
         };
-        let values = keys
-            .iter()
-            .filter_map(|key| Some((key.name, default(key)?)));
-        Self(values.collect())
+        Self(keys.iter().map(|key| (key.name, default(key))).collect())
     }
 
-    /// Gives a key another value.
-    pub fn set(&mut self, key: &'static str, value: Value) {
-        self.0.retain(|(name, _)| *name != key);
-        self.0.push((key, value));
+    /// Gives a key, which must be one of the law's, another value.
+    pub fn set(&mut self, key: &str, value: Value) {
+        if let Some((_, old)) = self.0.iter_mut().find(|(name, _)| *name == key) {
+            *old = Some(value);
+        }
     }
 
     /// The value of a key, if it has one.
     pub fn get(&self, key: &str) -> Option<&Value> {
-        let found = self.0.iter().find(|(name, _)| *name == key);
-        found.map(|(_, value)| value)
+        let (_, value) = self.0.iter().find(|(name, _)| *name == key)?;
+        value.as_ref()
     }
 
     /// The number of a key.
