@@ -94,9 +94,10 @@ impl Figures {
     /// The share of the messages' time that is hidden behind the interior bonds; NaN without messages.
     /// Ranks that wait for one another may take longer than the messages alone.
     fn hidden(&self) -> f64 {
-        match self.messages > 0.0 {
-            true => (1.0 - self.messages_time / self.messages_time_alone).max(0.0),
-            false => f64::NAN,
+        if self.messages > 0.0 {
+            (1.0 - self.messages_time / self.messages_time_alone).max(0.0)
+        } else {
+            f64::NAN
         }
     }
 

@@ -214,13 +214,14 @@ impl Section<'_> {
     fn wrong_number_of_constants(&self, given: &[(&str, Constant)]) -> crate::error::Error {
         let names = "`youngs_modulus`, `bulk_modulus`, `shear_modulus`, `lame_lambda` and \
                      `poisson_ratio`";
-        let message = match self.declaration.any_poisson_ratio {
-            true => format!("{}: give two of {names}", self.key),
-            false => format!(
+        let message = if self.declaration.any_poisson_ratio {
+            format!("{}: give two of {names}", self.key)
+        } else {
+            format!(
                 "{}: give one or two of {names}; with one (not the last), Poisson's ratio is the \
                  law's own",
                 self.key
-            ),
+            )
         };
         let third = given.get(2).map(|(name, _)| self.table[*name].span());
         self.scope

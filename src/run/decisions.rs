@@ -48,9 +48,12 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
     comm.max(&mut most);
     comm::min(comm, &mut least);
     let interior = comm::total(comm, model.interior as u64) as f64 / model.total as f64;
-    let range = |k: usize| match least[k] == most[k] {
-        true => most[k].to_string(),
-        false => format!("{} to {}", least[k], most[k]),
+    let range = |k: usize| {
+        if least[k] == most[k] {
+            most[k].to_string()
+        } else {
+            format!("{} to {}", least[k], most[k])
+        }
     };
     format!(
         "each rank has {} points, {} ghosts of {} other rank(s); {:.0} % of all points are interior",

@@ -76,13 +76,8 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     };
 
     #[inline(always)]
-    fn limit(&self) -> f64 {
-        self.criterion.limit()
-    }
-
-    #[inline(always)]
-    fn reads_thresholds(&self) -> bool {
-        self.criterion.reads_thresholds()
+    fn criterion(&self) -> Criterion {
+        self.criterion
     }
 
     #[inline(always)]

@@ -93,7 +93,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Panics
     /// When an array that the kernel reads does not cover the grid.
     pub fn new(kernel: &K, values: &'a GridValues<D>, volumes: [f64; 2]) -> Self {
-        let with_thresholds = kernel.reads_thresholds();
+        let with_thresholds = kernel.criterion().reads_thresholds();
         let numbers = K::Point::columns(&values.numbers);
         let covers = |column: &[f64]| column.len() >= values.grid.places();
         assert!(
@@ -107,7 +107,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             numbers,
             thresholds: &values.thresholds,
             with_thresholds,
-            limit: kernel.limit(),
+            limit: kernel.criterion().limit(),
             volumes: volumes.map(Lanes::splat),
         }
     }

@@ -3,9 +3,10 @@
 //! A kernel sees eight bonds at a time and adds to eight sums. It is written once for any dimension,
 //! law and storage: the bonds may be those of one point or those of eight.
 
+use crate::damage::Criterion;
 use crate::lanes::{Lanes, Numbers, Simd};
 use crate::material::Bond;
-use crate::material::bond::{NEAR, Wanted, Weights};
+use crate::material::bond::{Wanted, Weights};
 
 /// Eight bonds: what is read of both ends, and what is kept of the bonds.
 pub struct Group<K: Kernel<D>, const D: usize> {
@@ -91,16 +92,10 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// What it wants to know of deformed bonds.
     const WANTED: Wanted;
 
-    /// The |x| beyond which bonds are marked, see [`Bond::marked`].
+    /// When it breaks bonds: what it needs of them for that is found.
     #[inline(always)]
-    fn limit(&self) -> f64 {
-        NEAR
-    }
-
-    /// Whether it reads the thresholds of the ends.
-    #[inline(always)]
-    fn reads_thresholds(&self) -> bool {
-        false
+    fn criterion(&self) -> Criterion {
+        Criterion::Never
     }
 
     /// Whether it changes what bonds keep.

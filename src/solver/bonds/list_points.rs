@@ -94,7 +94,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         numbers: &'a [Vec<f64>],
         thresholds: &'a [f64],
     ) -> Self {
-        let with_thresholds = kernel.reads_thresholds();
+        let with_thresholds = kernel.criterion().reads_thresholds();
         let numbers = K::Point::columns(numbers);
         let covers = |column: &[f64]| column.len() >= reach;
         assert!(
@@ -108,7 +108,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             numbers,
             thresholds,
             with_thresholds,
-            limit: kernel.limit(),
+            limit: kernel.criterion().limit(),
         }
     }
 

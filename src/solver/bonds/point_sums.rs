@@ -42,13 +42,8 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
     };
 
     #[inline(always)]
-    fn limit(&self) -> f64 {
-        self.criterion.limit()
-    }
-
-    #[inline(always)]
-    fn reads_thresholds(&self) -> bool {
-        self.criterion.reads_thresholds()
+    fn criterion(&self) -> Criterion {
+        self.criterion
     }
 
     #[inline(always)]

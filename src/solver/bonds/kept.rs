@@ -1,0 +1,68 @@
+//! What is kept of the bonds: in checkpoints, and to undo a step.
+
+use crate::lanes::Lanes;
+
+use super::Forces;
+
+/// What bonds and energy were at the end of a step, to go back there.
+#[derive(Debug, Default)]
+pub struct KeptBonds(Vec<(Vec<u8>, Vec<Lanes>)>);
+
+impl<const D: usize> Forces<D> {
+    /// How many bytes of a checkpoint the bonds of each owned point take.
+    pub fn saved_lengths(&self, owned: usize) -> Vec<u32> {
+        let mut lengths = vec![0; owned];
+        for interaction in &self.interactions {
+            let add = |point: usize, length: usize| lengths[point] += length as u32;
+            interaction.bonds.row_lengths(add);
+        }
+        lengths
+    }
+
+    /// What is kept of the bonds of all owned points, one after the other.
+    pub fn saved(&self, lengths: &[u32]) -> Vec<u8> {
+        let (mut next, total) = starts(lengths);
+        let mut bytes = vec![0; total];
+        for interaction in &self.interactions {
+            interaction.bonds.save(&mut next, &mut bytes);
+        }
+        bytes
+    }
+
+    /// Puts back what [`Self::saved`] gave.
+    pub fn restore(&mut self, lengths: &[u32], bytes: &[u8]) {
+        let (mut next, _) = starts(lengths);
+        for interaction in &mut self.interactions {
+            interaction.bonds.restore(&mut next, bytes);
+        }
+    }
+
+    /// Takes note of the bonds, for [`Self::undo`].
+    pub fn keep(&self, kept: &mut KeptBonds) {
+        kept.0
+            .resize_with(self.interactions.len(), Default::default);
+        for (interaction, kept) in self.interactions.iter().zip(&mut kept.0) {
+            interaction.bonds.store().keep(kept);
+        }
+    }
+
+    /// Puts back the bonds that [`Self::keep`] took note of.
+    pub fn undo(&mut self, kept: &KeptBonds) {
+        for (interaction, kept) in self.interactions.iter_mut().zip(&kept.0) {
+            interaction.bonds.store_mut().undo(kept);
+        }
+    }
+}
+
+/// Where each point's bytes start, and how many there are in all.
+fn starts(lengths: &[u32]) -> (Vec<usize>, usize) {
+    let mut end = 0;
+    let starts = lengths
+        .iter()
+        .map(|length| {
+            end += *length as usize;
+            end - *length as usize
+        })
+        .collect();
+    (starts, end)
+}

@@ -1,0 +1,146 @@
+//! What is seen of the bonds at set-up and for output, by column over the owned points.
+
+use crate::families::BlockBonds;
+use crate::lanes::Numbers;
+use crate::material::{Law, with_pair};
+use crate::solver::model::Model;
+
+use super::Forces;
+use super::interaction::Interaction;
+use super::kernel::Kernel;
+use super::measures;
+use super::point_numbers;
+use super::sweep::{Source, sweep};
+
+/// What the bonds of the owned points hold, by column over the points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stored {
+    /// Strain energy density W, J/m³.
+    pub energy: Vec<f64>,
+    /// Volume of the intact neighbours in the point's own family, m³.
+    pub volume: Vec<f64>,
+    /// Number of intact neighbours, those included that have the point in their family only.
+    pub neighbours: Vec<f64>,
+    /// Energy density that bonds have dissipated without breaking, J/m³; empty where no law can.
+    pub dissipated: Vec<f64>,
+}
+
+impl<const D: usize> Forces<D> {
+    /// Columns of sums of a kernel over all bonds of the owned points.
+    fn measure(
+        &mut self,
+        owned: usize,
+        columns: usize,
+        mut sweep: impl FnMut(&mut Interaction, &mut [Vec<f64>], Source<'_, D>),
+    ) -> Vec<Vec<f64>> {
+        let mut sums = vec![vec![0.0; owned]; columns];
+        self.for_each_interaction(|interaction, source| sweep(interaction, &mut sums, source));
+        sums
+    }
+
+    /// What the bonds of each owned point hold, at the displacements of the last
+    /// [evaluation](Self::evaluate).
+    pub fn stored(&mut self, model: &Model<D>) -> Stored {
+        let columns = self.measure(model.owned(), 4, |interaction, sums, source| {
+            with_pair!(interaction.laws, laws => {
+                let kernel = measures::Stored { law: laws[0] };
+                sweep_all(&mut interaction.bonds, sums, &kernel, source);
+            });
+        });
+        let [mut energy, volume, neighbours, dissipated] =
+            columns.try_into().expect("four columns");
+        let numbers = &self.numbers.columns;
+        if self.numbers.stages > 0 {
+            for (point, energy) in energy.iter_mut().enumerate() {
+                let law = self.blocks[usize::from(model.block[point])].law;
+                let get = |k: usize| numbers.get(k).and_then(|column| column.get(point));
+                let own: [f64; point_numbers::NUMBERS] =
+                    std::array::from_fn(|k| get(k).copied().unwrap_or(0.0));
+                *energy += Law::<D>::point_energy(&law, &own);
+            }
+        }
+        Stored {
+            energy,
+            volume,
+            neighbours,
+            dissipated: if self.remembers {
+                dissipated
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    /// Volume of the intact neighbours of each owned point, m³.
+    pub fn family_volume(&mut self, model: &Model<D>) -> Vec<f64> {
+        let mut columns = self.measure(model.owned(), 1, |interaction, sums, source| {
+            sweep_all(
+                &mut interaction.bonds,
+                sums,
+                &measures::FamilyVolume,
+                source,
+            );
+        });
+        columns.remove(0)
+    }
+
+    /// D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.
+    pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
+        let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
+            with_pair!(interaction.laws, laws => {
+                let kernel = measures::Stiffness { laws };
+                sweep_all(&mut interaction.bonds, sums, &kernel, source);
+            });
+        });
+        columns.try_into().expect("six columns")
+    }
+
+    /// Stress of each owned point (Pa): columns xx, yy, zz, xy, yz, xz; at the displacements of the
+    /// last [evaluation](Self::evaluate).
+    pub fn stress(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
+        let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
+            with_pair!(interaction.laws, laws => {
+                let kernel = measures::Stress { law: laws[0] };
+                sweep_all(&mut interaction.bonds, sums, &kernel, source);
+            });
+        });
+        columns.try_into().expect("six columns")
+    }
+
+    /// Weighted volume m (m⁵) and dilatation θ of each owned point, at the displacements of the last
+    /// [evaluation](Self::evaluate).
+    pub fn dilatation(&mut self, model: &Model<D>) -> [Vec<f64>; 2] {
+        let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
+            fn is_linear<L: Law<D>, const D: usize>(_: &[L; 2]) -> bool {
+                L::LINEAR
+            }
+            let bonds = &mut interaction.bonds;
+            if with_pair!(&interaction.laws, laws => is_linear::<_, D>(laws)) {
+                sweep_all(bonds, sums, &measures::Dilatation::<true>, source);
+            } else {
+                sweep_all(bonds, sums, &measures::Dilatation::<false>, source);
+            }
+        });
+        let [weighted_volume, mut growth] = columns.try_into().expect("two columns");
+        for (growth, volume) in growth.iter_mut().zip(&weighted_volume) {
+            *growth = if *volume > 0.0 {
+                D as f64 * *growth / volume
+            } else {
+                0.0
+            };
+        }
+        [weighted_volume, growth]
+    }
+}
+
+/// Runs a kernel over all bonds between two blocks.
+pub(super) fn sweep_all<K: Kernel<D>, const D: usize>(
+    bonds: &mut BlockBonds,
+    sums: &mut [Vec<f64>],
+    kernel: &K,
+    source: Source<'_, D>,
+) {
+    let owned = sums.first().map_or(0, Vec::len);
+    let results = <(K::Sums, K::Rare)>::columns_mut(sums);
+    sweep(bonds, 0..owned, results, kernel, source);
+}
