@@ -8,6 +8,7 @@
 
 mod any;
 pub mod bond;
+mod correspondence;
 mod declaration;
 mod elastic_plastic_pmb;
 mod force_state;
@@ -35,6 +36,7 @@ registration::register! {
     normalised::Normalised,
     linear_microelastic::LinearMicroelastic,
     ordinary::Ordinary,
+    correspondence::Correspondence,
 }
 
 use crate::lanes::{Lanes, Numbers, Simd};
