@@ -4,6 +4,7 @@
 mod commands;
 mod communicator;
 mod contact;
+mod correspondence;
 mod crack_branching;
 mod decks;
 mod decomposition;
@@ -19,6 +20,7 @@ mod interfaces;
 mod invariants;
 mod laws;
 mod library;
+mod ordinary_history;
 mod plasticity;
 mod readers;
 mod restart;

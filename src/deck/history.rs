@@ -143,6 +143,19 @@ const ENTRIES: [(&str, usize); 6] = [
     ("xz", 3),
 ];
 
+/// Names of the entries of a tensor, row by row.
+const TENSOR: [(&str, usize); 9] = [
+    ("xx", 1),
+    ("xy", 2),
+    ("xz", 3),
+    ("yx", 2),
+    ("yy", 2),
+    ("yz", 3),
+    ("zx", 3),
+    ("zy", 3),
+    ("zz", 3),
+];
+
 /// Names of the entries of a vector.
 const AXES: [(&str, usize); 3] = [("x", 1), ("y", 2), ("z", 3)];
 
@@ -157,7 +170,8 @@ fn component(
     let names: &[(&str, usize)] = match field.components() {
         1 => &[],
         3 => &AXES,
-        _ => &ENTRIES,
+        6 => &ENTRIES,
+        _ => &TENSOR,
     };
     let there = names.iter().filter(|(_, least)| *least <= scope.dimension);
     match component {

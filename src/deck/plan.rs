@@ -540,15 +540,26 @@ pub enum Field {
     WeightedVolume,
     /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz.
     Stress,
+    /// Σ T⊗Y Ṽ over the volume that the deformed body has for one of the undeformed: Cauchy's stress,
+    /// Pa, in the same order.
+    CauchyStress,
+    /// von Mises' equivalent of Cauchy's stress, Pa.
+    VonMisesStress,
+    /// F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row; I where too few are left.
+    DeformationGradient,
     /// Number of intact bonds.
     Neighbours,
+    /// Number of the point's bonds that have broken since the start.
+    BrokenBonds,
+    /// 1 where a point has too few bonds left for its law and carries no force, else 0.
+    Singular,
     /// The rank that owns the point.
     Rank,
 }
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 16] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -558,7 +569,12 @@ impl Field {
         Self::Dilatation,
         Self::WeightedVolume,
         Self::Stress,
+        Self::CauchyStress,
+        Self::VonMisesStress,
+        Self::DeformationGradient,
         Self::Neighbours,
+        Self::BrokenBonds,
+        Self::Singular,
         Self::Rank,
     ];
 
@@ -574,7 +590,12 @@ impl Field {
             Self::Dilatation => "dilatation",
             Self::WeightedVolume => "weighted_volume",
             Self::Stress => "stress",
+            Self::CauchyStress => "cauchy_stress",
+            Self::VonMisesStress => "von_mises_stress",
+            Self::DeformationGradient => "deformation_gradient",
             Self::Neighbours => "neighbours",
+            Self::BrokenBonds => "broken_bonds",
+            Self::Singular => "singular",
             Self::Rank => "rank",
         }
     }
@@ -586,18 +607,25 @@ impl Field {
             Self::Velocity => "m/s",
             Self::Acceleration => "m/s^2",
             Self::ForceDensity => "N/m^3",
-            Self::Damage | Self::Dilatation | Self::Neighbours | Self::Rank => "1",
+            Self::Damage
+            | Self::Dilatation
+            | Self::DeformationGradient
+            | Self::Neighbours
+            | Self::BrokenBonds
+            | Self::Singular
+            | Self::Rank => "1",
             Self::WeightedVolume => "m^5",
-            Self::Stress => "Pa",
+            Self::Stress | Self::CauchyStress | Self::VonMisesStress => "Pa",
             Self::StrainEnergyDensity => "J/m^3",
         }
     }
 
-    /// 3 for vectors and 6 for symmetric tensors (padded with 0 in 1-D and 2-D), 1 for scalars.
+    /// 3 for vectors, 6 for symmetric tensors and 9 for others (padded in 1-D and 2-D), 1 for scalars.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement | Self::Velocity | Self::Acceleration | Self::ForceDensity => 3,
-            Self::Stress => 6,
+            Self::Stress | Self::CauchyStress => 6,
+            Self::DeformationGradient => 9,
             _ => 1,
         }
     }

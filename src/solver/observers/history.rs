@@ -96,6 +96,9 @@ impl HistoryObserver {
         vector(&mut columns, "cracked_lower".to_owned(), "m");
         vector(&mut columns, "cracked_upper".to_owned(), "m");
         columns.push(("overshoot_energy".to_owned(), "J"));
+        if simulation.forces.can_be_singular() {
+            columns.push(("singular_points".to_owned(), "1"));
+        }
         let mut reactions = Vec::new();
         for Reaction { set, span } in &plan.history.reactions {
             let points = members(plan, &simulation.model, *set);
@@ -192,9 +195,13 @@ impl HistoryObserver {
         let cracked = Cracked::new(simulation, snapshot);
         let neighbours = snapshot.stored.neighbours.iter();
         let intact: u64 = neighbours.map(|count| *count as u64).sum();
-        let mut counts = [intact, cracked.points];
+        let singular = simulation.forces.can_be_singular().then(|| {
+            let all = simulation.forces.singular(model);
+            all.iter().filter(|value| **value > 0.0).count() as u64
+        });
+        let mut counts = [intact, cracked.points, singular.unwrap_or(0)];
         comm.sum(&mut counts);
-        let [intact, cracked_points] = counts;
+        let [intact, cracked_points, singular_points] = counts;
         let (lower, upper) = cracked.extent(comm);
 
         let energy = own[0] + own[1] + own[2] + dissipated - work;
@@ -225,6 +232,7 @@ impl HistoryObserver {
         values.extend(&lower[..D]);
         values.extend(&upper[..D]);
         values.push(energies.overshoot);
+        values.extend(singular.map(|_| singular_points as f64));
         values.extend(reactions);
         values.extend(self.probe_values(simulation));
         for front in &self.fronts {
