@@ -137,7 +137,7 @@ fn a_cycle_of_shear_yields_at_the_yield_stress_and_dissipates_its_area() {
         for target in [3.0, -2.0, 2.5] {
             while gamma != target {
                 let left: f64 = target - gamma;
-                gamma += left.clamp(-0.02, 0.02);
+                gamma += left.clamp(-0.1, 0.1);
                 shear(&mut simulation, gamma * yields, 0.0);
                 // Elastic, perfectly plastic.
                 let trial = (gamma - plastic).clamp(-1.0, 1.0);
