@@ -5,6 +5,7 @@ mod commands;
 mod communicator;
 mod contact;
 mod crack_branching;
+mod crack_paths;
 mod decks;
 mod decomposition;
 mod dynamics;

@@ -60,6 +60,8 @@ fn used_sets(deck: &Deck) -> IndexSet<&str> {
     let conditions = deck.condition.values().map(|table| &table.get_ref().set);
     let initials = deck.initial.values().map(|table| &table.get_ref().set);
     let tips = history.tip.values().map(|table| &table.get_ref().set);
+    let cracks = history.crack.values().map(|table| &table.get_ref().set);
+    let forces = history.force.values().map(|table| &table.get_ref().set);
     let zones = deck.damage.values().flat_map(|table| {
         let Damage::CriticalStretch(law) = table.get_ref();
         &law.get_ref().no_failure
@@ -67,6 +69,8 @@ fn used_sets(deck: &Deck) -> IndexSet<&str> {
     conditions
         .chain(initials)
         .chain(tips)
+        .chain(cracks)
+        .chain(forces)
         .chain(zones)
         .chain(&history.reactions)
         .map(|name| &name.get_ref()[..])
