@@ -7,7 +7,9 @@ use super::number::{Edges, Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
-use super::{bodies, conditions, history, interface, materials, names, outputs, sets, shapes};
+use super::{
+    bodies, conditions, damage, history, interface, materials, names, outputs, sets, shapes,
+};
 use crate::dimension::Dimension;
 use crate::error::Result;
 
@@ -29,7 +31,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         materials::material(&scope, dimension, name, table)
     })?;
     let damages = resolve_each(&deck.damage, |name, table| {
-        materials::damage(&scope, &sets, name, table)
+        damage::damage(&scope, &sets, name, table)
     })?;
     let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(&scope, deck, &bodies)?;

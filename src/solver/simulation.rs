@@ -129,6 +129,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             loads: conditions.have_loads(),
             supports: conditions.have_supports(),
             damping: model.damping.iter().any(|rate| *rate > 0.0),
+            damage: plan.bodies.iter().any(|body| body.damage.is_some()),
         };
         let mut fields = Fields::new(&model, needs);
         apply_initials(plan, comm, &model, &mut fields)?;
@@ -153,7 +154,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         simulation
             .conditions
             .load(&mut simulation.fields, 0.0, true);
-        simulation.evaluate(Evolution::Step);
+        simulation.evaluate(Evolution::Step(0.0));
         simulation.guide();
         simulation.fields.add_damped_energy(&simulation.model, 0.0);
         simulation.bad = simulation.first_bad();
@@ -174,7 +175,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let time = self.clock.time();
         self.conditions.place(&mut self.fields, time, step);
         self.times.motion += start.elapsed();
-        self.evaluate(Evolution::Step);
+        self.evaluate(Evolution::Step(step));
         let start = Instant::now();
         let (model, fields) = (&self.model, &mut self.fields);
         self.conditions.load(fields, time, false);
@@ -196,11 +197,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let acting = Acting {
             displacement: &mut fields.displacement,
             force: &mut fields.internal_force,
-            freed: &mut fields.freed_energy,
         };
         let times = &mut self.times.forces;
         self.forces
             .evaluate(self.comm, &self.model, acting, evolution, times);
+        if let Evolution::Step(step) = evolution {
+            fields.book_broken(&self.model, self.forces.broken(), step);
+        }
     }
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
