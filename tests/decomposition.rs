@@ -34,6 +34,10 @@ shape.box = { lower = [0, 0.012], upper = [0.04, 0.016] }
 [crack.notch.segment]
 from = [-1, 0]
 to = [0.012, 0]
+[crack.slit.segment]
+from = [0.02, -0.008]
+to = [0.025, -0.004]
+width = 1.2e-3
 [set]
 top.where = 'y > 0.013'
 bottom.where = 'y < -0.012 + dx'
@@ -52,6 +56,8 @@ fields = ['displacement', 'velocity', 'acceleration', 'force_density', 'damage',
 [history]
 every_steps = 3
 reactions = ['rim']
+force.slanted = { set = 'rim', direction = [1, 2] }
+crack.notch = { from = [0, 0], threshold = 0.2 }
 probe.ahead.at = [0.02, 0]
 front.wave = { from = [0.02, -0.012], direction = [0.1, 1], field = 'velocity', threshold = 0.5 }
 front.strain = { from = [0, 0], direction = [1, 0], length = 0.03, field = 'strain_energy_density', threshold = 1 }

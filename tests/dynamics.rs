@@ -365,6 +365,8 @@ fn supports_do_the_work_that_becomes_energy() {
             displacement = ['0.01*(1 - cos(pi*min(t, 60)/60))*x/40', 'free']
             [history]
             reactions = ['left', 'right']
+            force.pull = {{ set = 'right', direction = [2, 0] }}
+            force.slanted = {{ set = 'left', direction = [3, -4] }}
             [time]
             end = 100
             step = {step}
@@ -390,6 +392,12 @@ fn supports_do_the_work_that_becomes_energy() {
             };
             assert!(column("reaction_right_x") > 0.0);
             assert!(column("reaction_left_x") < 0.0);
+            // Along a direction, of any length.
+            assert_eq!(column("force_pull"), column("reaction_right_x"));
+            let [x, y] = ["reaction_left_x", "reaction_left_y"].map(column);
+            let slanted = 0.6 * x - 0.8 * y;
+            let difference = (column("force_slanted") - slanted).abs();
+            assert!(difference < 1e-14 * slanted.abs(), "{difference}");
             let model = &simulation.model;
             let pulled = (0..model.owned()).find(|k| model.position(*k)[0] > 39.0);
             let u = simulation.fields.displacement[0][pulled.unwrap()];

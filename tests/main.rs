@@ -6,6 +6,7 @@ mod communicator;
 mod contact;
 mod correspondence;
 mod crack_branching;
+mod crack_paths;
 mod decks;
 mod decomposition;
 mod dynamics;

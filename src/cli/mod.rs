@@ -11,6 +11,7 @@ mod launch;
 mod machine_limits;
 mod memory;
 mod plot;
+mod plot_paths;
 mod progress;
 mod report;
 mod run;
@@ -89,7 +90,7 @@ enum Command {
 /// Run a deck, alone or under mpirun.
 ///
 /// Writes result.vtkhdf (opens in ParaView 5.12 and later), result.xdmf (for older ParaView) and
-/// history.csv into the output folder.
+/// history.csv into the output folder, and crack_NAME.csv for each crack whose path the deck asks for.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -179,7 +180,8 @@ Examples:
   fissure plot out/plate/result.vtkhdf
   fissure plot out/plate/result.vtkhdf --field strain_energy_density --time 25e-6
   fissure plot out/plate/result.vtkhdf --time all -o frames.png     frames_0000.png, …
-  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0")]
+  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0
+  fissure plot out/plate/result.vtkhdf --path out/plate/crack_main.csv")]
 struct PlotArguments {
     /// The result, a .vtkhdf file.
     result: PathBuf,
@@ -203,6 +205,11 @@ struct PlotArguments {
     /// Draw only the points nearest to this plane of a solid, such as z=0.005.
     #[arg(long, value_name = "AXIS=POSITION")]
     slice: Option<String>,
+
+    /// Draw lines over a plane picture: a CSV file with columns x and y (m), and branch where there are
+    /// several, such as crack_NAME.csv; may be repeated.
+    #[arg(long, value_name = "FILE.csv")]
+    path: Vec<PathBuf>,
 
     /// Range of the colours, such as 0,1 [default: that of the values].
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]

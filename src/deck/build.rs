@@ -55,9 +55,11 @@ impl Plan {
             history: History {
                 every: Interval::Seconds(end / ROWS),
                 reactions: Vec::new(),
+                support_forces: Vec::new(),
                 damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
                 probes: Vec::new(),
                 fronts: Vec::new(),
+                cracks: Vec::new(),
                 tips: Vec::new(),
             },
             checkpoint: CheckpointRule::default(),

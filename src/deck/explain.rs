@@ -77,6 +77,10 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     for front in history.front.values_mut().map(|table| table.get_mut()) {
         front.radius = front.radius.take().or(Some(grid.horizon.clone()));
     }
+    for crack in history.crack.values_mut().map(|table| table.get_mut()) {
+        let threshold = history.damage_threshold.clone();
+        crack.threshold = crack.threshold.take().or(threshold);
+    }
     for tip in history.tip.values_mut().map(|table| table.get_mut()) {
         let threshold = history.damage_threshold.clone();
         tip.threshold = tip.threshold.take().or(threshold);

@@ -465,6 +465,9 @@ pub enum Crack {
         from: Vector,
         /// The other end.
         to: Vector,
+        /// Width in m of a cut with two faces, half on each side; 0 if not given.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
     },
     /// A parallelogram (3-D).
     Rectangle {
@@ -474,6 +477,9 @@ pub enum Crack {
         edge_a: Vector,
         /// The edge from the corner to the other neighbouring one.
         edge_b: Vector,
+        /// As of a segment.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
     },
     /// A flat disc (3-D).
     Disc {
@@ -483,6 +489,9 @@ pub enum Crack {
         normal: Vector,
         /// Radius.
         radius: Number,
+        /// As of a segment.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
     },
 }
 
@@ -581,9 +590,12 @@ pub struct History {
     /// Steps between rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<NonZeroU64>>,
-    /// Sets whose reaction force is recorded.
+    /// Sets whose reaction force is recorded, by component.
     #[serde(default)]
     pub reactions: Vec<Text>,
+    /// Forces of supports along a direction, by name.
+    #[serde(default)]
+    pub force: Tables<SupportForce>,
     /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage_threshold: Option<Number>,
@@ -593,6 +605,9 @@ pub struct History {
     /// Fronts that are followed along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
+    /// Cracks whose path and length are found, by name; plane problems.
+    #[serde(default)]
+    pub crack: Tables<CrackPath>,
     /// Crack tips that are followed, by name.
     #[serde(default)]
     pub tip: Tables<Tip>,
@@ -612,6 +627,31 @@ pub struct Checkpoint {
     /// Simulated time between checkpoints in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_time: Option<Number>,
+}
+
+/// The force of the supports on a set along a direction.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportForce {
+    /// The set.
+    pub set: Text,
+    /// The direction in which the force counts, of any length.
+    pub direction: Vector,
+}
+
+/// A crack: the lines through the middle of the damage that hangs together from a place on, each
+/// branch by itself.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrackPath {
+    /// Where the crack starts, m; damage within one horizon of it belongs to the crack.
+    pub from: Vector,
+    /// The points that are looked at; all if not given.
+    #[serde(default = "all_points")]
+    pub set: Text,
+    /// What the damage must exceed; `damage_threshold` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<Number>,
 }
 
 /// A place to watch.

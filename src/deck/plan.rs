@@ -323,6 +323,8 @@ pub enum Crack {
         from: [f64; 3],
         /// The other.
         to: [f64; 3],
+        /// From face to face, half on each side; 0 for a cut without width.
+        width: f64,
     },
     /// A parallelogram.
     Rectangle {
@@ -332,6 +334,8 @@ pub enum Crack {
         edge_a: [f64; 3],
         /// The other edge from it.
         edge_b: [f64; 3],
+        /// As of a segment.
+        width: f64,
     },
     /// A flat disc.
     Disc {
@@ -341,6 +345,8 @@ pub enum Crack {
         normal: [f64; 3],
         /// Radius.
         radius: f64,
+        /// As of a segment.
+        width: f64,
     },
 }
 
@@ -442,14 +448,18 @@ pub struct Output {
 pub struct History {
     /// How often.
     pub every: Interval,
-    /// Sets whose reaction force is recorded.
+    /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
+    /// Forces of supports along a direction.
+    pub support_forces: Vec<SupportForce>,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
     /// Places that are watched.
     pub probes: Vec<Probe>,
     /// Fronts that are followed.
     pub fronts: Vec<Front>,
+    /// Cracks whose path is found.
+    pub cracks: Vec<CrackPath>,
     /// Crack tips that are followed.
     pub tips: Vec<Tip>,
 }
@@ -461,6 +471,34 @@ pub struct Reaction {
     pub set: usize,
     /// Where it is named.
     pub span: Range<usize>,
+}
+
+/// A set on which the force of the supports along a direction is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SupportForce {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Index of the set.
+    pub set: usize,
+    /// Unit vector.
+    pub direction: [f64; 3],
+}
+
+/// A crack whose path is found.
+#[derive(Debug, Clone)]
+pub struct CrackPath {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Where it starts, m.
+    pub from: [f64; 3],
+    /// Index of the set that is looked at.
+    pub set: usize,
+    /// What the damage must exceed.
+    pub threshold: f64,
 }
 
 /// A place whose nearest point is followed.

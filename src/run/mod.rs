@@ -20,6 +20,7 @@
 //! its plan.
 
 mod checkpoints;
+mod crack_files;
 mod decisions;
 mod files;
 mod observer;

@@ -27,9 +27,11 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
     };
     plan.history.every = Interval::Steps(1);
     plan.history.reactions.clear();
+    plan.history.support_forces.clear();
     plan.history.damage_threshold = 0.0;
     plan.history.probes.clear();
     plan.history.fronts.clear();
+    plan.history.cracks.clear();
     plan.history.tips.clear();
     plan.checkpoint = Default::default();
     format!("{WITHOUT_DECK}{plan:#?}\n")

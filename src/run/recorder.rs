@@ -1,5 +1,6 @@
 //! Writing result and history when they are due.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use crate::comm::{Communicator, IdOrder, agree};
@@ -16,6 +17,7 @@ use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
+use super::crack_files;
 use super::files::Files;
 use super::observer::{Observer, Row};
 
@@ -34,6 +36,8 @@ pub struct Recorder<'a> {
     pub last_row: Option<HistoryRow>,
     /// Time spent here.
     pub spent: Duration,
+    /// Where the paths of cracks go.
+    folder: PathBuf,
     fields: Vec<Field>,
     outputs: Schedule,
     rows: Schedule,
@@ -118,6 +122,7 @@ impl<'a> Recorder<'a> {
             order,
             last_row: None,
             spent: Duration::ZERO,
+            folder: files.folder.clone(),
             fields: plan.output.fields.clone(),
             outputs,
             rows,
@@ -190,6 +195,8 @@ impl<'a> Recorder<'a> {
             let data: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
             self.file
                 .write_step(simulation.clock.time(), simulation.clock.number(), &data)?;
+            let cracks = self.observer.crack_paths(simulation, &snapshot);
+            crack_files::write(simulation.comm, &self.folder, &cracks)?;
         }
         self.spent += start.elapsed();
         Ok(())

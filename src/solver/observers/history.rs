@@ -1,4 +1,4 @@
-//! The history of a run: energies and other sums, probes, fronts and crack tips.
+//! The history of a run: energies and other sums, probes, fronts, crack paths and crack tips.
 
 use rayon::prelude::*;
 
@@ -9,6 +9,8 @@ use crate::error::Result;
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
+use super::centre_line::{self, Branch};
+use super::crack_path::CrackPath;
 use super::front::Front;
 use super::nearest::nearest;
 use super::snapshot::Snapshot;
@@ -30,8 +32,11 @@ struct Probe {
 pub struct HistoryObserver {
     columns: Vec<(String, &'static str)>,
     reactions: Vec<Vec<u32>>,
+    /// Points, and the direction in which the force on them counts.
+    support_forces: Vec<(Vec<u32>, [f64; 3])>,
     probes: Vec<Probe>,
     fronts: Vec<Front>,
+    cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
     /// Energy (J) and intact bonds in the first row.
     start: Option<(f64, u64)>,
@@ -111,6 +116,14 @@ impl HistoryObserver {
                 "N",
             );
         }
+        let mut support_forces = Vec::new();
+        for rule in &plan.history.support_forces {
+            let points = members(plan, &simulation.model, rule.set);
+            let key = format!("[history.force.{}] set", rule.name);
+            not_empty(plan, comm, rule.set, &points, (&key, rule.span.clone()))?;
+            support_forces.push((points, rule.direction));
+            columns.push((format!("force_{}", rule.name), "N"));
+        }
         let mut probes = Vec::new();
         for plan::Probe { name, at, .. } in &plan.history.probes {
             let point = nearest(simulation, *at).own;
@@ -123,6 +136,12 @@ impl HistoryObserver {
             fronts.push(Front::new(simulation, front)?);
             columns.push((format!("front_{}", front.name), "m"));
         }
+        let mut cracks = Vec::new();
+        for rule in &plan.history.cracks {
+            cracks.push(CrackPath::new(simulation, rule)?);
+            columns.push((format!("crack_{}_length", rule.name), "m"));
+            columns.push((format!("crack_{}_branches", rule.name), "1"));
+        }
         let mut tips = Vec::new();
         for tip in &plan.history.tips {
             tips.push(Tip::new(simulation, tip)?);
@@ -134,8 +153,10 @@ impl HistoryObserver {
         Ok(Self {
             columns,
             reactions,
+            support_forces,
             probes,
             fronts,
+            cracks,
             tips,
             start: None,
         })
@@ -167,6 +188,20 @@ impl HistoryObserver {
         }
     }
 
+    /// The name of each crack whose path is found, and its branches now; the same on all ranks.
+    /// Collective.
+    pub fn crack_paths<const D: usize>(
+        &self,
+        simulation: &Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) -> Vec<(&str, Vec<Branch>)> {
+        let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        self.cracks
+            .iter()
+            .map(|crack| (crack.name(), crack.branches(simulation, damage)))
+            .collect()
+    }
+
     /// The present row; collective.
     pub fn row<const D: usize>(
         &mut self,
@@ -183,7 +218,8 @@ impl HistoryObserver {
         }
         sums.push(dissipated);
         sums.push(sum(fields.overshoot_energy.as_deref().unwrap_or_default()));
-        for members in &self.reactions {
+        let directed = self.support_forces.iter().map(|(members, _)| members);
+        for members in self.reactions.iter().chain(directed) {
             sums.extend(simulation.conditions.reaction(model, fields, members));
         }
         let sums = reduce(comm, &mut sums);
@@ -233,12 +269,22 @@ impl HistoryObserver {
         values.extend(&upper[..D]);
         values.push(energies.overshoot);
         values.extend(singular.map(|_| singular_points as f64));
+        let (reactions, directed) = reactions.split_at(D * self.reactions.len());
         values.extend(reactions);
+        for (force, (_, direction)) in directed.chunks_exact(D).zip(&self.support_forces) {
+            let products = force.iter().zip(direction).map(|(f, d)| f * d);
+            values.push(products.sum());
+        }
         values.extend(self.probe_values(simulation));
         for front in &self.fronts {
             values.push(front.position(simulation, snapshot));
         }
         let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        for crack in &self.cracks {
+            let branches = crack.branches(simulation, damage);
+            values.push(centre_line::length(&branches));
+            values.push(branches.len() as f64);
+        }
         for tip in &mut self.tips {
             values.extend(tip.row(simulation, damage));
         }
