@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use fissure::comm::Communicator;
 use fissure::deck::expression::Expression;
 use fissure::deck::plan::{
-    Action, Crack, CriticalStretch, Interval, Law, Material, Plan, Selector, Shape, Toughness,
+    Action, Crack, Damage, DamageRule, Interval, Law, Material, Plan, Selector, Shape, Toughness,
 };
 use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
@@ -58,7 +58,10 @@ pub fn plate(end: f64) -> Result<Plan> {
         lower: [0.0; 3],
         upper: [0.06, 0.03, 0.0],
     };
-    let brittle = CriticalStretch::new(Toughness::FractureEnergy(135.0));
+    let brittle = Damage::new(
+        DamageRule::CriticalStretch,
+        Toughness::FractureEnergy(135.0),
+    );
     plan.add_body("plate", glass, Some(brittle), plate, SPACING);
     let notch = Crack::Segment {
         from: [0.0, 0.015, 0.0],

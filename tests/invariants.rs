@@ -3,7 +3,7 @@
 
 use crate::support::{displace, force, forces, largest_force, plan, simulate, simulate_on};
 use fissure::dimension::Dimension;
-use fissure::material::{Declaration, declarations};
+use fissure::material::{Declaration, Invariants, declarations};
 use fissure::solver::Simulation;
 use fissure::solver::bonds::Evolution;
 use fissure::solver::motion::Kept;
@@ -43,11 +43,31 @@ impl Case {
 
     /// Whether bonds can break.
     fn can_break(&self) -> bool {
-        self.law.critical_stretch.is_some()
+        !self.damages(0.0).is_empty()
+    }
+
+    /// What its bonds can break by, with this α.
+    fn damages(&self, alpha: f64) -> Vec<String> {
+        let stretch = self.law.critical_stretch.map(|_| damage(alpha));
+        // About the energy of a critical stretch of 0.02.
+        let energy =
+            format!("damage.brittle.energy = {{ fracture_energy = 0.004, alpha = {alpha} }}");
+        let energy = self.law.breaks_by_energy.then_some(energy);
+        // With an influence only where all volumes are whole.
+        let influenced = ["influence", "diehl2016"];
+        let influenced = influenced.iter().any(|word| self.example.contains(word));
+        let energy = energy.filter(|_| !influenced);
+        stretch.into_iter().chain(energy).collect()
+    }
+
+    /// What holds for it.
+    fn invariants(&self) -> Invariants {
+        let plan = plan(&deck("plane-stress", &self.table(), "none", ""));
+        (self.law.invariants)(&plan.bodies[0].material.law.values)
     }
 
     fn is_conservative(&self) -> bool {
-        self.law.conservative
+        self.invariants().conservative
     }
 }
 
@@ -200,8 +220,15 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
 fn forces_are_equal_and_opposite() {
     fn check<const D: usize>(mut simulation: Simulation<D>) {
         displace(&mut simulation, wave);
+        let laws = simulation.plan.bodies.iter().map(|body| &body.material.law);
+        let mut kept = laws.map(|law| (law.declaration.invariants)(&law.values));
+        let bound = match kept.all(|invariants| invariants.angular_momentum) {
+            true => 1e-12,
+            // The square of a strain, of the part that the family does not see.
+            false => 1e-2,
+        };
         for [net, gross] in moments(&simulation) {
-            assert!(net.abs() <= 1e-12 * gross, "moment {net} of {gross}");
+            assert!(net.abs() <= bound * gross, "moment {net} of {gross}");
         }
         for d in 0..D {
             let (mut net, mut gross) = (0.0_f64, 0.0);
@@ -216,7 +243,9 @@ fn forces_are_equal_and_opposite() {
     for case in cases().filter(Case::can_break) {
         for alpha in [0.0, 0.25] {
             let deck = deck("3d", &case.table(), "linear", ", damage = 'brittle'");
-            simulate(&format!("{deck}{}", damage(alpha)), check::<3>);
+            for damage in case.damages(alpha) {
+                simulate(&format!("{deck}{damage}"), check::<3>);
+            }
         }
     }
     for deck in two_blocks() {
@@ -302,9 +331,11 @@ fn the_force_is_the_slope_of_the_energy() {
     let breakable = |case: &Case| case.can_break() && case.is_conservative();
     for case in cases().filter(breakable) {
         let body = |dimension| deck(dimension, &case.table(), "exact", ", damage = 'brittle'");
-        let breaking = |dimension| body(dimension) + &damage(0.25);
-        simulate(&breaking("plane-stress"), check::<2>);
-        simulate(&breaking("3d"), check::<3>);
+        for damage in case.damages(0.25) {
+            let breaking = |dimension| body(dimension) + &damage;
+            simulate(&breaking("plane-stress"), check::<2>);
+            simulate(&breaking("3d"), check::<3>);
+        }
     }
     for deck in two_blocks() {
         simulate(&deck, check::<2>);
@@ -351,13 +382,15 @@ fn both_ends_of_a_bond_break_together() {
     for case in cases().filter(Case::can_break) {
         for alpha in [0.0, 0.25] {
             let body = |dimension| deck(dimension, &case.table(), "linear", ", damage = 'brittle'");
-            let breaking = |dimension| body(dimension) + &damage(alpha);
-            if case.has_line() {
-                together::<1>(&breaking("1d"));
+            for damage in case.damages(alpha) {
+                let breaking = |dimension| body(dimension) + &damage;
+                if case.has_line() {
+                    together::<1>(&breaking("1d"));
+                }
+                together::<2>(&breaking("plane-stress"));
+                together::<2>(&breaking("plane-strain"));
+                together::<3>(&breaking("3d"));
             }
-            together::<2>(&breaking("plane-stress"));
-            together::<2>(&breaking("plane-strain"));
-            together::<3>(&breaking("3d"));
         }
     }
     for deck in two_blocks() {
@@ -419,7 +452,7 @@ fn a_bond_breaks_at_the_critical_stretch_and_not_before() {
         assert_eq!(count_intact(&mut simulation), 0);
         assert_eq!(largest_force(&simulation), 0.0);
         // What the bond held has been set free, half of it at each end.
-        let set_free: f64 = simulation.fields.freed_energy.iter().sum();
+        let set_free: f64 = simulation.fields.freed_energy.iter().flatten().sum();
         let held: f64 = stored.energy.iter().sum();
         assert!((set_free / held - 1.0).abs() < 1e-5);
         // Broken for good.

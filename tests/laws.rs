@@ -3,7 +3,7 @@
 use fissure::comm::threads;
 use fissure::deck::expression::Expression;
 use fissure::deck::plan::{
-    CriticalStretch, Law, Material, Plan, Shape, StepRule, Toughness, VolumeCorrection,
+    Damage, DamageRule, Law, Material, Plan, Shape, StepRule, Toughness, VolumeCorrection,
 };
 use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
@@ -20,7 +20,17 @@ fn key(key: &Key) -> String {
         }
         _ => String::new(),
     };
-    format!("`{}`{words}: {}", key.name, key.meaning)
+    format!("`{}`{words}", key.name)
+}
+
+/// Keys with what they mean, said once for those in a row that mean the same.
+fn keys(all: &[Key]) -> Vec<String> {
+    let same = all.chunk_by(|a, b| a.meaning == b.meaning);
+    same.map(|keys| {
+        let names: Vec<String> = keys.iter().map(key).collect();
+        format!("{}: {}", names.join(", "), keys[0].meaning)
+    })
+    .collect()
 }
 
 fn row(law: &Declaration) -> String {
@@ -31,12 +41,12 @@ fn row(law: &Declaration) -> String {
     if law.no_line.is_some() {
         force += "; 2-D and 3-D";
     }
-    force += match law.critical_stretch {
-        Some(_) => "; can break",
-        None => "; cannot break",
+    force += match (law.critical_stretch, law.breaks_by_energy) {
+        (Some(_), _) => "; can break",
+        (None, true) => "; can break by energy",
+        (None, false) => "; cannot break",
     };
-    let keys: Vec<String> = law.keys.iter().map(key).collect();
-    let cells = format!("{force} @ {}", keys.join("; "));
+    let cells = format!("{force} @ {}", keys(law.keys).join("; "));
     let cells = cells.replace('|', "\\|").replace(" @ ", " | ");
     format!("| `{}` | {cells} |", law.name)
 }
@@ -69,7 +79,7 @@ fn names_of_laws_and_keys_are_said_once_and_have_a_meaning() {
 }
 
 /// A plan of a small body with a law, built in Rust.
-fn body(dimension: Dimension, law: Law, damage: Option<CriticalStretch>) -> Plan {
+fn body(dimension: Dimension, law: Law, damage: Option<Damage>) -> Plan {
     let mut plan = Plan::new(dimension, 3.0, 1.0);
     plan.time.step = StepRule::Fixed(0.01);
     plan.volume_correction = VolumeCorrection::Linear;
@@ -97,7 +107,7 @@ fn a_law_of_a_plan_in_rust_is_checked_before_the_run() {
     let law = |name| Law::named(name).unwrap();
     let line = Dimension::Line { cross_section: 1.0 };
     let space = Dimension::Space;
-    let brittle = CriticalStretch::new(Toughness::FractureEnergy(1.0));
+    let brittle = Damage::new(DamageRule::CriticalStretch, Toughness::FractureEnergy(1.0));
     let found = fault::<3>(&body(space, law("elastic_plastic_pmb"), None));
     assert_eq!(
         found.unwrap(),

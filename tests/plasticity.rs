@@ -113,7 +113,7 @@ fn a_bond_breaks_at_the_critical_stretch_and_frees_what_it_held() {
             assert!(pulled > 0.0);
         }
         assert_eq!(pull(&mut simulation, critical), 0.0);
-        let freed: f64 = simulation.fields.freed_energy.iter().sum();
+        let freed: f64 = simulation.fields.freed_energy.iter().flatten().sum();
         let [held, dissipated] = energies(&mut simulation);
         assert_eq!(held, 0.0);
         let square = MICROMODULUS * SECTION * SECTION;
@@ -188,7 +188,7 @@ fn work_goes_into_energy_and_dissipation() {
                 let size = 1e-6;
                 let mut after = |step: f64| {
                     simulation.fields.displacement[d][point] += step;
-                    simulation.evaluate(fissure::solver::bonds::Evolution::Step);
+                    simulation.evaluate(fissure::solver::bonds::Evolution::Step(0.0));
                     let after = total(&mut simulation);
                     simulation.undo(&kept);
                     after

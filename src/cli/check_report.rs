@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use fissure::damage::DamageLaw;
 use fissure::deck::Plan;
 use fissure::deck::plan::{Body, PointSource};
 use fissure::dimension::Dimension;
@@ -41,8 +42,15 @@ pub fn body(report: &mut Report, plan: &Plan, body: &Body) {
     match laws.damage {
         None => report.line("damage", "none"),
         Some(damage) => {
-            report.line("critical stretch", format_args!("{:.4e}", damage.critical));
-            report.line("alpha", damage.alpha);
+            match damage {
+                DamageLaw::CriticalStretch(law) => {
+                    report.line("critical stretch", format_args!("{:.4e}", law.critical));
+                }
+                DamageLaw::BondEnergy(law) => {
+                    report.line("critical energy", format_args!("{:.4e} J/m⁶", law.critical));
+                }
+            }
+            report.line("alpha", damage.alpha());
         }
     }
     if let PointSource::Lattice { spacing, .. } = body.points {

@@ -1,5 +1,5 @@
 //! When a bond breaks, decided by the same operations from both ends: stretches are compared by x of
-//! [`crate::material::bond`], which needs no root.
+//! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states.
 
 use crate::lanes::{Lanes, Simd};
 use crate::material::bond::{NEAR, growth_of};
@@ -12,9 +12,14 @@ pub enum Criterion {
     Never,
     /// At this stretch.
     Stretch(f64),
-    /// At the smaller of the thresholds of the two points; the critical stretches of their blocks are
-    /// the part of it that a law may scale, 0 where a block has none.
+    /// At the smaller of the threshold stretches of the two points; the critical stretches of their
+    /// blocks are the part of it that a law may scale, 0 where a block has none.
     Thresholds([f64; 2]),
+    /// Pulled, when the work of the force states reaches this much, J/m⁶.
+    Work(f64),
+    /// Pulled, when the work of the force states reaches the smaller of the thresholds of the two
+    /// points, J/m⁶.
+    WorkThresholds,
 }
 
 /// The own and the far ends of eight bonds: their laws and what they know.
@@ -32,39 +37,64 @@ impl Criterion {
     /// Whether it depends on the thresholds of the ends.
     #[inline(always)]
     pub fn reads_thresholds(self) -> bool {
-        matches!(self, Self::Thresholds(_))
+        matches!(self, Self::Thresholds(_) | Self::WorkThresholds)
     }
 
-    /// The |x| of [`crate::material::bond`] beyond which bonds must be marked; none below breaks.
+    /// Whether it asks for the work of the force states.
+    #[inline(always)]
+    pub fn reads_work(self) -> bool {
+        matches!(self, Self::Work(_) | Self::WorkThresholds)
+    }
+
+    /// The |x| of [`crate::material::bond`] beyond which bonds must be marked; none below breaks by
+    /// its stretch.
     #[inline(always)]
     pub fn limit(self) -> f64 {
         match self {
             // What equals the limit is not beyond it.
             Self::Stretch(critical) => NEAR.min(growth_of(critical).next_down()),
-            Self::Never | Self::Thresholds(_) => NEAR,
+            _ => NEAR,
         }
     }
 
-    /// A bit for each bond that breaks.
+    /// A bit for each bond that breaks; `work` is in J/m⁶, and read only if it is asked for.
     #[inline(always)]
     pub fn met<S: Simd, L: Law<D>, const D: usize>(
         self,
         simd: S,
         bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
+        work: Lanes,
     ) -> u8 {
+        match self {
+            Self::Never => 0,
+            // A bond that breaks is marked.
+            Self::Stretch(_) if !L::SCALED && bond.marked == 0 => 0,
+            Self::Stretch(critical) if !L::SCALED => {
+                simd.at_least(bond.growth, Lanes::splat(growth_of(critical)))
+            }
+            Self::Work(_) | Self::WorkThresholds => {
+                simd.at_least(work, self.threshold(ends)) & bond.growth.above(0.0)
+            }
+            Self::Stretch(_) | Self::Thresholds(_) => {
+                let threshold = self.threshold(ends);
+                let threshold = threshold * (Lanes::splat(2.0) + threshold);
+                simd.at_least(bond.growth, threshold)
+            }
+        }
+    }
+
+    /// The stretch or work at which each bond breaks.
+    #[inline(always)]
+    fn threshold<L: Law<D>, const D: usize>(self, ends: Ends<'_, L, L::Point>) -> Lanes {
         let scale = || {
             let [here, there] = ends.points;
             ends.laws[0].toughness_scale(here, &ends.laws[1], there)
         };
-        let threshold = match self {
-            Self::Never => return 0,
-            // A bond that breaks is marked.
-            Self::Stretch(_) if !L::SCALED && bond.marked == 0 => return 0,
+        match self {
+            Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) => {
-                return simd.at_least(bond.growth, Lanes::splat(growth_of(critical)));
-            }
+            Self::Stretch(critical) | Self::Work(critical) => Lanes::splat(critical),
             Self::Thresholds(critical) => {
                 let [mut here, mut there] = *ends.thresholds;
                 if L::SCALED {
@@ -74,8 +104,26 @@ impl Criterion {
                 }
                 here.min(there)
             }
+            Self::WorkThresholds => ends.thresholds[0].min(ends.thresholds[1]),
+        }
+    }
+
+    /// The share of the energy of each broken bond that it held above its criterion, because it was
+    /// seen late: 1 − (s_c/s)² or 1 − w_c/w. The bond must know its stretch.
+    #[inline(always)]
+    pub fn overshoot<L: Law<D>, const D: usize>(
+        self,
+        bond: &Bond<D>,
+        ends: Ends<'_, L, L::Point>,
+        work: Lanes,
+    ) -> Lanes {
+        let threshold = self.threshold(ends);
+        let ratio = if self.reads_work() {
+            threshold / work
+        } else {
+            let ratio = threshold / bond.stretch;
+            ratio * ratio
         };
-        let threshold = threshold * (Lanes::splat(2.0) + threshold);
-        simd.at_least(bond.growth, threshold)
+        (Lanes::splat(1.0) - ratio).max(Lanes::splat(0.0))
     }
 }

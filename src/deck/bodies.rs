@@ -25,7 +25,7 @@ pub fn bodies(
     deck: &Deck,
     spacing: Option<[f64; 3]>,
     materials: &IndexMap<String, plan::Material>,
-    damages: &IndexMap<String, plan::CriticalStretch>,
+    damages: &IndexMap<String, plan::Damage>,
 ) -> Result<Vec<plan::Body>> {
     if deck.body.len() > MOST_BODIES {
         let message = format!(
@@ -68,7 +68,9 @@ pub fn bodies(
                 (scope.length(number, &key)?, number.span())
             }
         };
-        let fault = materials[material].law.damage_fault();
+        let fault = damage
+            .as_ref()
+            .and_then(|damage: &plan::Damage| materials[material].law.damage_fault(damage));
         if let (Some(name), Some(fault)) = (&body.damage, fault) {
             return Err(scope.error(name.span(), format!("{key} damage: {fault}")));
         }

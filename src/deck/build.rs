@@ -4,8 +4,8 @@ use super::expression::{Expression, Variable};
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
-    Action, Body, CheckpointRule, Condition, Crack, CriticalStretch, FamilyRule, History, Initial,
-    Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan, PointSource,
+    Action, Body, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule, History,
+    Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan, PointSource,
     PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time, Toughness, VolumeCorrection,
 };
 use super::resolve::ALL_VARIABLES;
@@ -73,7 +73,7 @@ impl Plan {
         &mut self,
         name: &str,
         material: Material,
-        damage: Option<CriticalStretch>,
+        damage: Option<Damage>,
         shape: Shape,
         spacing: f64,
     ) -> usize {
@@ -204,10 +204,11 @@ impl Material {
     }
 }
 
-impl CriticalStretch {
-    /// Damage of all bonds by the same critical stretch.
-    pub fn new(toughness: Toughness) -> Self {
+impl Damage {
+    /// Damage of all bonds alike.
+    pub fn new(rule: DamageRule, toughness: Toughness) -> Self {
         Self {
+            rule,
             toughness,
             alpha: 0.0,
             no_failure: Vec::new(),

@@ -60,10 +60,13 @@ fn used_sets(deck: &Deck) -> IndexSet<&str> {
     let conditions = deck.condition.values().map(|table| &table.get_ref().set);
     let initials = deck.initial.values().map(|table| &table.get_ref().set);
     let tips = history.tip.values().map(|table| &table.get_ref().set);
-    let zones = deck.damage.values().flat_map(|table| {
-        let Damage::CriticalStretch(law) = table.get_ref();
-        &law.get_ref().no_failure
-    });
+    let zones = deck
+        .damage
+        .values()
+        .flat_map(|table| match table.get_ref() {
+            Damage::CriticalStretch(law) => &law.get_ref().no_failure,
+            Damage::Energy(law) => &law.get_ref().no_failure,
+        });
     conditions
         .chain(initials)
         .chain(tips)

@@ -110,7 +110,7 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
                 let word = Written::Text(words.first()?.word.to_owned());
                 Some(Spanned::new(0..0, word))
             }
-            Kind::OfLength => None,
+            Kind::Optional { .. } | Kind::OfLength => None,
         },
     };
     let names = common_keys().chain(law.keys.iter().map(|key| key.name));

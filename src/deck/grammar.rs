@@ -289,6 +289,8 @@ impl Serialize for Material {
 pub enum Damage {
     /// A bond breaks for good at a critical stretch.
     CriticalStretch(Spanned<CriticalStretch>),
+    /// A bond that is pulled breaks for good when it has taken a work.
+    Energy(Spanned<BondEnergy>),
 }
 
 /// Critical stretch, from one of three measures of toughness.
@@ -310,6 +312,43 @@ pub struct CriticalStretch {
     /// Sets of points whose bonds never break.
     #[serde(default)]
     pub no_failure: Vec<Text>,
+}
+
+/// The work of bonds, from one of two measures of toughness.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct BondEnergy {
+    /// Fracture energy G0 in J/m².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy: Option<Number>,
+    /// Fracture toughness K_Ic in Pa·√m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_toughness: Option<Number>,
+    /// How the critical work follows: "energy" (all bonds across an area take the fracture energy) or
+    /// "willberg2022" (as in Willberg et al. 2022, eq. 16 and 18).
+    #[serde(default)]
+    pub calibration: Calibration,
+    /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
+    #[serde(default = "no_alpha")]
+    pub alpha: Number,
+    /// Sets of points whose bonds never break.
+    #[serde(default)]
+    pub no_failure: Vec<Text>,
+}
+
+/// How the critical work of bonds follows from the fracture energy.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Calibration {
+    /// From the energy of all bonds across an area.
+    #[default]
+    Energy,
+    /// As printed in Willberg et al. 2022.
+    Willberg2022,
+}
+
+fn no_alpha() -> Number {
+    default_number(0.0)
 }
 
 fn default_alpha() -> Number {

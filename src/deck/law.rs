@@ -2,10 +2,11 @@
 
 use super::expression::Expression;
 use super::number::shown;
+use super::plan::{Damage, DamageRule};
 use super::source::suggestion;
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
-use crate::material::{Declaration, Key, Kind, OfLength, Value, Values, declarations};
+use crate::material::{Declaration, Key, Kind, LawFault, OfLength, Value, Values, declarations};
 
 /// A law with the values of its own keys.
 #[derive(Debug, Clone)]
@@ -14,14 +15,6 @@ pub struct Law {
     pub declaration: &'static Declaration,
     /// What its keys are.
     pub values: Values,
-}
-
-/// What is wrong with a law.
-pub struct Fault {
-    /// The key that is to blame, if it is one that stands there.
-    pub key: Option<&'static str>,
-    /// What is wrong, and what would be right.
-    pub message: String,
 }
 
 impl Law {
@@ -66,18 +59,19 @@ impl Law {
     }
 
     /// Whether it can be used: all keys are given that must be, and it is there in this dimension.
-    pub fn fault(&self, dimension: Dimension) -> Option<Fault> {
+    pub fn fault(&self, dimension: Dimension) -> Option<LawFault> {
         for key in self.declaration.keys {
             let required = matches!(key.kind, Kind::Number { .. });
             if required && self.values.get(key.name).is_none() {
-                return Some(Fault {
+                return Some(LawFault {
                     key: None,
                     message: format!("needs `{}`: {}", key.name, key.meaning),
                 });
             }
         }
         if !matches!(dimension, Dimension::Line { .. }) {
-            return None;
+            let fault = self.declaration.fault?;
+            return fault(&self.values, dimension);
         }
         let word = |key: &'static Key| match (&key.kind, self.values.get(key.name)) {
             (Kind::Word(words), Some(Value::Word(given))) => {
@@ -88,20 +82,26 @@ impl Law {
         };
         let whole = self.declaration.no_line.map(|why| (None, why));
         let (key, why) = whole.or_else(|| self.declaration.keys.iter().find_map(word))?;
-        Some(Fault {
+        Some(LawFault {
             key,
             message: why.to_owned(),
         })
     }
 
-    /// Why bodies of the law can have no damage, if they cannot.
-    pub fn damage_fault(&self) -> Option<String> {
-        if self.declaration.critical_stretch.is_some() {
+    /// Why bodies of the law can have no such damage, if they cannot.
+    pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
+        let (can, way): (fn(&Declaration) -> bool, _) = match damage.rule {
+            DamageRule::CriticalStretch => {
+                (|law| law.critical_stretch.is_some(), "by their stretch")
+            }
+            DamageRule::Energy(_) => (|law| law.breaks_by_energy, "by their energy"),
+        };
+        if can(self.declaration) {
             return None;
         }
-        let others = declarations().filter(|law| law.critical_stretch.is_some());
+        let others = declarations().filter(|law| can(law));
         Some(format!(
-            "bonds of the law `{}` never break; take {} for a body that can",
+            "bonds of the law `{}` never break {way}; take {} for a body whose bonds can",
             self.declaration.name,
             names(others, "or"),
         ))
@@ -124,7 +124,10 @@ pub fn find(name: &str) -> std::result::Result<&'static Declaration, String> {
 /// Whether a key can have this value, or else what it must be.
 pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     match (&key.kind, value) {
-        (Kind::Number { range, words, .. }, Value::Number(number)) => {
+        (
+            Kind::Number { range, words, .. } | Kind::Optional { range, words },
+            Value::Number(number),
+        ) => {
             let fits = range.contains(number);
             let error = || format!("must be {words}, is {}", shown(*number));
             if fits { Ok(()) } else { Err(error()) }
@@ -146,7 +149,9 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
 /// What a key must be, in the words of a deck's user.
 pub fn wanted(key: &Key) -> String {
     match &key.kind {
-        Kind::Number { .. } | Kind::OfLength => "a number or an expression in quotes".to_owned(),
+        Kind::Number { .. } | Kind::Optional { .. } | Kind::OfLength => {
+            "a number or an expression in quotes".to_owned()
+        }
         Kind::Word(words) => {
             let words = words.iter().map(|word| format!("\"{}\"", word.word));
             listed(words, "or")

@@ -1,4 +1,4 @@
-//! Materials and damage laws of a deck, validated.
+//! Materials of a deck, validated.
 
 use std::ops::Range;
 
@@ -10,7 +10,6 @@ use super::law;
 use super::number::{Number, Written};
 use super::plan;
 use super::resolve::Scope;
-use super::sets::find_sets;
 use super::source::suggestion;
 use crate::dimension::Dimension;
 use crate::elastic::{Constant, Isotropic};
@@ -42,10 +41,11 @@ pub fn material(
     let Some(density) = section.table.get(DENSITY) else {
         return Err(section.error(None, format!("needs `{DENSITY}`")));
     };
+    let law = section.law(dimension)?;
     Ok(plan::Material {
-        law: section.law(dimension)?,
         density: scope.positive(density, &section.key_of(DENSITY))?,
-        elastic: section.elastic(dimension)?,
+        elastic: section.elastic(&law, dimension)?,
+        law,
         damping: match section.table.get(DAMPING) {
             None => 0.0,
             Some(number) => {
@@ -119,7 +119,7 @@ impl Section<'_> {
     fn value(&self, key: &Key, written: &Number) -> Result<Value> {
         let value = match (&key.kind, written.get_ref()) {
             (Kind::Word(_), Written::Text(word)) => word.as_str().into(),
-            (Kind::Word(_) | Kind::Number { .. }, _) => {
+            (Kind::Word(_) | Kind::Number { .. } | Kind::Optional { .. }, _) => {
                 self.scope.number(written, &self.key_of(key.name))?.into()
             }
             (Kind::OfLength, _) => {
@@ -133,8 +133,19 @@ impl Section<'_> {
         Ok(value)
     }
 
-    /// The elastic constants; those of a bond-based law have its own Poisson ratio.
-    fn elastic(&self, dimension: Dimension) -> Result<Isotropic> {
+    /// The elastic constants; those of a bond-based law have its own Poisson ratio, and a law may have
+    /// keys that stand for them.
+    fn elastic(&self, law: &plan::Law, dimension: Dimension) -> Result<Isotropic> {
+        let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
+        if let Some(own) = own {
+            return match self.elastic_constants().first() {
+                None => Ok(own),
+                Some((name, _)) => Err(self.error(
+                    Some(name),
+                    "the law has elastic constants of its own here; leave this out",
+                )),
+            };
+        }
         let bond_based = !self.declaration.any_poisson_ratio;
         let own = dimension.bond_based_poisson_ratio();
         let given = self.elastic_constants();
@@ -227,47 +238,4 @@ impl Section<'_> {
         self.scope
             .error(third.unwrap_or(self.place.clone()), message)
     }
-}
-
-/// Validates a damage law.
-///
-/// # Errors
-/// On a wrong number, an unknown set, or anything but one measure of toughness.
-pub fn damage(
-    scope: &Scope,
-    sets: &[plan::Set],
-    name: &str,
-    table: &Spanned<grammar::Damage>,
-) -> Result<plan::CriticalStretch> {
-    let grammar::Damage::CriticalStretch(spanned) = table.get_ref();
-    let law = spanned.get_ref();
-    let key = format!("[damage.{name}.critical_stretch]");
-    type Measure = fn(f64) -> plan::Toughness;
-    let measures: [(&str, &Option<Number>, Measure); 3] = [
-        (
-            "fracture_energy",
-            &law.fracture_energy,
-            plan::Toughness::FractureEnergy,
-        ),
-        (
-            "fracture_toughness",
-            &law.fracture_toughness,
-            plan::Toughness::FractureToughness,
-        ),
-        (
-            "critical_stretch",
-            &law.critical_stretch,
-            plan::Toughness::CriticalStretch,
-        ),
-    ];
-    let given = measures.map(|(name, number, _)| (name, number.as_ref().map(Spanned::span)));
-    let (measure, number, toughness) = measures[scope.exactly_one(spanned.span(), &key, &given)?];
-    let number = number.as_ref().expect("this measure is given");
-    let toughness = toughness(scope.positive(number, &format!("{key} {measure}"))?);
-    let alpha_key = format!("{key} alpha");
-    Ok(plan::CriticalStretch {
-        toughness,
-        alpha: scope.within(&law.alpha, &alpha_key, 0.0..1.0, "at least 0 and below 1")?,
-        no_failure: find_sets(scope, &law.no_failure, sets, &format!("{key} no_failure"))?,
-    })
 }

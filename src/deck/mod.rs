@@ -3,6 +3,7 @@
 mod bodies;
 mod build;
 mod conditions;
+mod damage;
 mod difference;
 mod doubts;
 mod explain;

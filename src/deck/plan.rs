@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use super::expression::Expression;
 pub use super::law::Law;
 use super::source::Source;
+pub use crate::damage::Calibration;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
@@ -80,7 +81,7 @@ pub struct Body {
     /// The material.
     pub material: Material,
     /// The damage law, if bonds can break.
-    pub damage: Option<CriticalStretch>,
+    pub damage: Option<Damage>,
     /// Horizon δ, m.
     pub horizon: f64,
     /// Where its horizon stands in the deck: its own or that of the grid.
@@ -177,15 +178,26 @@ pub enum InterfaceRule {
     Own,
 }
 
-/// Critical-stretch damage.
+/// When bonds break.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CriticalStretch {
-    /// What sets the critical stretch.
+pub struct Damage {
+    /// What they break by.
+    pub rule: DamageRule,
+    /// How much it takes.
     pub toughness: Toughness,
     /// α in s ≥ s0 − α s_min.
     pub alpha: f64,
     /// Indices of sets whose bonds never break.
     pub no_failure: Vec<usize>,
+}
+
+/// What bonds break by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DamageRule {
+    /// Their stretch.
+    CriticalStretch,
+    /// The work that they have taken.
+    Energy(Calibration),
 }
 
 /// Three measures of how much a material resists a crack.
@@ -195,7 +207,7 @@ pub enum Toughness {
     FractureEnergy(f64),
     /// K_Ic, Pa·√m.
     FractureToughness(f64),
-    /// s0 itself.
+    /// s0 itself; for bonds that break by their stretch.
     CriticalStretch(f64),
 }
 

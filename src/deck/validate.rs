@@ -8,7 +8,7 @@ use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
 use super::{
-    bodies, conditions, history, interface, materials, names, outputs, sets, shapes, time,
+    bodies, conditions, damage, history, interface, materials, names, outputs, sets, shapes, time,
 };
 use crate::dimension::Dimension;
 use crate::error::Result;
@@ -31,7 +31,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         materials::material(&scope, dimension, name, table)
     })?;
     let damages = resolve_each(&deck.damage, |name, table| {
-        materials::damage(&scope, &sets, name, table)
+        damage::damage(&scope, &sets, name, table)
     })?;
     let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(&scope, deck, &bodies)?;

@@ -220,21 +220,57 @@ impl BondLattice {
     /// Calls `found` with the index of the byte and the bit of each intact bond, and the local indices
     /// of both ends.
     fn for_each(&self, mut found: impl FnMut(usize, usize, [usize; 2])) {
-        let count = self.offsets.len();
-        for (k, vector) in self.vectors.iter().enumerate() {
-            let shifts = &self.shifts[vector.line as usize * self.around.len()..];
-            for (o, offset) in self.offsets.iter().enumerate() {
-                let byte = k * count + o;
-                let mut bits = self.store.intact[byte];
-                while bits != 0 {
-                    let lane = bits.trailing_zeros() as usize;
-                    bits &= bits - 1;
-                    let shift = shifts[offset.line as usize] + offset.x;
-                    let place = vector.place as i64 + i64::from(shift) + lane as i64;
-                    let there = self.grid.points[place as usize] as usize;
-                    found(byte, lane, [vector.point as usize + lane, there]);
-                }
+        for k in 0..self.vectors.len() {
+            self.for_each_of(k, &mut found);
+        }
+    }
+
+    /// As [`Self::for_each`], of one vector.
+    fn for_each_of(&self, vector: usize, found: &mut impl FnMut(usize, usize, [usize; 2])) {
+        let first = vector * self.offsets.len();
+        let vector = &self.vectors[vector];
+        let shifts = &self.shifts[vector.line as usize * self.around.len()..];
+        for (o, offset) in self.offsets.iter().enumerate() {
+            let byte = first + o;
+            let mut bits = self.store.intact[byte];
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let shift = shifts[offset.line as usize] + offset.x;
+                let place = vector.place as i64 + i64::from(shift) + lane as i64;
+                let there = self.grid.points[place as usize] as usize;
+                found(byte, lane, [vector.point as usize + lane, there]);
             }
+        }
+    }
+
+    /// The vector that a point is one of, if it has bonds here.
+    fn vector_of(&self, point: usize) -> Option<usize> {
+        let k = self.vectors_below(point + 1).checked_sub(1)?;
+        (point < self.points_of(k).end).then_some(k)
+    }
+
+    /// The points from the first of a vector to the last one that has bonds here.
+    fn points_of(&self, vector: usize) -> Range<usize> {
+        let vector = &self.vectors[vector];
+        let first = vector.point as usize;
+        first..first + WIDTH - vector.members.leading_zeros() as usize
+    }
+
+    /// See [`super::BlockBonds::together`].
+    pub fn together(&self, point: usize) -> Range<usize> {
+        self.vector_of(point)
+            .map_or(point..point + 1, |vector| self.points_of(vector))
+    }
+
+    /// See [`super::BlockBonds::for_each_neighbour`].
+    pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
+        if let Some(vector) = self.vector_of(point) {
+            self.for_each_of(vector, &mut |_, _, [here, there]| {
+                if here == point {
+                    found(there);
+                }
+            });
         }
     }
 

@@ -165,6 +165,20 @@ impl BondList {
         }
     }
 
+    /// Calls `found` with the local index of the far end of every intact bond of a point.
+    pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
+        let Ok(row) = self.points.binary_search(&(point as u32)) else {
+            return;
+        };
+        for group in self.starts[row]..self.starts[row + 1] {
+            for (k, there) in self.neighbours[group].iter().enumerate() {
+                if self.store.intact[group] >> k & 1 == 1 {
+                    found(*there as usize);
+                }
+            }
+        }
+    }
+
     /// Calls `found` with the number of each row, its point and the bytes of a checkpoint that its
     /// bonds take, which are the same on any number of ranks.
     pub fn for_each_row(&self, mut found: impl FnMut(usize, usize, usize)) {

@@ -16,6 +16,8 @@ mod store;
 mod vectors;
 mod volume;
 
+use std::ops::Range;
+
 pub use arrange::arrange;
 pub use fault::{Fault, MOST_NEIGHBOURS};
 pub use find::find;
@@ -77,6 +79,20 @@ impl BlockBonds {
     /// Calls `found` with the local indices of both ends of every intact bond.
     pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
         with!(self, bonds => bonds.for_each_intact(found));
+    }
+
+    /// Calls `found` with the local index of the far end of every intact bond of an owned point.
+    pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
+        with!(self, bonds => bonds.for_each_neighbour(point, found));
+    }
+
+    /// The owned points, one after the other, whose bonds here are worked on together with those of a
+    /// point.
+    pub fn together(&self, point: usize) -> Range<usize> {
+        match self {
+            Self::List(_) => point..point + 1,
+            Self::Lattice(lattice) => lattice.together(point),
+        }
     }
 
     /// Gives every bond so many numbers, which are 0.

@@ -104,6 +104,66 @@ impl<const N: usize> Numbers for [Lanes; N] {
     }
 }
 
+/// Row by row.
+impl<const N: usize, const M: usize> Numbers for [[Lanes; N]; M] {
+    const COUNT: usize = N * M;
+    type Columns<'a> = [[&'a [f64]; N]; M];
+    type ColumnsMut<'a> = [[&'a mut [f64]; N]; M];
+
+    #[inline(always)]
+    fn each(mut value: impl FnMut(usize) -> Lanes) -> Self {
+        let mut all = [[Lanes::splat(0.0); N]; M];
+        for (row, rows) in all.iter_mut().enumerate() {
+            for (k, lanes) in rows.iter_mut().enumerate() {
+                *lanes = value(row * N + k);
+            }
+        }
+        all
+    }
+
+    #[inline(always)]
+    fn get(&self, quantity: usize) -> Lanes {
+        self[quantity / N][quantity % N]
+    }
+
+    #[inline(always)]
+    fn get_mut(&mut self, quantity: usize) -> &mut Lanes {
+        &mut self[quantity / N][quantity % N]
+    }
+
+    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_> {
+        std::array::from_fn(|row| <[Lanes; N]>::columns(&all[row * N..]))
+    }
+
+    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_> {
+        let mut rows = all.chunks_mut(N);
+        std::array::from_fn(|_| {
+            <[Lanes; N]>::columns_mut(rows.next().expect("a column for each quantity"))
+        })
+    }
+
+    #[inline(always)]
+    fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64] {
+        columns[quantity / N][quantity % N]
+    }
+
+    fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2] {
+        let mut firsts = columns;
+        let seconds = std::array::from_fn(|row| {
+            let own = std::mem::replace(&mut firsts[row], std::array::from_fn(|_| &mut [][..]));
+            let [first, second] = <[Lanes; N]>::split_at(own, middle);
+            firsts[row] = first;
+            second
+        });
+        [firsts, seconds]
+    }
+
+    #[inline(always)]
+    fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64] {
+        columns[quantity / N][quantity % N]
+    }
+}
+
 impl<A: Numbers, B: Numbers> Numbers for (A, B) {
     const COUNT: usize = A::COUNT + B::COUNT;
     type Columns<'a> = (A::Columns<'a>, B::Columns<'a>);

@@ -110,8 +110,8 @@ impl<const D: usize> Law<D> for AnyLaw {
     const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, length: Lanes) -> Self::WholeSum {
-        with_law!(self, law => filled_up(Law::<D>::whole_share(law, length)))
+    fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
+        with_law!(self, law => filled_up(law.whole_share(bond)))
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
@@ -119,18 +119,29 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(always)]
-    fn share<const S: usize>(&self, bond: &Bond<D>, own: &Self::Point) -> Self::Sum {
-        with_law!(self, law => filled_up(law.share::<S>(bond, &first(own))))
+    fn share<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        own: &Self::Point,
+        memory: &Self::Memory,
+    ) -> Self::Sum {
+        with_law!(self, law => filled_up(law.share::<S>(bond, &first(own), &first(memory))))
     }
 
     #[inline(always)]
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64]) {
-        with_law!(self, law => Law::<D>::point(law, stage, sums, numbers));
+    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], step: Option<f64>) {
+        with_law!(self, law => Law::<D>::point(law, stage, sums, numbers, step));
     }
 
     #[inline(always)]
-    fn memory(&self, bond: &Bond<D>, end: &Self::Point, before: &Self::Memory) -> Self::Memory {
-        with_law!(self, law => filled_up(law.memory(bond, &first(end), &first(before))))
+    fn memory(
+        &self,
+        bond: &Bond<D>,
+        end: &Self::Point,
+        before: &Self::Memory,
+        step: f64,
+    ) -> Self::Memory {
+        with_law!(self, law => filled_up(law.memory(bond, &first(end), &first(before), step)))
     }
 
     #[inline(always)]
@@ -147,6 +158,10 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::point_energy(law, numbers))
     }
 
+    fn is_singular(&self, numbers: &[f64]) -> bool {
+        with_law!(self, law => Law::<D>::is_singular(law, numbers))
+    }
+
     #[inline(always)]
     fn dissipated(&self, length: Lanes, memory: &Self::Memory) -> Lanes {
         with_law!(self, law => Law::<D>::dissipated(law, length, &first(memory)))
@@ -155,5 +170,9 @@ impl<const D: usize> Law<D> for AnyLaw {
     #[inline(always)]
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes {
         with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
+    }
+
+    fn resists_across(&self) -> bool {
+        with_law!(self, law => Law::<D>::resists_across(law))
     }
 }

@@ -50,6 +50,8 @@ pub struct Bond<const D: usize> {
     pub stretch: Lanes,
     /// (|Y| − |ξ|)/|Y|; means nothing for linear laws. Of intact bonds, where it is asked for.
     pub shortening: Lanes,
+    /// η by component, m.
+    pub moved: [Lanes; D],
     /// Y by component, m; for linear laws ξ.
     pub along: [Lanes; D],
     /// A bit for each intact bond with a large |x|.
@@ -154,6 +156,7 @@ pub fn deform<S: Simd, const D: usize>(
             growth,
             stretch: growth,
             shortening: growth,
+            moved: eta,
             along: xi,
             marked: intact,
         };
@@ -178,6 +181,7 @@ pub fn deform<S: Simd, const D: usize>(
         growth,
         stretch,
         shortening,
+        moved: eta,
         along: deformed,
         marked,
     }

@@ -25,10 +25,16 @@ pub struct Declaration {
     pub no_line: Option<&'static str>,
     /// Whether forces act along ξ and are linear in the displacements, so that they know no rotation.
     pub linear: bool,
-    /// Whether forces are the slope of the strain energy after any motion, as they are not where bonds
-    /// yield.
-    pub conservative: bool,
-    /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break.
+    /// What always holds for it, with these values of its keys.
+    pub invariants: fn(&Values) -> Invariants,
+    /// What is wrong with the values of its keys together, if anything is.
+    pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
+    /// The elastic constants that follow from its own keys, where these are given; then no others are.
+    pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
+    /// Whether bonds can break by the work that they have taken.
+    pub breaks_by_energy: bool,
+    /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break by
+    /// their stretch.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
     /// Makes the law.
     pub build: fn(&Given) -> Built,
@@ -47,7 +53,10 @@ impl Declaration {
             any_poisson_ratio: false,
             no_line: None,
             linear: false,
-            conservative: true,
+            invariants: |_| Invariants::ALL,
+            fault: None,
+            elastic: None,
+            breaks_by_energy: false,
             critical_stretch: None,
             build,
             examples: &[""],
@@ -69,6 +78,35 @@ impl fmt::Debug for Declaration {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(self.name)
     }
+}
+
+/// What holds for a law after any motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Invariants {
+    /// Forces are the slope of the strain energy, as they are not where bonds yield.
+    pub conservative: bool,
+    /// A motion that is turned has the same forces, turned.
+    pub objective: bool,
+    /// The forces of a body alone do not turn it.
+    pub angular_momentum: bool,
+}
+
+impl Invariants {
+    /// All of them.
+    pub const ALL: Self = Self {
+        conservative: true,
+        objective: true,
+        angular_momentum: true,
+    };
+}
+
+/// What is wrong with the values of a law's keys.
+#[derive(Debug, Clone)]
+pub struct LawFault {
+    /// The key that is to blame, if it is one alone.
+    pub key: Option<&'static str>,
+    /// What is wrong, and what would be right.
+    pub message: String,
 }
 
 /// A law that decks can name, perhaps under several names.
@@ -99,6 +137,13 @@ pub enum Kind {
         words: &'static str,
         /// Its value if it is not given; `None` if it must be.
         default: Option<f64>,
+    },
+    /// A number that may be left out.
+    Optional {
+        /// Where it must lie.
+        range: Range<f64>,
+        /// The range in words that follow "must be".
+        words: &'static str,
     },
     /// One of these words; the first if it is not given.
     Word(&'static [Word]),
@@ -171,7 +216,7 @@ impl Values {
         let default = |key: &Key| match &key.kind {
             Kind::Number { default, .. } => default.map(Value::Number),
             Kind::Word(words) => words.first().map(|first| first.word.into()),
-            Kind::OfLength => None,
+            Kind::Optional { .. } | Kind::OfLength => None,
         };
         Self(keys.iter().map(|key| (key.name, default(key))).collect())
     }

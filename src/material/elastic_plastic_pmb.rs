@@ -7,7 +7,9 @@
 
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
-use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Pmb,
+};
 use crate::lanes::{Lanes, Simd};
 
 /// The law with its constants.
@@ -28,7 +30,11 @@ const YIELD_STRETCH: Key = Key {
 impl Declared for ElasticPlasticPmb {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
         keys: &[YIELD_STRETCH],
-        conservative: false,
+        invariants: |_| Invariants {
+            conservative: false,
+            ..Invariants::ALL
+        },
+        breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
         examples: &["yield_stretch = 0.02"],
         ..Declaration::new(
@@ -76,7 +82,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]
-    fn memory(&self, bond: &Bond<D>, _: &[Lanes; 0], before: &[Lanes; 2]) -> [Lanes; 2] {
+    fn memory(&self, bond: &Bond<D>, _: &[Lanes; 0], before: &[Lanes; 2], _: f64) -> [Lanes; 2] {
         let [plastic, path] = *before;
         let limit = Lanes::splat(self.yield_stretch);
         // s_p stays where s − s_y ≤ s_p ≤ s + s_y, else it takes the nearer of the two.

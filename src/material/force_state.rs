@@ -18,6 +18,10 @@ pub trait ForceState<const D: usize>: Copy {
     /// A component of T⊗Y, of the part that does not turn the bond.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
+    /// The work ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η of the force density of a bond, J/m⁶, that pulls without
+    /// turning; the same to the bit from both ends.
+    fn work(self, bond: &Bond<D>, linear: bool) -> Lanes;
+
     /// By component.
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
 }
@@ -50,6 +54,17 @@ impl<const D: usize> ForceState<D> for Along {
         self.0 * bond.along[a] * bond.along[b]
     }
 
+    /// The force acts on the extension: ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
+    #[inline(always)]
+    fn work(self, bond: &Bond<D>, linear: bool) -> Lanes {
+        let share = if linear {
+            bond.growth
+        } else {
+            bond.shortening * (Lanes::splat(1.0) + bond.growth)
+        };
+        self.0 * (bond.length * bond.length * share) * 0.5
+    }
+
     #[inline(always)]
     fn vector(self, bond: &Bond<D>) -> [Lanes; D] {
         bond.along.map(|component| self.0 * component)
@@ -78,6 +93,15 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
     #[inline(always)]
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes {
         (self[a] * bond.along[b] + self[b] * bond.along[a]) * 0.5
+    }
+
+    #[inline(always)]
+    fn work(self, bond: &Bond<D>, _: bool) -> Lanes {
+        let mut sum = self[0] * bond.moved[0];
+        for d in 1..D {
+            sum += self[d] * bond.moved[d];
+        }
+        sum * 0.5
     }
 
     #[inline(always)]

@@ -76,7 +76,8 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     const LINEAR: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, length: Lanes) -> [Lanes; 1] {
+    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        let length = bond.length;
         [length]
     }
 

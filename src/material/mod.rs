@@ -8,6 +8,7 @@
 
 mod any;
 pub mod bond;
+mod correspondence;
 mod declaration;
 mod elastic_plastic_pmb;
 mod force_state;
@@ -21,7 +22,8 @@ mod registration;
 pub use any::{Counts, MOST};
 pub use bond::Bond;
 pub use declaration::{
-    Built, Declaration, Declared, Given, Key, Kind, OfLength, Value, Values, Word,
+    Built, Declaration, Declared, Given, Invariants, Key, Kind, LawFault, OfLength, Value, Values,
+    Word,
 };
 pub use force_state::{Along, ForceState};
 pub use influence::Influence;
@@ -34,6 +36,7 @@ registration::register! {
     normalised::Normalised,
     linear_microelastic::LinearMicroelastic,
     ordinary::Ordinary,
+    correspondence::Correspondence,
 }
 
 use crate::lanes::{Lanes, Numbers, Simd};
@@ -83,6 +86,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::force`] or [`Self::memory`] read the stretch of bonds.
     const FORCE_READS_STRETCH: bool = false;
 
+    /// Whether [`Self::force`] reads the shortening of bonds.
+    const FORCE_READS_SHORTENING: bool = true;
+
+    /// How many dimensions there must be for bodies of the law.
+    const LEAST_DIMENSION: usize = 1;
+
+    /// Whether [`Self::share`] reads the stretch of bonds.
+    const SUM_READS_STRETCH: bool = true;
+
     /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.
     const LINEAR: bool = false;
 
@@ -94,7 +106,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// What a bond of the undeformed body adds to the sums over the whole family.
     #[inline(always)]
-    fn whole_share(&self, _length: Lanes) -> Self::WholeSum {
+    fn whole_share(&self, _bond: &Bond<D>) -> Self::WholeSum {
         Self::WholeSum::splat(0.0)
     }
 
@@ -104,16 +116,28 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// What an intact bond adds to the sums of stage `S`, which may use the numbers found by the
     /// stages before.
     #[inline(always)]
-    fn share<const S: usize>(&self, _bond: &Bond<D>, _own: &Self::Point) -> Self::Sum {
+    fn share<const S: usize>(
+        &self,
+        _bond: &Bond<D>,
+        _own: &Self::Point,
+        _memory: &Self::Memory,
+    ) -> Self::Sum {
         Self::Sum::splat(0.0)
     }
 
-    /// The numbers of a point from the sums of a stage: those of [`Self::Point`], then its own ones.
-    fn point(&self, _stage: usize, _sums: &[f64], _numbers: &mut [f64]) {}
+    /// The numbers of a point from the sums of a stage: those of [`Self::Point`], then its own ones. In
+    /// a step (s) the point may remember; else nothing does.
+    fn point(&self, _stage: usize, _sums: &[f64], _numbers: &mut [f64], _step: Option<f64>) {}
 
-    /// What a bond keeps for an end when it has come to this deformation.
+    /// What a bond keeps for an end when it has come to this deformation in a step (s).
     #[inline(always)]
-    fn memory(&self, _bond: &Bond<D>, _end: &Self::Point, before: &Self::Memory) -> Self::Memory {
+    fn memory(
+        &self,
+        _bond: &Bond<D>,
+        _end: &Self::Point,
+        before: &Self::Memory,
+        _step: f64,
+    ) -> Self::Memory {
         *before
     }
 
@@ -148,6 +172,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         0.0
     }
 
+    /// Whether a point has too few bonds left for the law, and carries no force.
+    fn is_singular(&self, _numbers: &[f64]) -> bool {
+        false
+    }
+
     /// What a bond, broken or not, has dissipated at one end without breaking, J/m⁶.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _memory: &Self::Memory) -> Lanes {
@@ -157,6 +186,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// A spring constant (N/m⁷) that the bond's and point's energy at one end nowhere exceed:
     /// W ≤ ½ Σ k (|Y| − |ξ|)² Ṽ. For bond-based laws |∂T/∂η|.
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes;
+
+    /// Whether the springs of [`Self::stiffness`] resist motions across the bonds as well:
+    /// W ≤ ½ Σ k |η|² Ṽ.
+    fn resists_across(&self) -> bool {
+        false
+    }
 
     /// What the critical stretch of a bond is multiplied by; the same from both ends.
     #[inline(always)]

@@ -44,6 +44,7 @@ const FORM: Key = Key {
 impl Declared for Normalised {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
         keys: &[FORM],
+        breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
         examples: &["", "form = 'diehl2016'"],
         ..Declaration::new(
@@ -126,8 +127,8 @@ impl<const D: usize> Law<D> for Normalised {
     const SCALED: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, length: Lanes) -> [Lanes; 1] {
-        [length]
+    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        [bond.length]
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {

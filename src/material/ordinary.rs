@@ -102,6 +102,7 @@ impl Declared for Ordinary {
         keys: &[INFLUENCE],
         any_poisson_ratio: true,
         no_line: Some("`ordinary` has no 1-D form; `pmb` is the same there for ν = 0.25"),
+        breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
         examples: &[
             "poisson_ratio = 0.4",
@@ -152,12 +153,13 @@ impl<const D: usize> Law<D> for Ordinary {
     type Force = Along;
     const CONSTANTS: usize = 1;
     const STAGES: usize = 1;
+    const LEAST_DIMENSION: usize = 2;
     /// θ.
     const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]
-    fn whole_share(&self, length: Lanes) -> [Lanes; 1] {
-        [length * length]
+    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        [bond.length * bond.length]
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
@@ -169,12 +171,12 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     #[inline(always)]
-    fn share<const S: usize>(&self, bond: &Bond<D>, _: &[Lanes; 2]) -> [Lanes; 1] {
+    fn share<const S: usize>(&self, bond: &Bond<D>, _: &[Lanes; 2], _: &[Lanes; 0]) -> [Lanes; 1] {
         [bond.length * bond.length * bond.stretch]
     }
 
     #[inline(always)]
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64]) {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
         let share = self.dimension * numbers[0] / self.extensional;
         let dilatation = share * sums[0];
         numbers[1] = share * self.volumetric * dilatation;

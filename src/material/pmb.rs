@@ -67,6 +67,7 @@ impl Declared for Pmb {
     const DECLARATIONS: &'static [Declaration] = &[
         Declaration {
             keys: &[SURFACE_CORRECTION],
+            breaks_by_energy: true,
             critical_stretch: Some(bond_based_critical_stretch),
             examples: &["", "surface_correction = 'energy'"],
             ..Declaration::new("pmb", "prototype microelastic, f = c s e", build)

@@ -1,8 +1,8 @@
 //! From the plan to the law, the failure rule and the weights of every family.
 
-use crate::damage::{Criterion, CriticalStretch};
+use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw};
 use crate::deck::plan::{
-    self, Body, InterfaceRule, Plan, PointSource, Toughness, VolumeCorrection,
+    self, Body, DamageRule, InterfaceRule, Plan, PointSource, Toughness, VolumeCorrection,
 };
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
@@ -38,15 +38,17 @@ fn constants(plan: &Plan, here: &Body, there: &Body) -> Constants {
     }
 }
 
-/// An error if a body has a law that cannot be made, or damage and a law whose bonds never break.
+/// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not
+/// go with that of another body.
 ///
 /// # Errors
-/// For plans made in Rust; what a deck says is checked where it is read.
+/// For plans made in Rust; most of what a deck says is checked where it is read.
 pub fn laws_are_possible(plan: &Plan) -> Result<()> {
     for body in &plan.bodies {
         let law = &body.material.law;
         let fault = law.fault(plan.dimension).map(|fault| fault.message);
-        let fault = fault.or_else(|| law.damage_fault().filter(|_| body.damage.is_some()));
+        let damage = body.damage.as_ref();
+        let fault = fault.or_else(|| damage.and_then(|damage| law.damage_fault(damage)));
         if let Some(fault) = fault {
             let name = law.declaration.name;
             return Err(Error::input(format!(
@@ -54,6 +56,46 @@ pub fn laws_are_possible(plan: &Plan) -> Result<()> {
                 body.name
             )));
         }
+        damage_is_possible(plan, body)?;
+    }
+    Ok(())
+}
+
+/// An error if the bonds of a body break by their energy and something else is in the way of it.
+fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
+    let Some(damage) = &body.damage else {
+        return Ok(());
+    };
+    let by_energy = |damage: &plan::Damage| damage.rule != DamageRule::CriticalStretch;
+    let error = |message: String| {
+        let message = format!("[body.{}] damage: {message}", body.name);
+        Err(plan.source.error(body.span.clone(), message))
+    };
+    let meets = |other: &Body| plan.interface.between(body, other) != InterfaceRule::None;
+    let of_other_kind = plan.bodies.iter().find(|other| {
+        let differs = |other: &plan::Damage| by_energy(other) != by_energy(damage);
+        other.damage.as_ref().is_some_and(differs) && meets(other)
+    });
+    if let Some(other) = of_other_kind {
+        return error(format!(
+            "its bonds break by another rule than those of body `{}`, to which it may be bonded; give \
+             both the same rule, or set `[interface] rule = \"none\"`",
+            other.name
+        ));
+    }
+    if !by_energy(damage) {
+        return Ok(());
+    }
+    if matches!(damage.toughness, Toughness::CriticalStretch(_)) {
+        return error("a critical stretch is no measure of energy".to_owned());
+    }
+    let influenced = build(plan, body, constants(plan, body, body)).influence;
+    if influenced.is_some() && plan.volume_correction != VolumeCorrection::None {
+        return error(
+            "bonds with an influence that is not constant break by their energy only with \
+             `[grid] volume_correction = \"none\"`"
+                .to_owned(),
+        );
     }
     Ok(())
 }
@@ -61,8 +103,7 @@ pub fn laws_are_possible(plan: &Plan) -> Result<()> {
 /// What the law of a body is made from.
 fn given<'a>(plan: &Plan, body: &'a Body, constants: Constants) -> Given<'a> {
     // A critical stretch that the plan gives itself holds for all bonds.
-    let itself =
-        |damage: &plan::CriticalStretch| matches!(damage.toughness, Toughness::CriticalStretch(_));
+    let itself = |damage: &plan::Damage| matches!(damage.toughness, Toughness::CriticalStretch(_));
     Given {
         dimension: plan.dimension,
         elastic: constants.elastic,
@@ -120,26 +161,60 @@ pub fn block_laws(plan: &Plan, body: &Body) -> BlockLaws {
 }
 
 /// The damage law of a block.
-fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<CriticalStretch> {
+fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
     let damage = body.damage.as_ref()?;
     let (dimension, elastic) = (plan.dimension, constants.elastic);
-    let of_energy = body.material.law.declaration.critical_stretch?;
-    let from_energy = |energy: f64| of_energy(&given(plan, body, constants), energy);
-    let critical = match damage.toughness {
-        Toughness::CriticalStretch(stretch) => stretch,
-        Toughness::FractureEnergy(energy) => from_energy(energy),
-        Toughness::FractureToughness(toughness) => from_energy(
-            CriticalStretch::energy_from_toughness(dimension, elastic, toughness),
-        ),
+    let given = given(plan, body, constants);
+    let of_law = body.material.law.declaration.critical_stretch;
+    let stretch = |energy: f64| match of_law {
+        Some(stretch) => stretch(&given, energy),
+        None => CriticalStretch::from_energy(dimension, elastic, energy, constants.horizon),
     };
-    Some(CriticalStretch {
-        critical,
-        alpha: damage.alpha,
+    let energy = match damage.toughness {
+        Toughness::FractureEnergy(energy) => energy,
+        Toughness::FractureToughness(toughness) => {
+            CriticalStretch::energy_from_toughness(dimension, elastic, toughness)
+        }
+        Toughness::CriticalStretch(critical) => {
+            let alpha = damage.alpha;
+            return Some(DamageLaw::CriticalStretch(CriticalStretch {
+                critical,
+                alpha,
+            }));
+        }
+    };
+    let alpha = damage.alpha;
+    Some(match damage.rule {
+        DamageRule::CriticalStretch => DamageLaw::CriticalStretch(CriticalStretch {
+            critical: stretch(energy),
+            alpha,
+        }),
+        DamageRule::Energy(calibration) => DamageLaw::BondEnergy(BondEnergy {
+            critical: BondEnergy::from_energy(dimension, calibration, energy, constants.horizon),
+            alpha,
+            stretch: stretch(energy),
+        }),
     })
 }
 
-/// Gives the bonds between two blocks their laws, criterion and weights. A bond between blocks breaks
-/// at the smaller of the two thresholds, of which a block without damage has none.
+/// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
+/// without damage has none.
+fn criterion(blocks: &[BlockLaws], ends: [usize; 2], per_point: bool) -> Criterion {
+    let laws = ends.map(|block| blocks[block].damage);
+    let critical = laws.map(|law| law.map(|law| law.critical()));
+    let Some(smallest) = critical.into_iter().flatten().reduce(f64::min) else {
+        return Criterion::Never;
+    };
+    let by_work = |law: DamageLaw| matches!(law, DamageLaw::BondEnergy(_));
+    match (laws.into_iter().flatten().any(by_work), per_point) {
+        (true, true) => Criterion::WorkThresholds,
+        (true, false) => Criterion::Work(smallest),
+        (false, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
+        (false, false) => Criterion::Stretch(smallest),
+    }
+}
+
+/// Gives the bonds between two blocks their laws, criterion and weights.
 pub fn assign<const D: usize>(
     plan: &Plan,
     model: &Model<D>,
@@ -148,17 +223,10 @@ pub fn assign<const D: usize>(
 ) -> Vec<Interaction> {
     let per_point = blocks
         .iter()
-        .any(|block| block.damage.is_some_and(|law| law.alpha > 0.0));
+        .any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
     let give = |mut bonds: BlockBonds| {
         let ends = bonds.blocks();
-        let critical = ends.map(|block| blocks[block].damage.map(|law| law.critical));
-        let criterion = match critical.into_iter().flatten().reduce(f64::min) {
-            None => Criterion::Never,
-            Some(_) if per_point => {
-                Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0)))
-            }
-            Some(smallest) => Criterion::Stretch(smallest),
-        };
+        let criterion = criterion(blocks, ends, per_point);
         let [here, there] = ends.map(|block| &plan.bodies[block]);
         let ends = [(here, there), (there, here)].map(|(body, other)| {
             let constants = constants(plan, body, other);
@@ -175,6 +243,7 @@ pub fn assign<const D: usize>(
             bonds,
             laws: PairLaw::new(own, far),
             criterion,
+            influence: plan.volume_correction == VolumeCorrection::None,
         }
     };
     all.into_iter().map(give).collect()

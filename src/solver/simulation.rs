@@ -151,6 +151,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             supports: all().any(Conditions::have_supports),
             damping: model.damping.iter().any(|rate| *rate > 0.0),
             relaxation: plan.relaxes(),
+            damage: plan.bodies.iter().any(|body| body.damage.is_some()),
         };
         let mut fields = Fields::new(&model, needs);
         if let Some(density) = &mut fields.fictitious_density {
@@ -185,7 +186,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .conditions
             .load(&mut simulation.fields, 0.0, true);
         simulation.evaluate(match simulation.time_rule().method {
-            Method::Explicit => Evolution::Step,
+            Method::Explicit => Evolution::Step(0.0),
             // This is no equilibrium.
             Method::Relaxation(_) => Evolution::None,
         });
@@ -225,7 +226,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let time = self.clock.time();
         self.conditions.place(&mut self.fields, time, step);
         self.times.motion += start.elapsed();
-        self.evaluate(Evolution::Step);
+        self.evaluate(Evolution::Step(step));
         let start = Instant::now();
         let (model, fields) = (&self.model, &mut self.fields);
         self.conditions.load(fields, time, false);
@@ -247,12 +248,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let acting = Acting {
             displacement: &mut fields.displacement,
             force: &mut fields.internal_force,
-            freed: &mut fields.freed_energy,
         };
         self.times.evaluations += 1;
         let times = &mut self.times.forces;
         self.forces
             .evaluate(self.comm, &self.model, acting, evolution, times);
+        if let Evolution::Step(step) = evolution {
+            fields.book_broken(&self.model, self.forces.broken(), step);
+        }
     }
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.

@@ -14,6 +14,7 @@ pub use interior::{Interior, interior};
 pub use size::{Size, size};
 
 use crate::comm::total;
+use crate::damage::DamageLaw;
 use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::deck::shown;
 use crate::solver::Simulation;
@@ -122,7 +123,10 @@ fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
 
 fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
     for body in &plan.bodies {
-        let critical = block_laws(plan, body).damage.map(|damage| damage.critical);
+        let critical = match block_laws(plan, body).damage {
+            Some(DamageLaw::CriticalStretch(law)) => Some(law.critical),
+            _ => None,
+        };
         if let Some(critical) = critical.filter(|critical| *critical >= LARGEST_STRETCH) {
             let message = format!(
                 "[body.{}] damage: its bonds break at a stretch of {critical:.3}, at {:.3} times their \

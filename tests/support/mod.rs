@@ -70,7 +70,7 @@ pub fn displace<const D: usize>(
                 place[d] - simulation.model.reference[d][point];
         }
     }
-    simulation.evaluate(Evolution::Step);
+    simulation.evaluate(Evolution::Step(0.0));
 }
 
 /// The internal force density of an owned point, N/m³.

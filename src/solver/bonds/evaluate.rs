@@ -13,8 +13,8 @@ use crate::material::bond::stretch_of;
 use crate::material::{Law, with_pair};
 use crate::solver::model::Model;
 
+use super::broken::Broken;
 use super::force::{Evolution, Force};
-use super::interaction::Interaction;
 use super::list_points;
 use super::point_sums::{SmallestStretch, StageSum};
 use super::sweep::{Source, sweep};
@@ -29,7 +29,7 @@ const PIECE: usize = 4096;
 
 /// What a stage reads anew from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum News {
+pub(super) enum News {
     Displacement,
     Thresholds,
     Numbers,
@@ -58,13 +58,12 @@ pub struct Acting<'a, const D: usize> {
     pub displacement: &'a mut [Vec<f64>; D],
     /// Internal force density of the owned points, N/m³; replaced.
     pub force: &'a mut [Vec<f64>; D],
-    /// Energy that each owned point's share of bonds has set free by breaking, J; added to.
-    pub freed: &'a mut [f64],
 }
 
 impl<const D: usize> Forces<D> {
     /// Brings the ghosts up to date and replaces the internal force densities. Bonds break and
-    /// remember, or nothing changes but forces. Collective.
+    /// remember, or nothing changes but forces; what comes of bonds that break is in
+    /// [`Self::broken`]. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -76,8 +75,8 @@ impl<const D: usize> Forces<D> {
         let Acting {
             displacement,
             force,
-            freed,
         } = acting;
+        self.broken.clear();
         let owned = model.owned();
         let piece = PIECE * rayon::current_num_threads();
         let start = Instant::now();
@@ -102,7 +101,7 @@ impl<const D: usize> Forces<D> {
                 }
                 News::Nothing => {}
             }
-            self.clear(stage, owned);
+            self.clear(stage, 0..owned);
             let mut timed = |work: &mut dyn FnMut()| {
                 let start = Instant::now();
                 work();
@@ -114,10 +113,11 @@ impl<const D: usize> Forces<D> {
                 // Once all messages have arrived the rest is done in one piece.
                 while rest.len() > piece && progress() {
                     let next = rest.start + piece;
-                    timed(&mut || self.run(stage, rest.start..next, force, freed, evolution));
+                    let points = rest.start..next;
+                    timed(&mut || self.run(stage, points.clone(), force, evolution));
                     rest.start = next;
                 }
-                timed(&mut || self.run(stage, rest.clone(), force, freed, evolution));
+                timed(&mut || self.run(stage, rest.clone(), force, evolution));
             };
             if news == News::Nothing {
                 interior(&mut || false);
@@ -138,12 +138,16 @@ impl<const D: usize> Forces<D> {
             self.halo = halo;
             let start = Instant::now();
             self.update(news, Which::Ghosts, model, displacement);
-            self.run(stage, model.interior..owned, force, freed, evolution);
-            self.finish(stage, model, freed);
+            let border = model.interior..owned;
+            self.run(stage, border, force, evolution);
+            self.finish(stage, 0..owned, model, evolution);
             in_bonds += start.elapsed();
         }
         times.bonds += in_bonds;
         times.halo += start.elapsed() - in_bonds;
+        if evolution != Evolution::None {
+            self.settle(comm, model, displacement, force, times);
+        }
     }
 
     /// What a stage reads anew from other ranks.
@@ -160,7 +164,13 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Shows the bonds what is new of some of the points.
-    fn update(&mut self, news: News, which: Which, model: &Model<D>, displacement: &[Vec<f64>; D]) {
+    pub(super) fn update(
+        &mut self,
+        news: News,
+        which: Which,
+        model: &Model<D>,
+        displacement: &[Vec<f64>; D],
+    ) {
         for grid in &mut self.grids {
             match news {
                 News::Displacement => grid.update_displacement(which, displacement),
@@ -183,37 +193,33 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Gets ready for a stage.
-    fn clear(&mut self, stage: Stage, owned: usize) {
+    /// Gets ready for a stage at some of the points.
+    pub(super) fn clear(&mut self, stage: Stage, points: Range<usize>) {
         match stage {
-            Stage::SmallestStretch => self.thresholds[..owned].fill(f64::INFINITY),
-            Stage::PointSum(_) => self.numbers.sums.iter_mut().for_each(|sums| sums.fill(0.0)),
+            Stage::SmallestStretch => self.thresholds[points].fill(f64::INFINITY),
+            Stage::PointSum(_) => {
+                for sums in &mut self.numbers.sums {
+                    sums[points.clone()].fill(0.0);
+                }
+            }
             Stage::Force => {}
         }
     }
 
     /// Sums over the bonds of a range of the owned points.
-    fn run(
+    pub(super) fn run(
         &mut self,
         stage: Stage,
         points: Range<usize>,
         force: &mut [Vec<f64>; D],
-        freed: &mut [f64],
         evolution: Evolution,
     ) {
-        let criterion = |interaction: &Interaction, here: bool| {
-            if here && evolution == Evolution::Step {
-                interaction.criterion
-            } else {
-                Criterion::Never
-            }
-        };
         match stage {
             Stage::SmallestStretch => {
                 // Taken out while it is written.
                 let mut thresholds = [std::mem::take(&mut self.thresholds)];
                 self.for_each_interaction(|interaction, source| {
-                    let results = <([Lanes; 1], [Lanes; 0])>::columns_mut(&mut thresholds);
+                    let results = <[Lanes; 1]>::columns_mut(&mut thresholds);
                     let bonds = &mut interaction.bonds;
                     sweep(bonds, points.clone(), results, &SmallestStretch, source);
                 });
@@ -222,77 +228,89 @@ impl<const D: usize> Forces<D> {
             Stage::PointSum(number) => {
                 let mut sums = std::mem::take(&mut self.numbers.sums);
                 self.for_each_interaction(|interaction, source| {
-                    let criterion = criterion(interaction, number == 0);
-                    let points = points.clone();
-                    let bonds = &mut interaction.bonds;
+                    let (bonds, points) = (&mut interaction.bonds, points.clone());
                     with_pair!(interaction.laws, laws => {
-                        sum_stage(number, bonds, points, laws, criterion, &mut sums, freed, source);
+                        sum_stage(number, bonds, points, laws[0], &mut sums, source);
                     });
                 });
                 self.numbers.sums = sums;
             }
-            Stage::Force => self.for_each_interaction(|interaction, source| {
-                fn sums_before<L: Law<D>, const D: usize>(_: &[L; 2]) -> bool {
-                    L::STAGES > 0
-                }
-                with_pair!(interaction.laws, laws => {
-                    let criterion = criterion(interaction, !sums_before::<_, D>(&laws));
-                    let kernel = Force { laws, criterion, evolution };
-                    let results = (force.each_mut().map(Vec::as_mut_slice), [&mut *freed]);
-                    sweep(&mut interaction.bonds, points.clone(), results, &kernel, source);
+            Stage::Force => {
+                let mut broken = std::mem::take(&mut self.broken);
+                self.for_each_interaction(|interaction, source| {
+                    let criterion = if evolution == Evolution::None {
+                        Criterion::Never
+                    } else {
+                        interaction.criterion
+                    };
+                    let influence = interaction.influence;
+                    with_pair!(interaction.laws, laws => {
+                        let kernel = Force { laws, criterion, influence, evolution };
+                        let results = force.each_mut().map(Vec::as_mut_slice);
+                        let bonds = &mut interaction.bonds;
+                        let told = sweep(bonds, points.clone(), results, &kernel, source);
+                        broken.extend(told.iter().map(Broken::new));
+                    });
                 });
-            }),
+                self.broken = broken;
+            }
         }
     }
 
-    /// Finds what the points make of the sums of a stage.
-    fn finish(&mut self, stage: Stage, model: &Model<D>, freed: &mut [f64]) {
+    /// Finds what some of the points make of the sums of a stage.
+    pub(super) fn finish(
+        &mut self,
+        stage: Stage,
+        points: Range<usize>,
+        model: &Model<D>,
+        evolution: Evolution,
+    ) {
         let blocks = &self.blocks;
         match stage {
             Stage::SmallestStretch => {
-                let owned = self.thresholds[..model.owned()].par_iter_mut();
-                let owned = owned.with_min_len(CHUNK).zip(&model.block);
-                owned.for_each(|(value, block)| {
-                    *value = match blocks[usize::from(*block)].damage {
-                        // A point without intact bonds has no smallest stretch.
-                        Some(law) if value.is_infinite() => law.critical,
-                        Some(law) => law.threshold(stretch_of(*value)),
-                        None => f64::INFINITY,
-                    };
-                });
+                let thresholds = self.thresholds[points.clone()].par_iter_mut();
+                let block = &model.block[points];
+                thresholds
+                    .with_min_len(CHUNK)
+                    .zip(block)
+                    .for_each(|(value, block)| {
+                        *value = match blocks[usize::from(*block)].damage {
+                            // A point without intact bonds has no smallest stretch.
+                            Some(law) if value.is_infinite() => law.critical(),
+                            Some(law) => law.threshold(stretch_of(*value)),
+                            None => f64::INFINITY,
+                        };
+                    });
             }
-            Stage::PointSum(number) => self.numbers.finish(number, model, blocks, freed),
+            Stage::PointSum(number) => {
+                let step = evolution.step();
+                self.numbers.finish(number, points, model, blocks, step);
+            }
             Stage::Force => {}
         }
     }
 }
 
 /// Runs the kernel of a stage, if the law has so many.
-#[expect(clippy::too_many_arguments, reason = "called once, generic in the law")]
 fn sum_stage<L: Law<D>, const D: usize>(
     number: usize,
     bonds: &mut BlockBonds,
     points: Range<usize>,
-    laws: [L; 2],
-    criterion: Criterion,
+    law: L,
     sums: &mut [Vec<f64>],
-    freed: &mut [f64],
     source: Source<'_, D>,
 ) {
     if number >= L::STAGES {
         return;
     }
-    let half = sums.len() / 2;
-    let (left, lost) = sums.split_at_mut(half);
-    let results = (
-        L::Sum::columns_mut(left),
-        (L::Sum::columns_mut(lost), [freed]),
-    );
+    let results = L::Sum::columns_mut(sums);
     // No law has more stages, and no loop is compiled for those that a law does not have.
     match number {
         0 if const { L::STAGES > 0 } => {
-            let kernel = StageSum::<L, 0> { laws, criterion };
-            sweep(bonds, points, results, &kernel, source);
+            sweep(bonds, points, results, &StageSum::<L, 0> { law }, source);
+        }
+        1 if const { L::STAGES > 1 } => {
+            sweep(bonds, points, results, &StageSum::<L, 1> { law }, source);
         }
         _ => unreachable!("a law with more stages than loops"),
     }

@@ -1,78 +1,86 @@
-//! The sum of the bond forces, and the breaking of bonds where it needs no force states.
+//! The sum of the bond forces, and the breaking of bonds by what both ends' force states say.
 
 use crate::damage::{Criterion, Ends};
 use crate::lanes::{Lanes, Numbers, Simd};
-use crate::material::bond::Wanted;
+use crate::material::bond::{Wanted, Weights};
 use crate::material::{ForceState, Law};
 
 use super::kernel::{Group, Kernel};
 
 /// What happens to bonds while forces are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Evolution {
-    /// Bonds break and remember, as at the end of a step.
-    Step,
+    /// Bonds break and remember, as at the end of a step of this length (s).
+    Step(f64),
     /// Nothing: forces are only looked at.
     None,
 }
 
-/// Breaks the intact bonds that must, and adds their energy at the own end (J); returns which.
-#[inline(always)]
-pub fn break_bonds<S: Simd, L: Law<D>, K, const D: usize>(
-    simd: S,
-    laws: &[L; 2],
-    criterion: Criterion,
-    group: &mut Group<K, D>,
-    freed: &mut Lanes,
-) -> u8
-where
-    K: Kernel<D, Point = L::Point, Memory = L::Memory>,
-{
-    let ends = Ends {
-        laws,
-        points: &group.points,
-        thresholds: &group.thresholds,
-    };
-    let broken = group.intact & criterion.met::<S, L, D>(simd, &group.bond, ends);
-    if broken == 0 {
-        return 0;
+impl Evolution {
+    /// The length of the step (s), if there is one.
+    pub fn step(self) -> Option<f64> {
+        match self {
+            Self::Step(step) => Some(step),
+            Self::None => None,
+        }
     }
-    let broken = broken & group.breakable;
-    group.intact &= !broken;
-    // Copies, so that a loop need not keep them where they can be pointed to.
-    let (bond, own, memory) = (group.bond, group.points[0], group.memory[0]);
-    let (volume, share) = (group.volume, group.weights.own() * group.own_volume);
-    let law = laws[0];
-    simd.aside(move || {
-        let bond = bond.with_stretch(L::LINEAR);
-        let energy = law.bond_energy(&bond, &own, &memory) * volume;
-        *freed += simd.keep(energy * share, broken);
-    });
-    broken
 }
 
-/// Sums the forces of bonds, of which some may break before: force density by component (N/m³), then
-/// the energy (J) that the points' shares of the bonds set free.
+/// Sums the forces of the intact bonds: force density by component (N/m³), less those of bonds that
+/// break by what their force states say. Of these it sums the number, the energy (J) that the points'
+/// shares of them set free, how much of it they held above their criterion (J), and their forces (N/m³).
 #[derive(Clone, Copy)]
 pub struct Force<L> {
     /// Laws of the own and of the far end.
     pub laws: [L; 2],
     /// When bonds break here.
     pub criterion: Criterion,
+    /// Whether the weights of bonds are their influence, and not shares of volume.
+    pub influence: bool,
     /// Whether bonds remember.
     pub evolution: Evolution,
 }
 
+impl<L> Force<L> {
+    /// The work ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η of each bond of whole cells, J/m⁶, from the weighted sum of the
+    /// force states.
+    #[inline(always)]
+    fn work<S: Simd, const D: usize>(
+        &self,
+        simd: S,
+        group: &Group<Self, D>,
+        weighted: L::Force,
+    ) -> Lanes
+    where
+        L: Law<D>,
+    {
+        let whole = match group.weights {
+            Weights::One => weighted,
+            _ if self.influence => weighted,
+            _ => L::bond_force(
+                simd,
+                &self.laws,
+                &group.bond,
+                &group.points,
+                &group.memory,
+                Weights::One,
+            ),
+        };
+        whole.work(&group.bond, L::LINEAR)
+    }
+}
+
 impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Sums = [Lanes; D];
-    type Rare = [Lanes; 1];
+    type Broken = ([Lanes; 3], [Lanes; D]);
     type Point = L::Point;
     type Memory = L::Memory;
+    const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const HOT: bool = L::HOT;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::FORCE_READS_STRETCH,
-        shortening: true,
+        shortening: L::FORCE_READS_SHORTENING,
     };
 
     #[inline(always)]
@@ -82,7 +90,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
 
     #[inline(always)]
     fn remembers(&self) -> bool {
-        self.evolution == Evolution::Step
+        self.evolution != Evolution::None
     }
 
     #[inline(always)]
@@ -91,26 +99,59 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         simd: S,
         group: &mut Group<Self, D>,
         force: &mut [Lanes; D],
-        [freed]: &mut [Lanes; 1],
+        (told, lost): &mut Self::Broken,
     ) {
-        break_bonds::<S, L, Self, D>(simd, &self.laws, self.criterion, group, freed);
-        let [own, far] = &self.laws;
-        let [here, there] = &group.points;
-        if L::Memory::COUNT > 0 {
+        if let Evolution::Step(step) = self.evolution
+            && L::Memory::COUNT > 0
+        {
+            let [own, far] = &self.laws;
+            let [here, there] = &group.points;
             group.memory = [
-                own.memory(&group.bond, here, &group.memory[0]),
-                far.memory(&group.bond, there, &group.memory[1]),
+                own.memory(&group.bond, here, &group.memory[0], step),
+                far.memory(&group.bond, there, &group.memory[1], step),
             ];
         }
-        let (bond, weights) = (&group.bond, group.weights);
         let total = L::bond_force(
             simd,
             &self.laws,
-            bond,
+            &group.bond,
             &group.points,
             &group.memory,
-            weights,
+            group.weights,
         );
-        total.add(simd, bond, group.volume, group.intact, force);
+        let work = if self.criterion.reads_work() {
+            self.work(simd, group, total)
+        } else {
+            Lanes::splat(0.0)
+        };
+        let ends = Ends {
+            laws: &self.laws,
+            points: &group.points,
+            thresholds: &group.thresholds,
+        };
+        let broken = group.intact & self.criterion.met::<S, L, D>(simd, &group.bond, ends, work);
+        if broken != 0 {
+            let broken = broken & group.breakable;
+            group.intact &= !broken;
+            // Copies, so that a loop need not keep them where they can be pointed to.
+            let (bond, points, thresholds) = (group.bond, group.points, group.thresholds);
+            let (laws, memory, criterion) = (self.laws, group.memory[0], self.criterion);
+            let (volume, weight) = (group.volume, group.weights.own() * group.own_volume);
+            simd.aside(move || {
+                let bond = bond.with_stretch(L::LINEAR);
+                let ends = Ends {
+                    laws: &laws,
+                    points: &points,
+                    thresholds: &thresholds,
+                };
+                let energy = laws[0].bond_energy(&bond, &points[0], &memory) * weight * volume;
+                let overshoot = energy * criterion.overshoot::<L, D>(&bond, ends, work);
+                told[0] += simd.keep(Lanes::splat(1.0), broken);
+                told[1] += simd.keep(energy, broken);
+                told[2] += simd.keep(overshoot, broken);
+                total.add(simd, &bond, volume, broken, lost);
+            });
+        }
+        total.add(simd, &group.bond, group.volume, group.intact, force);
     }
 }

@@ -1,6 +1,6 @@
 //! The bonds between two blocks with the laws that they follow.
 
-use crate::damage::{Criterion, CriticalStretch};
+use crate::damage::{Criterion, DamageLaw};
 use crate::families::BlockBonds;
 use crate::material::{AnyLaw, PairLaw};
 
@@ -12,6 +12,8 @@ pub struct Interaction {
     pub laws: PairLaw,
     /// When bonds break.
     pub criterion: Criterion,
+    /// Whether the weights of the bonds are their influence, and not shares of volume.
+    pub influence: bool,
 }
 
 /// What the points of a block follow.
@@ -20,5 +22,5 @@ pub struct BlockLaws {
     /// The material law.
     pub law: AnyLaw,
     /// The damage law, if bonds can break.
-    pub damage: Option<CriticalStretch>,
+    pub damage: Option<DamageLaw>,
 }

@@ -67,15 +67,18 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Eight sums of each quantity; each is added to a column of numbers of the points.
     type Sums: Numbers;
 
-    /// As [`Self::Sums`], of quantities to which few bonds add: these may be pointed to, and a loop need
-    /// not keep them in registers.
-    type Rare: Numbers;
+    /// Eight sums of each quantity to which only bonds add that break; they are told by point, where
+    /// there are any.
+    type Broken: Numbers;
 
     /// The numbers of the ends that it reads.
     type Point: Numbers;
 
     /// The numbers of the bonds that it reads.
     type Memory: Numbers;
+
+    /// Whether there are bonds for it in `D` dimensions; else no loops are compiled.
+    const EXISTS: bool = true;
 
     /// How its sums become numbers.
     const COMBINE: Combine = Combine::Add;
@@ -116,6 +119,6 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         simd: S,
         group: &mut Group<Self, D>,
         sums: &mut Self::Sums,
-        rare: &mut Self::Rare,
+        broken: &mut Self::Broken,
     );
 }

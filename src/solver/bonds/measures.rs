@@ -27,7 +27,7 @@ pub struct Stored<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Sums = [Lanes; 4];
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
     const WHOLE: bool = L::Memory::COUNT > 0;
@@ -42,8 +42,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
         _: &mut [Lanes; 0],
     ) {
         let (family, own) = (group.family(), &group.points[0]);
-        let memory = self.law.memory(&group.bond, own, &group.memory[0]);
-        let energy = self.law.bond_energy(&group.bond, own, &memory);
+        let energy = self.law.bond_energy(&group.bond, own, &group.memory[0]);
         sums[0] += simd.keep(group.own_share(energy), family);
         sums[1] += simd.keep(group.volume, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
@@ -60,7 +59,7 @@ pub struct FamilyVolume;
 
 impl<const D: usize> Kernel<D> for FamilyVolume {
     type Sums = [Lanes; 1];
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const WANTED: Wanted = wanted(true);
@@ -105,7 +104,7 @@ pub struct Stiffness<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     type Sums = [Lanes; 6];
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = [Lanes; 0];
     const WANTED: Wanted = wanted(L::LINEAR);
@@ -119,11 +118,23 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
         _: &mut [Lanes; 0],
     ) {
         let length = group.bond.length;
+        let xi = &group.bond.reference;
         let own = self.laws[0].stiffness(length, &group.points[0]) * group.weights.own();
         let far = self.laws[1].stiffness(length, &group.points[1]) * group.weights.far();
-        let weight = (own + far) * group.volume / (length * length);
-        let xi = &group.bond.reference;
+        // Either all of a spring or the share along the bond.
+        let [own_across, far_across] = self.laws.map(|law| law.resists_across());
+        let none = Lanes::splat(0.0);
+        let sum = |across: bool| {
+            let share = |end, is| if is == across { end } else { none };
+            (share(own, own_across) + share(far, far_across)) * group.volume
+        };
+        let weight = sum(false) / (length * length);
         add_tensor::<S, D>(simd, sums, group.intact, |a, b| weight * xi[a] * xi[b]);
+        if own_across || far_across {
+            for sum_across in &mut sums[..D] {
+                *sum_across += simd.keep(sum(true), group.intact);
+            }
+        }
     }
 }
 
@@ -140,7 +151,7 @@ pub struct Stress<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     type Sums = [Lanes; 6];
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
     const WANTED: Wanted = wanted(L::LINEAR);
@@ -154,8 +165,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
         _: &mut [Lanes; 0],
     ) {
         let own = &group.points[0];
-        let memory = self.law.memory(&group.bond, own, &group.memory[0]);
-        let force = self.law.force(&group.bond, own, &memory);
+        let force = self.law.force(&group.bond, own, &group.memory[0]);
         let force = force.times(group.weights.own()).times(group.volume);
         add_tensor::<S, D>(simd, sums, group.intact, |a, b| {
             force.dyad(&group.bond, a, b)
@@ -170,7 +180,7 @@ pub struct Dilatation<const LINEAR: bool>;
 
 impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
     type Sums = [Lanes; 2];
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const WHOLE: bool = true;

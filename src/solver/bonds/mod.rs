@@ -5,9 +5,10 @@
 //! stage begins with a message where it reads anew what other ranks find: first the displacements,
 //! then thresholds or numbers of points. Interior points are worked on while messages are in flight.
 //!
-//! Bonds break in the first stage of a law that reads them, so that numbers of points and forces know
-//! the same bonds.
+//! Bonds break where the forces are summed, by what the force states of both ends say. What follows for
+//! the numbers of points is then found anew where it changes: see [`broken`].
 
+mod broken;
 mod evaluate;
 mod force;
 mod grid_points;
@@ -37,6 +38,7 @@ use point_sums::WholeSum;
 use seen::sweep_all;
 use sweep::Source;
 
+pub use broken::Broken;
 pub use evaluate::{Acting, ForceTimes};
 pub use force::Evolution;
 pub use interaction::{BlockLaws, Interaction};
@@ -72,6 +74,10 @@ pub struct Forces<const D: usize> {
     instructions: Instructions,
     /// Whether any law dissipates energy in intact bonds.
     remembers: bool,
+    /// Whether any bonds can break; the same on all ranks.
+    breaks: bool,
+    /// What came of bonds that broke in the last evaluation.
+    broken: Vec<Broken<D>>,
 }
 
 impl<const D: usize> Forces<D> {
@@ -96,7 +102,8 @@ impl<const D: usize> Forces<D> {
             .any(|pair| kind(&pair[0]) != kind(&pair[1]));
         let numbers = PointNumbers::new(&blocks, mixed, model);
         let with_thresholds =
-            (blocks.iter()).any(|block| block.damage.is_some_and(|law| law.alpha > 0.0));
+            (blocks.iter()).any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
+        let breaks = blocks.iter().any(|block| block.damage.is_some());
         let mut remembers = false;
         for interaction in &mut interactions {
             fn width<L: Law<D>, const D: usize>(_: &[L; 2]) -> usize {
@@ -139,6 +146,8 @@ impl<const D: usize> Forces<D> {
             halo,
             instructions,
             remembers,
+            breaks,
+            broken: Vec::new(),
         };
         if forces.numbers.with_constants {
             forces.find_constants(comm, model);

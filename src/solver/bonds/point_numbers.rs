@@ -1,6 +1,8 @@
 //! The numbers of points that laws declare: how they follow from sums over bonds.
 
-use crate::material::{AnyLaw, Counts, Law, MOST};
+use std::ops::Range;
+
+use crate::material::{Counts, Law, MOST};
 use crate::solver::model::Model;
 
 use super::interaction::BlockLaws;
@@ -11,9 +13,8 @@ const CHUNK: usize = 4096;
 /// Numbers of a point, at most.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
-/// Columns that a stage works on, at most: numbers, sums over the bonds left, sums over those that
-/// broke, energy set free.
-const COLUMNS: usize = NUMBERS + 2 * MOST.sum + 1;
+/// Columns that a stage works on, at most: numbers and sums.
+const COLUMNS: usize = NUMBERS + MOST.sum;
 
 /// The numbers of the local points by column: those that bonds read (of ghosts too), then those of a
 /// law alone (of owned points).
@@ -28,7 +29,7 @@ pub struct PointNumbers {
     pub stages: usize,
     /// Whether any law has constants.
     pub with_constants: bool,
-    /// Sums of a stage over the bonds left and over those that broke, by column.
+    /// Sums of a stage over the bonds, by column.
     pub sums: Vec<Vec<f64>>,
 }
 
@@ -49,7 +50,7 @@ impl PointNumbers {
             first_changing: changing.map(|c| c.constants).min().unwrap_or(read),
             stages: most(|c| c.stages),
             with_constants: most(|c| c.constants) > 0,
-            sums: vec![vec![0.0; owned]; 2 * if mixed { MOST.sum } else { most(|c| c.sum) }],
+            sums: vec![vec![0.0; owned]; if mixed { MOST.sum } else { most(|c| c.sum) }],
         }
     }
 
@@ -75,82 +76,60 @@ impl PointNumbers {
         }
     }
 
-    /// Finds the numbers that follow from the sums of a stage, and adds the energy (J) that points have
-    /// lost because bonds broke.
+    /// The numbers of an owned point.
+    pub fn of(&self, point: usize) -> [f64; NUMBERS] {
+        let get = |k: usize| self.columns.get(k).and_then(|column| column.get(point));
+        std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
+    }
+
+    /// Finds the numbers of some owned points that follow from the sums of a stage.
     pub fn finish<const D: usize>(
         &mut self,
         stage: usize,
+        points: Range<usize>,
         model: &Model<D>,
         blocks: &[BlockLaws],
-        freed: &mut [f64],
+        step: Option<f64>,
     ) {
-        let owned = model.owned();
-        let sums = self.sums.len() / 2;
         let mut columns: [&mut [f64]; COLUMNS] = std::array::from_fn(|_| &mut [][..]);
         for (place, column) in self.columns.iter_mut().enumerate() {
-            columns[place] = &mut column[..owned];
+            columns[place] = &mut column[points.clone()];
         }
-        let (left, lost) = self.sums.split_at_mut(sums);
-        for (k, (left, lost)) in left.iter_mut().zip(lost).enumerate() {
-            columns[NUMBERS + k] = left;
-            columns[NUMBERS + MOST.sum + k] = lost;
+        for (place, column) in self.sums.iter_mut().enumerate() {
+            columns[NUMBERS + place] = &mut column[points.clone()];
         }
-        columns[COLUMNS - 1] = freed;
-        over_points(0..owned, columns, &|first, columns| {
-            for k in 0..columns[COLUMNS - 1].len() {
-                let point = first + k;
-                let law = blocks[usize::from(model.block[point])].law;
+        over_points(points, columns, &|points, columns| {
+            for (k, point) in points.enumerate() {
+                let law = &blocks[usize::from(model.block[point])].law;
                 let counts = law.counts::<D>();
                 if stage >= counts.stages {
                     continue;
                 }
                 let get = |column: usize| columns[column].get(k).copied().unwrap_or(0.0);
                 let mut numbers: [f64; NUMBERS] = std::array::from_fn(get);
-                let left: [f64; MOST.sum] = std::array::from_fn(|s| get(NUMBERS + s));
-                let lost: [f64; MOST.sum] = std::array::from_fn(|s| get(NUMBERS + MOST.sum + s));
-                let mut change = 0.0;
-                if lost.iter().any(|sum| *sum != 0.0) {
-                    let before: [f64; MOST.sum] = std::array::from_fn(|s| lost[s] + left[s]);
-                    change += energy_at::<D>(&law, stage, &before, numbers)
-                        - energy_at::<D>(&law, stage, &left, numbers);
-                }
-                Law::<D>::point(&law, stage, &left[..counts.sum], &mut numbers);
-                for (column, number) in columns
-                    .iter_mut()
-                    .zip(numbers)
-                    .take(counts.point + counts.own)
-                {
+                let sums: [f64; MOST.sum] = std::array::from_fn(|s| get(NUMBERS + s));
+                Law::<D>::point(law, stage, &sums[..counts.sum], &mut numbers, step);
+                let found = counts.point + counts.own;
+                for (column, number) in columns.iter_mut().zip(numbers).take(found) {
                     column[k] = number;
                 }
-                columns[COLUMNS - 1][k] += model.volume[point] * change;
             }
         });
     }
 }
 
-/// The energy density of a point (J/m³) whose stage has these sums.
-fn energy_at<const D: usize>(
-    law: &AnyLaw,
-    stage: usize,
-    sums: &[f64],
-    mut numbers: [f64; NUMBERS],
-) -> f64 {
-    Law::<D>::point(law, stage, &sums[..law.counts::<D>().sum], &mut numbers);
-    Law::<D>::point_energy(law, &numbers)
-}
-
-/// Calls `work` with parts of the columns, on all threads, and the index of the first entry; columns
+/// Calls `work` with parts of the columns, on all threads, and the points that they belong to; columns
 /// may be empty.
 fn over_points<const N: usize>(
-    range: std::ops::Range<usize>,
+    points: Range<usize>,
     mut columns: [&mut [f64]; N],
-    work: &(impl Fn(usize, &mut [&mut [f64]; N]) + Sync),
+    work: &(impl Fn(Range<usize>, &mut [&mut [f64]; N]) + Sync),
 ) {
-    if range.len() <= CHUNK {
-        return work(range.start, &mut columns);
+    if points.len() <= CHUNK {
+        return work(points, &mut columns);
     }
-    let half = range.len() / 2;
-    let middle = range.start + half;
+    let half = points.len() / 2;
+    let middle = points.start + half;
     let second = columns.each_mut().map(|column| {
         let whole = std::mem::take(column);
         let (first, second) = whole.split_at_mut(half.min(whole.len()));
@@ -158,7 +137,7 @@ fn over_points<const N: usize>(
         second
     });
     rayon::join(
-        || over_points(range.start..middle, columns, work),
-        || over_points(middle..range.end, second, work),
+        || over_points(points.start..middle, columns, work),
+        || over_points(middle..points.end, second, work),
     );
 }

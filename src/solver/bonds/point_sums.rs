@@ -1,11 +1,9 @@
 //! The sums over bonds that the numbers of points follow from.
 
-use crate::damage::Criterion;
 use crate::lanes::{Lanes, Numbers, Simd};
 use crate::material::Law;
 use crate::material::bond::Wanted;
 
-use super::force::break_bonds;
 use super::kernel::{Combine, Group, Kernel};
 
 /// Neither stretches nor forces.
@@ -17,56 +15,46 @@ const fn growth_only(linear: bool) -> Wanted {
     }
 }
 
-/// Sums stage `N` of a law over the intact bonds, of which some may break before: the sums over those
-/// left, the sums over those that break, and the energy (J) that the points' shares of these set free.
+/// Sums stage `N` of a law over the intact bonds.
 #[derive(Clone, Copy)]
 pub struct StageSum<L, const N: usize> {
-    /// Laws of the own and of the far end.
-    pub laws: [L; 2],
-    /// When bonds break here.
-    pub criterion: Criterion,
+    /// The law of the own end.
+    pub law: L,
 }
 
 impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
     type Sums = L::Sum;
-    type Rare = (L::Sum, [Lanes; 1]);
+    type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
+    const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const HOT: bool = L::HOT;
-    // Only a criterion that laws scale looks at both ends.
-    const READS_FAR: bool = L::SCALED;
+    const READS_FAR: bool = false;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
-        stretch: true,
+        stretch: L::SUM_READS_STRETCH,
         shortening: false,
     };
-
-    #[inline(always)]
-    fn criterion(&self) -> Criterion {
-        self.criterion
-    }
 
     #[inline(always)]
     fn add<S: Simd>(
         &self,
         simd: S,
         group: &mut Group<Self, D>,
-        left: &mut L::Sum,
-        (lost, [freed]): &mut Self::Rare,
+        sums: &mut L::Sum,
+        _: &mut [Lanes; 0],
     ) {
-        let share = self.laws[0].share::<N>(&group.bond, &group.points[0]);
-        let share = L::Sum::each(|k| group.own_share(share.get(k)));
-        let broken = break_bonds::<S, L, Self, D>(simd, &self.laws, self.criterion, group, freed);
-        if broken != 0 {
-            // Kept apart, so that `left` is the same sum as if the bonds had been broken before.
-            simd.aside(move || {
-                for k in 0..L::Sum::COUNT {
-                    *lost.get_mut(k) += simd.keep(share.get(k), broken);
-                }
-            });
-        }
+        let share = (self.law).share::<N>(&group.bond, &group.points[0], &group.memory[0]);
+        let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
-            *left.get_mut(k) += simd.keep(share.get(k), group.intact);
+            // The stretch of a bond that only fills up a group is not a number.
+            let share = if L::SUM_READS_STRETCH {
+                simd.keep(share.get(k), group.intact)
+            } else {
+                share.get(k)
+            };
+            let sum = sums.get_mut(k);
+            *sum = simd.multiply_add(share, weight, *sum);
         }
     }
 }
@@ -80,7 +68,7 @@ pub struct WholeSum<L> {
 
 impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
     type Sums = L::WholeSum;
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const WHOLE: bool = true;
@@ -94,7 +82,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
         sums: &mut L::WholeSum,
         _: &mut [Lanes; 0],
     ) {
-        let share = self.law.whole_share(group.bond.length);
+        let share = self.law.whole_share(&group.bond);
         for k in 0..L::WholeSum::COUNT {
             let share = share.get(k) * group.volume * group.weights.own();
             *sums.get_mut(k) += simd.keep(share, group.whole);
@@ -109,7 +97,7 @@ pub struct SmallestStretch;
 
 impl<const D: usize> Kernel<D> for SmallestStretch {
     type Sums = [Lanes; 1];
-    type Rare = [Lanes; 0];
+    type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;

@@ -1,7 +1,9 @@
 //! What is seen of the bonds at set-up and for output, by column over the owned points.
 
+use std::ops::Range;
+
 use crate::families::BlockBonds;
-use crate::lanes::Numbers;
+use crate::lanes::{Lanes, Numbers};
 use crate::material::{Law, with_pair};
 use crate::solver::model::Model;
 
@@ -9,8 +11,7 @@ use super::Forces;
 use super::interaction::Interaction;
 use super::kernel::Kernel;
 use super::measures;
-use super::point_numbers;
-use super::sweep::{Source, sweep};
+use super::sweep::{Source, sweep, sweep_from};
 
 /// What the bonds of the owned points hold, by column over the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,22 +42,25 @@ impl<const D: usize> Forces<D> {
     /// What the bonds of each owned point hold, at the displacements of the last
     /// [evaluation](Self::evaluate).
     pub fn stored(&mut self, model: &Model<D>) -> Stored {
-        let columns = self.measure(model.owned(), 4, |interaction, sums, source| {
+        self.stored_at(model, 0..model.owned())
+    }
+
+    /// As [`Self::stored`], of some of the points: no part of those whose bonds are worked on together.
+    pub(super) fn stored_at(&mut self, model: &Model<D>, points: Range<usize>) -> Stored {
+        let mut columns: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; points.len()]);
+        self.for_each_interaction(|interaction, source| {
             with_pair!(interaction.laws, laws => {
                 let kernel = measures::Stored { law: laws[0] };
-                sweep_all(&mut interaction.bonds, sums, &kernel, source);
+                let results = <[Lanes; 4]>::columns_mut(&mut columns);
+                let (bonds, base) = (&mut interaction.bonds, points.start);
+                sweep_from(bonds, points.clone(), base, results, &kernel, source);
             });
         });
-        let [mut energy, volume, neighbours, dissipated] =
-            columns.try_into().expect("four columns");
-        let numbers = &self.numbers.columns;
+        let [mut energy, volume, neighbours, dissipated] = columns;
         if self.numbers.stages > 0 {
-            for (point, energy) in energy.iter_mut().enumerate() {
-                let law = self.blocks[usize::from(model.block[point])].law;
-                let get = |k: usize| numbers.get(k).and_then(|column| column.get(point));
-                let own: [f64; point_numbers::NUMBERS] =
-                    std::array::from_fn(|k| get(k).copied().unwrap_or(0.0));
-                *energy += Law::<D>::point_energy(&law, &own);
+            for (point, energy) in points.zip(&mut energy) {
+                let law = &self.blocks[usize::from(model.block[point])].law;
+                *energy += Law::<D>::point_energy(law, &self.numbers.of(point));
             }
         }
         Stored {
@@ -141,6 +145,6 @@ pub(super) fn sweep_all<K: Kernel<D>, const D: usize>(
     source: Source<'_, D>,
 ) {
     let owned = sums.first().map_or(0, Vec::len);
-    let results = <(K::Sums, K::Rare)>::columns_mut(sums);
+    let results = K::Sums::columns_mut(sums);
     sweep(bonds, 0..owned, results, kernel, source);
 }

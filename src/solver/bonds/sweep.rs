@@ -34,8 +34,19 @@ pub struct Source<'a, const D: usize> {
 }
 
 /// The columns of numbers of the points that a kernel adds to.
-type Results<'a, K, const D: usize> =
-    <(<K as Kernel<D>>::Sums, <K as Kernel<D>>::Rare) as Numbers>::ColumnsMut<'a>;
+type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as Numbers>::ColumnsMut<'a>;
+
+/// What a kernel sums over the bonds of a point that break.
+#[derive(Debug, Clone, Copy)]
+pub struct BrokenSums {
+    /// Its local index.
+    pub point: usize,
+    /// The sums; those that a kernel does not have are 0.
+    pub sums: [f64; MOST_BROKEN],
+}
+
+/// The most quantities of [`Kernel::Broken`].
+pub const MOST_BROKEN: usize = 6;
 
 /// Part of the bonds of two blocks.
 trait Part: Sized + Send {
@@ -60,14 +71,14 @@ trait Runner<P: Part>: Sync {
         part: P,
         base: usize,
         results: <Self::Sums as Numbers>::ColumnsMut<'_>,
-    );
+    ) -> Vec<BrokenSums>;
 
     /// Whether it is worth a version for each set of vector instructions.
     const HOT: bool;
 }
 
 /// Runs the kernel over the bonds of the owned points in a range of local indices. The results are
-/// columns over all owned points.
+/// columns over all owned points. Returns what bonds that break give, by ascending point.
 ///
 /// # Panics
 /// When an array that the kernel reads is too short for the bonds.
@@ -77,7 +88,22 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
     results: Results<'_, K, D>,
     kernel: &K,
     source: Source<'_, D>,
-) {
+) -> Vec<BrokenSums> {
+    if const { !K::EXISTS } {
+        unreachable!("bonds of a law that is not there in {D} dimensions")
+    }
+    sweep_from(bonds, points, 0, results, kernel, source)
+}
+
+/// As [`sweep`], with results that are columns over the owned points from `base` on.
+pub fn sweep_from<K: Kernel<D>, const D: usize>(
+    bonds: &mut BlockBonds,
+    points: Range<usize>,
+    base: usize,
+    results: Results<'_, K, D>,
+    kernel: &K,
+    source: Source<'_, D>,
+) -> Vec<BrokenSums> {
     let instructions = source.instructions;
     let several = rayon::current_num_threads() > 1;
     let leaf = |groups: usize| {
@@ -99,7 +125,7 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
             let leaf = leaf(list.groups_a_row());
             let points = ListPoints::new(kernel, list.reach(), nodes, numbers, thresholds);
             let runner = OverRows { kernel, points };
-            split(list.rows(rows), 0, results, &runner, leaf, instructions);
+            split(list.rows(rows), base, results, &runner, leaf, instructions)
         }
         BlockBonds::Lattice(lattice) => {
             let vectors = lattice.vectors_below(points.start)..lattice.vectors_below(points.end);
@@ -117,7 +143,7 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
             };
             let leaf = leaf(lattice.offsets());
             let part = lattice.vectors(vectors);
-            split(part, 0, results, &runner, leaf, instructions);
+            split(part, base, results, &runner, leaf, instructions)
         }
     }
 }
@@ -130,7 +156,7 @@ fn split<P: Part, R: Runner<P>>(
     runner: &R,
     leaf: usize,
     instructions: Instructions,
-) {
+) -> Vec<BrokenSums> {
     if part.len() <= leaf {
         return run(part, base, results, runner, instructions);
     }
@@ -138,10 +164,12 @@ fn split<P: Part, R: Runner<P>>(
     let border = part.point(half);
     let (part_a, part_b) = part.split_at(half);
     let [results_a, results_b] = R::Sums::split_at(results, border - base);
-    rayon::join(
+    let (mut all, mut rest) = rayon::join(
         || split(part_a, base, results_a, runner, leaf, instructions),
         || split(part_b, border, results_b, runner, leaf, instructions),
     );
+    all.append(&mut rest);
+    all
 }
 
 fn run<P: Part, R: Runner<P>>(
@@ -150,7 +178,7 @@ fn run<P: Part, R: Runner<P>>(
     results: <R::Sums as Numbers>::ColumnsMut<'_>,
     runner: &R,
     instructions: Instructions,
-) {
+) -> Vec<BrokenSums> {
     match instructions {
         // Without AVX-512 it is not much slower, and has the same bits.
         #[cfg(target_arch = "x86_64")]
@@ -180,8 +208,8 @@ fn run_avx512<P: Part, R: Runner<P>>(
     base: usize,
     results: <R::Sums as Numbers>::ColumnsMut<'_>,
     runner: &R,
-) {
-    runner.run(simd, part, base, results);
+) -> Vec<BrokenSums> {
+    runner.run(simd, part, base, results)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -192,8 +220,8 @@ fn run_avx2<P: Part, R: Runner<P>>(
     base: usize,
     results: <R::Sums as Numbers>::ColumnsMut<'_>,
     runner: &R,
-) {
-    runner.run(simd, part, base, results);
+) -> Vec<BrokenSums> {
+    runner.run(simd, part, base, results)
 }
 
 impl Part for Rows<'_> {
@@ -232,13 +260,24 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
     }
 }
 
+impl BrokenSums {
+    /// From the sums of eight lanes.
+    fn new<N: Numbers>(point: usize, broken: &N, value: impl Fn(Lanes) -> f64) -> Self {
+        let mut sums = [0.0; MOST_BROKEN];
+        for (k, sum) in sums.iter_mut().enumerate().take(N::COUNT) {
+            *sum = value(broken.get(k));
+        }
+        Self { point, sums }
+    }
+}
+
 struct OverRows<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: ListPoints<'a, K, D>,
 }
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
-    type Sums = (K::Sums, K::Rare);
+    type Sums = K::Sums;
     const HOT: bool = K::HOT;
 
     #[inline(always)]
@@ -248,37 +287,43 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
         mut rows: Rows<'b>,
         base: usize,
         mut results: Results<'_, K, D>,
-    ) {
+    ) -> Vec<BrokenSums> {
+        let mut told = Vec::new();
         let (kernel, points) = (*self.kernel, self.points);
         for k in 0..rows.len() {
             let mut row: Row<'_> = rows.row(k);
             let mut sums = kernel.start();
-            let mut rare = K::Rare::splat(0.0);
+            let mut broken = K::Broken::splat(0.0);
+            let mut any_broken = false;
             // SAFETY: the rows are those of the list whose reach `points` was made for.
             let here = unsafe { points.here(row.point) };
             for group in 0..row.neighbours.len() {
                 // SAFETY: as above.
                 let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };
                 let before = bonds.intact;
-                kernel.add(simd, &mut bonds, &mut sums, &mut rare);
+                kernel.add(simd, &mut bonds, &mut sums, &mut broken);
                 if bonds.intact != before {
                     row.groups.intact[group] = bonds.intact;
+                    any_broken = true;
                 }
                 if K::Memory::COUNT > 0 && kernel.remembers() {
-                    store_memory(row.groups.numbers(group), &bonds.memory, bonds.intact);
+                    store_memory(row.groups.numbers(group), &bonds.memory, before);
                 }
             }
-            let sums = (sums, rare);
-            for quantity in 0..<(K::Sums, K::Rare)>::COUNT {
+            for quantity in 0..K::Sums::COUNT {
                 let lanes = sums.get(quantity);
                 let value = match K::COMBINE {
                     Combine::Add => lanes.sum(),
                     Combine::Smallest => lanes.smallest(),
                 };
-                let column = <(K::Sums, K::Rare)>::column_mut(&mut results, quantity);
+                let column = K::Sums::column_mut(&mut results, quantity);
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
+            if any_broken {
+                told.push(BrokenSums::new(row.point, &broken, Lanes::sum));
+            }
         }
+        told
     }
 }
 
@@ -290,7 +335,7 @@ struct OverVectors<'a, K: Kernel<D>, const D: usize> {
 }
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K, D> {
-    type Sums = (K::Sums, K::Rare);
+    type Sums = K::Sums;
     const HOT: bool = K::HOT;
 
     #[inline(always)]
@@ -300,14 +345,16 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         mut vectors: Vectors<'b>,
         base: usize,
         mut results: Results<'_, K, D>,
-    ) {
+    ) -> Vec<BrokenSums> {
+        let mut told = Vec::new();
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
         for k in 0..vectors.len() {
             let mut vector: Adjacent<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
             let mut sums = kernel.start();
-            let mut rare = K::Rare::splat(0.0);
+            let mut broken = K::Broken::splat(0.0);
+            let mut any_broken = false;
             // SAFETY: the vectors are those of the grid that `points` was made for.
             let here = unsafe { points.here(vector.place) };
             for o in 0..vector.offsets.len() {
@@ -317,18 +364,18 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     bonds.whole = whole.map_or(0, |bits| bits[o]);
                 }
                 let before = bonds.intact;
-                kernel.add(simd, &mut bonds, &mut sums, &mut rare);
+                kernel.add(simd, &mut bonds, &mut sums, &mut broken);
                 if bonds.intact != before {
                     vector.groups.intact[o] = bonds.intact;
+                    any_broken = true;
                 }
                 if K::Memory::COUNT > 0 && kernel.remembers() {
-                    store_memory(vector.groups.numbers(o), &bonds.memory, bonds.intact);
+                    store_memory(vector.groups.numbers(o), &bonds.memory, before);
                 }
             }
             let first = vector.point - base;
-            let sums = (sums, rare);
-            for quantity in 0..<(K::Sums, K::Rare)>::COUNT {
-                let column = <(K::Sums, K::Rare)>::column_mut(&mut results, quantity);
+            for quantity in 0..K::Sums::COUNT {
+                let column = K::Sums::column_mut(&mut results, quantity);
                 let lanes: Lanes = sums.get(quantity);
                 for lane in 0..WIDTH {
                     if vector.members >> lane & 1 == 1 {
@@ -336,6 +383,15 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     }
                 }
             }
+            if any_broken {
+                for lane in 0..WIDTH {
+                    told.push(BrokenSums::new(vector.point + lane, &broken, |lanes| {
+                        lanes.0[lane]
+                    }));
+                }
+                told.retain(|told: &BrokenSums| told.sums[0] > 0.0);
+            }
         }
+        told
     }
 }

@@ -132,7 +132,12 @@ impl<const D: usize> Conditions<D> {
     /// the step just made (s), 0 at the start.
     pub fn place(&self, fields: &mut Fields<D>, time: f64, step: f64) {
         for support in &self.supports {
-            support.place(&mut fields.displacement[support.component], time, step);
+            let component = support.component;
+            support.place(&mut fields.displacement[component], time, step);
+            if step > 0.0 {
+                let displacement = &fields.displacement[component];
+                support.set_mean_velocity(displacement, &mut fields.velocity[component], step);
+            }
         }
     }
 

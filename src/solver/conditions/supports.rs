@@ -105,6 +105,14 @@ impl Support {
         }
     }
 
+    /// Gives the points their mean velocity in the step just made (s).
+    pub fn set_mean_velocity(&self, displacement: &[f64], velocity: &mut [f64], step: f64) {
+        for (from, point) in self.moved_from.iter().zip(&self.points) {
+            let point = *point as usize;
+            velocity[point] = (displacement[point] - from) / step;
+        }
+    }
+
     /// Gives the points their velocity at `time` (s), and finds the reactions: what must be added to
     /// the other forces so that the Verlet scheme makes the prescribed motion. `step` is the time
     /// step (s). Returns whether all of that is finite.

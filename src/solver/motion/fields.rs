@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use crate::deck::plan::Field;
+use crate::solver::bonds::Broken;
 use crate::solver::model::Model;
 
 /// What a field is, and what happens to it.
@@ -157,9 +158,15 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Energy that a point's share of bonds has set free by breaking, J.
-    freed_energy: Vec<f64> = Description {
+    /// Energy that a point's share of bonds has set free by breaking, J; none without damage.
+    freed_energy: Option<Vec<f64>> = Description {
         name: "freed_energy",
+        ..ENERGY
+    };
+    /// How much of the freed energy bonds held above their criterion when they were seen to break, J;
+    /// none without damage.
+    overshoot_energy: Option<Vec<f64>> = Description {
+        name: "overshoot_energy",
         ..ENERGY
     };
     /// Work done by loads and supports, J; none without them.
@@ -221,6 +228,8 @@ pub struct Needs {
     pub damping: bool,
     /// Whether there is relaxation.
     pub relaxation: bool,
+    /// Whether bonds can break.
+    pub damage: bool,
 }
 
 impl<const D: usize> Fields<D> {
@@ -235,7 +244,8 @@ impl<const D: usize> Fields<D> {
             internal_force: vector(owned),
             external_force: needs.loads.then(|| vector(owned)),
             reaction: needs.supports.then(|| vector(owned)),
-            freed_energy: scalar(),
+            freed_energy: needs.damage.then(scalar),
+            overshoot_energy: needs.damage.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
             damping_power: needs.damping.then(scalar),
             relaxation_velocity: needs.relaxation.then(|| vector(owned)),
@@ -286,6 +296,26 @@ impl<const D: usize> Fields<D> {
                 *power = model.damping_of(point) * mass * square;
                 *energy += 0.5 * step * (before + *power);
             });
+    }
+
+    /// Books what bonds set free that broke at the end of a step (s).
+    ///
+    /// Their force has acted in the first half kick of the step and is missing in the second, so that
+    /// they have taken up ½ F·Δℓ less than they held in the end: that stays with the points. On
+    /// average a bond breaks in the middle of the step at whose end it is seen, so that neither motion
+    /// nor energy depends on the step to first order.
+    pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
+        let velocity = &self.velocity;
+        let (Some(freed), Some(overshoot)) = (&mut self.freed_energy, &mut self.overshoot_energy)
+        else {
+            return;
+        };
+        for broken in all {
+            let point = broken.point;
+            let power: f64 = (0..D).map(|d| broken.force[d] * velocity[d][point]).sum();
+            freed[point] += broken.energy + 0.5 * step * model.volume[point] * power;
+            overshoot[point] += broken.overshoot;
+        }
     }
 
     /// The columns of a field, if decks may ask for it and it is one of the points'.

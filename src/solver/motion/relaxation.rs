@@ -311,10 +311,11 @@ impl<const D: usize> Simulation<'_, D> {
     /// In equilibrium: breaks the bonds that must, and lets the points start anew; where none does, the
     /// load step is over.
     fn break_or_settle(&mut self) {
-        let freed = self.fields.freed_energy.clone();
-        self.evaluate(Evolution::Step);
-        let broke = u64::from(self.fields.freed_energy != freed);
-        if total(self.comm, broke) > 0 {
+        // Time moves once in a load step, however often bonds break.
+        let is_first = self.load_step.since_breaking == self.load_step.iterations;
+        let step = if is_first { self.clock.step() } else { 0.0 };
+        self.evaluate(Evolution::Step(step));
+        if total(self.comm, self.forces.broken().len() as u64) > 0 {
             self.load_step.since_breaking = 0;
             self.stop();
             self.evaluate(Evolution::None);

@@ -46,6 +46,8 @@ pub struct Energies {
     pub strain: f64,
     /// Set free by bonds that broke.
     pub fracture: f64,
+    /// How much of that bonds held above their criterion when they were seen to break.
+    pub overshoot: f64,
     /// Work done by loads and supports.
     pub work: f64,
     /// Taken by viscous damping and by bonds that yield.
@@ -94,26 +96,31 @@ impl HistoryObserver {
         if plan.scales_density() {
             columns.push(("kinetic_ratio".to_owned(), "1"));
         }
-        let mut vector = |name: String, unit| {
+        let vector = |columns: &mut Vec<_>, name: String, unit| {
             columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), unit)));
         };
-        vector("momentum".to_owned(), "kg m/s");
-        vector("cracked_lower".to_owned(), "m");
-        vector("cracked_upper".to_owned(), "m");
+        vector(&mut columns, "momentum".to_owned(), "kg m/s");
+        vector(&mut columns, "cracked_lower".to_owned(), "m");
+        vector(&mut columns, "cracked_upper".to_owned(), "m");
+        columns.push(("overshoot_energy".to_owned(), "J"));
         let mut reactions = Vec::new();
         for Reaction { set, span } in &plan.history.reactions {
             let points = members(plan, &simulation.model, *set);
             let place = ("[history] reactions", span.clone());
             not_empty(plan, comm, *set, &points, place)?;
             reactions.push(points);
-            vector(format!("reaction_{}", plan.sets[*set].name), "N");
+            vector(
+                &mut columns,
+                format!("reaction_{}", plan.sets[*set].name),
+                "N",
+            );
         }
         let mut probes = Vec::new();
         for plan::Probe { name, at, .. } in &plan.history.probes {
             let point = nearest(simulation, *at).own;
             probes.push(Probe { point });
-            vector(format!("probe_{name}_displacement"), "m");
-            vector(format!("probe_{name}_velocity"), "m/s");
+            vector(&mut columns, format!("probe_{name}_displacement"), "m");
+            vector(&mut columns, format!("probe_{name}_velocity"), "m/s");
         }
         let mut fronts = Vec::new();
         for front in &plan.history.fronts {
@@ -179,12 +186,15 @@ impl HistoryObserver {
             dissipated.add(density * volume);
         }
         sums.push(dissipated);
+        sums.push(sum(fields.overshoot_energy.as_deref().unwrap_or_default()));
         for members in &self.reactions {
             sums.extend(simulation.conditions.reaction(model, fields, members));
         }
         let sums = reduce(comm, &mut sums);
         let (own, rest) = sums.split_at(3 + D);
-        let (work, dissipated, reactions) = (rest[0], rest[1], &rest[2..]);
+        let ([work, dissipated, overshoot], reactions) =
+            rest.split_first_chunk().expect("three sums");
+        let (work, dissipated, overshoot) = (*work, *dissipated, *overshoot);
 
         let cracked = Cracked::new(simulation, snapshot);
         let neighbours = snapshot.stored.neighbours.iter();
@@ -200,6 +210,7 @@ impl HistoryObserver {
             kinetic: own[0],
             strain: own[1],
             fracture: own[2],
+            overshoot,
             work,
             dissipated,
             error: energy - first_energy,
@@ -227,6 +238,7 @@ impl HistoryObserver {
         values.extend(&own[3..]);
         values.extend(&lower[..D]);
         values.extend(&upper[..D]);
+        values.push(energies.overshoot);
         values.extend(reactions);
         values.extend(self.probe_values(simulation));
         for front in &self.fronts {
@@ -285,7 +297,9 @@ fn point_sums<const D: usize>(
         }
         sums[0].add(0.5 * mass * square);
         sums[1].add(snapshot.stored.energy[point] * model.volume[point]);
-        sums[2].add(fields.freed_energy[point]);
+        if let Some(freed) = &fields.freed_energy {
+            sums[2].add(freed[point]);
+        }
     };
     (0..model.owned().div_ceil(CHUNK))
         .into_par_iter()

@@ -1,0 +1,118 @@
+//! A bond breaks for good when it is pulled and the work of its force states reaches w_c.
+//!
+//! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work that a linear bond
+//! has taken is w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. All bonds across a unit area take G0 together: in the plane
+//! 2h ∫₀^δ ∫_z^δ ∫₀^{acos(z/ξ)} w_c ξ dφ dξ dz = (2/3) h δ³ w_c.
+
+use std::f64::consts::PI;
+
+use crate::dimension::Dimension;
+
+/// How w_c follows from the fracture energy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Calibration {
+    /// So that all bonds across a unit area take it.
+    Energy,
+    /// As Willberg et al. 2022 print it in eq. 16 and 18: their w has no ½, and in the plane their w_c
+    /// is 3G0/(πδ³h).
+    Willberg2022,
+}
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BondEnergy {
+    /// w_c, J/m⁶.
+    pub critical: f64,
+    /// α.
+    pub alpha: f64,
+    /// The critical stretch s0 that belongs to the same fracture energy, which α acts on.
+    pub stretch: f64,
+}
+
+impl BondEnergy {
+    /// w_c (J/m⁶) from the fracture energy G0 (J/m²) and the horizon δ (m): 3-D 4G0/(πδ⁴), in the
+    /// plane 3G0/(2δ³h), 1-D 2G0/(δ²A).
+    pub fn from_energy(
+        dimension: Dimension,
+        calibration: Calibration,
+        energy: f64,
+        horizon: f64,
+    ) -> f64 {
+        use Dimension::{Line, PlaneStrain, PlaneStress, Space};
+        let share = match (dimension, calibration) {
+            (Space, _) => 4.0 / (PI * horizon.powi(4)),
+            (PlaneStress { thickness } | PlaneStrain { thickness }, Calibration::Energy) => {
+                1.5 / (horizon.powi(3) * thickness)
+            }
+            (PlaneStress { thickness } | PlaneStrain { thickness }, _) => {
+                3.0 / (PI * horizon.powi(3) * thickness)
+            }
+            (Line { cross_section }, _) => 2.0 / (horizon.powi(2) * cross_section),
+        };
+        match calibration {
+            Calibration::Energy => share * energy,
+            Calibration::Willberg2022 => 0.5 * share * energy,
+        }
+    }
+
+    /// The threshold (J/m⁶) of a point whose intact bonds have this smallest stretch: that of a stretch
+    /// s0 − α s_min in place of s0.
+    #[inline(always)]
+    pub fn threshold(&self, smallest: f64) -> f64 {
+        let share = (1.0 - self.alpha * smallest / self.stretch).max(0.0);
+        self.critical * share * share
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All bonds across a unit area, by the midpoint rule, over the fracture energy.
+    fn taken(dimension: Dimension) -> f64 {
+        let (horizon, energy, cells) = (3e-3, 135.0, 1500_u32);
+        let critical = BondEnergy::from_energy(dimension, Calibration::Energy, energy, horizon);
+        let step = horizon / f64::from(cells);
+        let middle = |k: u32| (f64::from(k) + 0.5) * step;
+        let mut sum = 0.0;
+        for i in 0..cells {
+            let z = middle(i);
+            for j in i + 1..cells {
+                let r = middle(j);
+                sum += match dimension {
+                    // The cap of directions that cross.
+                    Dimension::Space => 2.0 * PI * (1.0 - z / r) * r * r,
+                    Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
+                        2.0 * (z / r).acos() * r * thickness
+                    }
+                    Dimension::Line { cross_section } => cross_section,
+                };
+            }
+        }
+        sum * critical * step * step / energy
+    }
+
+    #[test]
+    fn all_bonds_across_an_area_take_the_fracture_energy() {
+        for dimension in [
+            Dimension::Space,
+            Dimension::PlaneStress { thickness: 0.01 },
+            Dimension::PlaneStrain { thickness: 0.2 },
+            Dimension::Line { cross_section: 0.3 },
+        ] {
+            let taken = taken(dimension);
+            assert!((taken - 1.0).abs() < 2e-3, "{dimension:?}: {taken}");
+        }
+    }
+
+    #[test]
+    fn alpha_acts_as_on_the_critical_stretch() {
+        let law = BondEnergy {
+            critical: 4.0,
+            alpha: 0.5,
+            stretch: 0.02,
+        };
+        // s0 − α s_min = 0.03 is 1.5 s0.
+        assert!((law.threshold(-0.02) - 9.0).abs() < 1e-12);
+    }
+}

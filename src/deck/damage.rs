@@ -1,0 +1,96 @@
+//! Damage laws of decks.
+
+use serde_spanned::Spanned;
+
+use super::grammar::{self, Text};
+use super::number::Number;
+use super::plan::{self, Calibration, DamageRule, Toughness};
+use super::resolve::Scope;
+use super::sets::find_sets;
+use crate::error::Result;
+
+/// A key that says how much it takes for bonds to break, and what it means.
+type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
+
+/// Validates a damage law.
+///
+/// # Errors
+/// On a wrong number, an unknown set, or anything but one measure of toughness.
+pub fn damage(
+    scope: &Scope,
+    sets: &[plan::Set],
+    name: &str,
+    table: &Spanned<grammar::Damage>,
+) -> Result<plan::Damage> {
+    match table.get_ref() {
+        grammar::Damage::CriticalStretch(spanned) => {
+            let law = spanned.get_ref();
+            let key = format!("[damage.{name}.critical_stretch]");
+            let stretch: Measure = (
+                "critical_stretch",
+                &law.critical_stretch,
+                Toughness::CriticalStretch,
+            );
+            let [energy, toughness] = of_crack(&law.fracture_energy, &law.fracture_toughness);
+            let all = [energy, toughness, stretch];
+            Ok(plan::Damage {
+                rule: DamageRule::CriticalStretch,
+                toughness: measure(scope, spanned, &key, &all)?,
+                alpha: alpha(scope, &law.alpha, &key)?,
+                no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
+            })
+        }
+        grammar::Damage::Energy(spanned) => {
+            let law = spanned.get_ref();
+            let key = format!("[damage.{name}.energy]");
+            let all = of_crack(&law.fracture_energy, &law.fracture_toughness);
+            let calibration = match law.calibration {
+                grammar::Calibration::Energy => Calibration::Energy,
+                grammar::Calibration::Willberg2022 => Calibration::Willberg2022,
+            };
+            Ok(plan::Damage {
+                rule: DamageRule::Energy(calibration),
+                toughness: measure(scope, spanned, &key, &all)?,
+                alpha: alpha(scope, &law.alpha, &key)?,
+                no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
+            })
+        }
+    }
+}
+
+/// What a crack takes by its area or at its tip.
+fn of_crack<'a>(energy: &'a Option<Number>, toughness: &'a Option<Number>) -> [Measure<'a>; 2] {
+    [
+        ("fracture_energy", energy, Toughness::FractureEnergy),
+        (
+            "fracture_toughness",
+            toughness,
+            Toughness::FractureToughness,
+        ),
+    ]
+}
+
+/// The one measure that is given.
+fn measure<T>(
+    scope: &Scope,
+    table: &Spanned<T>,
+    key: &str,
+    measures: &[Measure<'_>],
+) -> Result<Toughness> {
+    let given: Vec<_> = measures
+        .iter()
+        .map(|(name, number, _)| (*name, number.as_ref().map(Spanned::span)))
+        .collect();
+    let (name, number, toughness) = measures[scope.exactly_one(table.span(), key, &given)?];
+    let number = number.as_ref().expect("this measure is given");
+    Ok(toughness(scope.positive(number, &format!("{key} {name}"))?))
+}
+
+fn alpha(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
+    let words = "at least 0 and below 1";
+    scope.within(number, &format!("{key} alpha"), 0.0..1.0, words)
+}
+
+fn no_failure(scope: &Scope, sets: &[plan::Set], names: &[Text], key: &str) -> Result<Vec<usize>> {
+    find_sets(scope, names, sets, &format!("{key} no_failure"))
+}

@@ -1,0 +1,96 @@
+//! Tensors of a family: the shape tensor, and how symmetric tensors are kept.
+
+use nalgebra::{Matrix3, SMatrix};
+
+use crate::lanes::Lanes;
+
+/// A shape tensor is singular where its determinant is below this share of that of a family of the same
+/// size that looks alike in all directions.
+const SINGULAR: f64 = 1e-2;
+
+/// The mixed entries of a symmetric tensor in the order in which they are kept: yz, xz, xy in space and
+/// xy in the plane.
+#[inline(always)]
+pub fn mixed<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
+    const SPACE: [(usize, usize); 3] = [(1, 2), (0, 2), (0, 1)];
+    let skipped = match D {
+        3 => 0,
+        2 => 2,
+        _ => 3,
+    };
+    SPACE.into_iter().skip(skipped)
+}
+
+/// An entry of a symmetric tensor that is kept by diagonal and mixed entries.
+#[inline(always)]
+pub fn symmetric<const D: usize>(
+    (diagonal, others): &([Lanes; D], [Lanes; D]),
+    a: usize,
+    b: usize,
+) -> Lanes {
+    if a == b {
+        return diagonal[a];
+    }
+    // In space the mixed entry of two directions has the place of the third.
+    if D == 3 { others[3 - a - b] } else { others[0] }
+}
+
+/// K = Σ ω ξ⊗ξ Ṽ of a point.
+#[derive(Debug, Clone, Copy)]
+pub struct ShapeTensor<const D: usize>(SMatrix<f64, D, D>);
+
+impl<const D: usize> ShapeTensor<D> {
+    /// From its diagonal and mixed entries, m⁵.
+    pub fn new(entries: &[f64]) -> Self {
+        let mut tensor = SMatrix::zeros();
+        for a in 0..D {
+            tensor[(a, a)] = entries[a];
+        }
+        for (k, (a, b)) in mixed::<D>().enumerate() {
+            tensor[(a, b)] = entries[D + k];
+            tensor[(b, a)] = entries[D + k];
+        }
+        Self(tensor)
+    }
+
+    /// K⁻¹ (m⁻⁵), unless K is nearly singular.
+    pub fn inverse(&self) -> Option<SMatrix<f64, D, D>> {
+        let mean = self.0.trace() / D as f64;
+        // The comparison is false for a family without bonds, too.
+        if determinant(&self.0) > SINGULAR * mean.powi(D as i32) {
+            self.0.try_inverse()
+        } else {
+            None
+        }
+    }
+
+    /// The smallest eigenvalue, m⁵.
+    pub fn smallest(&self) -> f64 {
+        extremes(&self.0)[0]
+    }
+}
+
+/// The smallest and the largest eigenvalue of a symmetric matrix of at most three rows.
+pub fn extremes<const D: usize>(m: &SMatrix<f64, D, D>) -> [f64; 2] {
+    // What the first axis alone gives lies between them.
+    let mut whole = Matrix3::from_diagonal_element(m[(0, 0)]);
+    for a in 0..D {
+        for b in 0..D {
+            whole[(a, b)] = m[(a, b)];
+        }
+    }
+    let all = whole.symmetric_eigenvalues();
+    [all.min(), all.max()]
+}
+
+/// The determinant of a matrix of at most three rows.
+pub fn determinant<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
+    match D {
+        1 => m[(0, 0)],
+        2 => m[(0, 0)] * m[(1, 1)] - m[(0, 1)] * m[(1, 0)],
+        _ => {
+            let minor = |a: usize, b: usize| m[(1, a)] * m[(2, b)] - m[(1, b)] * m[(2, a)];
+            m[(0, 0)] * minor(1, 2) - m[(0, 1)] * minor(0, 2) + m[(0, 2)] * minor(0, 1)
+        }
+    }
+}

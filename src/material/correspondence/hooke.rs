@@ -1,0 +1,402 @@
+//! Hooke's matrix: isotropic, orthotropic or full, in axes that may be turned against those of the body.
+//!
+//! Voigt's order is xx, yy, zz, yz, xz, xy with engineering shear strains. In the plane xx, yy and xy
+//! are used of it: in plane stress the matrix is that of a thin sheet, in plane strain part of that of
+//! the solid.
+
+use nalgebra::{Matrix3, Matrix6, Rotation3, SMatrix, Vector3};
+
+use super::super::{Given, Key, Kind, LawFault, Values};
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
+
+/// The components of a tensor in Voigt's order.
+const VOIGT: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
+
+/// Those of the plane.
+const PLANE: [usize; 3] = [0, 1, 5];
+
+/// C, Pa.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hooke(Matrix6<f64>);
+
+/// The full matrix: its upper triangle.
+const FULL: [[&str; 6]; 6] = [
+    ["c11", "c12", "c13", "c14", "c15", "c16"],
+    ["", "c22", "c23", "c24", "c25", "c26"],
+    ["", "", "c33", "c34", "c35", "c36"],
+    ["", "", "", "c44", "c45", "c46"],
+    ["", "", "", "", "c55", "c56"],
+    ["", "", "", "", "", "c66"],
+];
+
+/// An orthotropic solid: Young's moduli, Poisson's ratios and shear moduli.
+const ORTHOTROPIC: [&str; 9] = [
+    "youngs_modulus_x",
+    "youngs_modulus_y",
+    "youngs_modulus_z",
+    "poisson_ratio_xy",
+    "poisson_ratio_yz",
+    "poisson_ratio_xz",
+    "shear_modulus_xy",
+    "shear_modulus_yz",
+    "shear_modulus_xz",
+];
+
+/// Those of a thin sheet.
+const SHEET: [&str; 4] = [
+    "youngs_modulus_x",
+    "youngs_modulus_y",
+    "poisson_ratio_xy",
+    "shear_modulus_xy",
+];
+
+const ANGLES: [&str; 3] = ["angle_1", "angle_2", "angle_3"];
+
+pub const fn entry(name: &'static str) -> Key {
+    Key {
+        name,
+        meaning: "an entry of Hooke's matrix in Voigt's order xx, yy, zz, yz, xz, xy, Pa; 0 if not given \
+                  where others are",
+        kind: Kind::Optional {
+            range: f64::NEG_INFINITY..f64::INFINITY,
+            words: "a number",
+        },
+    }
+}
+
+pub const fn modulus(name: &'static str) -> Key {
+    Key {
+        name,
+        meaning: "a modulus of an orthotropic solid along its own axes, Pa",
+        kind: Kind::Optional {
+            range: f64::MIN_POSITIVE..f64::INFINITY,
+            words: "above 0",
+        },
+    }
+}
+
+pub const fn ratio(name: &'static str) -> Key {
+    Key {
+        name,
+        meaning: "a Poisson's ratio of an orthotropic solid: the strain along the second axis over that \
+                  along the first, when it is pulled along the first, with the sign changed",
+        kind: Kind::Optional {
+            range: f64::NEG_INFINITY..f64::INFINITY,
+            words: "a number",
+        },
+    }
+}
+
+pub const fn angle(name: &'static str) -> Key {
+    Key {
+        name,
+        meaning: "Bunge's angles, degrees, by which the axes of the material are turned: about z, then x, \
+                  then z; in the plane the first alone",
+        kind: Kind::Number {
+            range: -360.0..360.0,
+            words: "between -360 and 360",
+            default: Some(0.0),
+        },
+    }
+}
+
+/// These keys, and those of Hooke's matrix.
+macro_rules! keys_with_hooke {
+    ($($own:expr),* $(,)?) => {
+        &[
+            $($own,)*
+            hooke::entry("c11"), hooke::entry("c12"), hooke::entry("c13"), hooke::entry("c14"),
+            hooke::entry("c15"), hooke::entry("c16"), hooke::entry("c22"), hooke::entry("c23"),
+            hooke::entry("c24"), hooke::entry("c25"), hooke::entry("c26"), hooke::entry("c33"),
+            hooke::entry("c34"), hooke::entry("c35"), hooke::entry("c36"), hooke::entry("c44"),
+            hooke::entry("c45"), hooke::entry("c46"), hooke::entry("c55"), hooke::entry("c56"),
+            hooke::entry("c66"),
+            hooke::modulus("youngs_modulus_x"), hooke::modulus("youngs_modulus_y"),
+            hooke::modulus("youngs_modulus_z"), hooke::ratio("poisson_ratio_xy"),
+            hooke::ratio("poisson_ratio_yz"), hooke::ratio("poisson_ratio_xz"),
+            hooke::modulus("shear_modulus_xy"), hooke::modulus("shear_modulus_yz"),
+            hooke::modulus("shear_modulus_xz"),
+            hooke::angle("angle_1"), hooke::angle("angle_2"), hooke::angle("angle_3"),
+        ]
+    };
+}
+pub(super) use keys_with_hooke;
+
+/// The first of some keys that has a value.
+fn given_of(
+    values: &Values,
+    names: impl IntoIterator<Item = &'static str>,
+) -> Option<&'static str> {
+    let mut names = names.into_iter();
+    names.find(|name| !name.is_empty() && values.get(name).is_some())
+}
+
+fn full_entries() -> impl Iterator<Item = &'static str> {
+    FULL.into_iter().flatten()
+}
+
+fn fault_at(key: &'static str, message: impl Into<String>) -> Option<LawFault> {
+    Some(LawFault {
+        key: Some(key),
+        message: message.into(),
+    })
+}
+
+/// What is wrong with the constants in this setting.
+pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
+    let full = given_of(values, full_entries());
+    let orthotropic = given_of(values, ORTHOTROPIC);
+    let space = matches!(dimension, Dimension::Space);
+    if let (Some(entry), Some(_)) = (full, orthotropic) {
+        let message = "give the entries of Hooke's matrix or the constants of an orthotropic solid, \
+                       not both";
+        return fault_at(entry, message);
+    }
+    if !space
+        && let Some(key) = given_of(
+            values,
+            ["angle_2", "angle_3"]
+                .into_iter()
+                .filter(|key| values.number(key) != 0.0),
+        )
+    {
+        return fault_at(key, "in the plane the axes turn by `angle_1` alone");
+    }
+    let axes = ANGLES.into_iter().find(|key| values.number(key) != 0.0);
+    if let (Some(key), None) = (axes, full.or(orthotropic)) {
+        return fault_at(key, "an isotropic solid has no axes");
+    }
+    if let (Some(key), "neo-hooke") = (full.or(orthotropic), values.word(super::STRESS.name)) {
+        return fault_at(
+            key,
+            "`stress = \"neo-hooke\"` is isotropic: give two elastic constants",
+        );
+    }
+    if let Some(first) = full {
+        let across = |(k, name): (usize, &'static str)| {
+            let (row, column) = (k / 6, k % 6);
+            (!PLANE.contains(&row) || !PLANE.contains(&column)).then_some(name)
+        };
+        let outside = given_of(values, full_entries().enumerate().filter_map(across));
+        if let (false, Some(key)) = (space, outside) {
+            let message = "in the plane Hooke's matrix has c11, c12, c16, c22, c26 and c66";
+            return fault_at(key, message);
+        }
+        return indefinite(&unturned(values, dimension)?, dimension, first);
+    }
+    let first = orthotropic?;
+    let wanted: &[&'static str] = match dimension {
+        Dimension::PlaneStress { .. } => &SHEET,
+        _ => &ORTHOTROPIC,
+    };
+    if let Some(missing) = wanted.iter().find(|key| values.get(key).is_none()) {
+        return fault_at(
+            first,
+            format!("an orthotropic solid needs `{missing}`, too"),
+        );
+    }
+    let unused = ORTHOTROPIC.into_iter().filter(|key| !wanted.contains(key));
+    if let Some(key) = given_of(values, unused) {
+        return fault_at(key, "a thin sheet in plane stress has no such constant");
+    }
+    indefinite(&unturned(values, dimension)?, dimension, first)
+}
+
+/// A matrix that some strain has no energy in.
+fn indefinite(matrix: &Matrix6<f64>, dimension: Dimension, key: &'static str) -> Option<LawFault> {
+    let smallest = eigenvalues(matrix, dimension)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    // A NaN is not above 0 either.
+    if smallest > 0.0 {
+        return None;
+    }
+    fault_at(
+        key,
+        format!(
+            "these constants are of no solid: the smallest eigenvalue of Hooke's matrix is {smallest:.4e} \
+             Pa, and all must be above 0"
+        ),
+    )
+}
+
+/// The eigenvalues of C : E = λ E, Pa.
+fn eigenvalues(matrix: &Matrix6<f64>, dimension: Dimension) -> Vec<f64> {
+    // Kelvin's notation, in which the length of a tensor is that of its vector.
+    let factor = |k: usize| if k < 3 { 1.0 } else { 2_f64.sqrt() };
+    let kelvin = Matrix6::from_fn(|a, b| matrix[(a, b)] * factor(a) * factor(b));
+    if matches!(dimension, Dimension::Space) {
+        return kelvin.symmetric_eigenvalues().iter().copied().collect();
+    }
+    let plane = Matrix3::from_fn(|a, b| kelvin[(PLANE[a], PLANE[b])]);
+    plane.symmetric_eigenvalues().iter().copied().collect()
+}
+
+/// The matrix along the material's own axes, where it is not isotropic.
+fn unturned(values: &Values, dimension: Dimension) -> Option<Matrix6<f64>> {
+    let number = |key: &str| values.get(key).map_or(0.0, |_| values.number(key));
+    if given_of(values, full_entries()).is_some() {
+        return Some(Matrix6::from_fn(|a, b| number(FULL[a.min(b)][a.max(b)])));
+    }
+    given_of(values, ORTHOTROPIC)?;
+    let sheet = matches!(dimension, Dimension::PlaneStress { .. });
+    let of = |kind: &str, axes: &str| number(&format!("{kind}_{axes}"));
+    let young = ["x", "y", "z"].map(|axis| of("youngs_modulus", axis));
+    let mut compliance = Matrix6::zeros();
+    for (k, young) in young.into_iter().enumerate() {
+        // What a sheet has across it does not matter, if it does not couple.
+        compliance[(k, k)] = if sheet && k == 2 { 1.0 } else { 1.0 / young };
+    }
+    for (axes, a, b) in [("yz", 1, 2), ("xz", 0, 2), ("xy", 0, 1)] {
+        let shear = 6 - a - b;
+        if sheet && axes != "xy" {
+            compliance[(shear, shear)] = 1.0;
+            continue;
+        }
+        compliance[(a, b)] = -of("poisson_ratio", axes) / young[a];
+        compliance[(b, a)] = compliance[(a, b)];
+        compliance[(shear, shear)] = 1.0 / of("shear_modulus", axes);
+    }
+    let not_a_solid = Matrix6::from_element(f64::NAN);
+    Some(compliance.try_inverse().unwrap_or(not_a_solid))
+}
+
+/// The elastic constants of the isotropic solid with the same moduli on average over all directions
+/// (Voigt), where the law has constants of its own.
+pub fn average(values: &Values, dimension: Dimension) -> Option<Isotropic> {
+    let c = unturned(values, dimension)?;
+    if matches!(dimension, Dimension::Space) {
+        let normal = c[(0, 0)] + c[(1, 1)] + c[(2, 2)];
+        let coupled = c[(0, 1)] + c[(1, 2)] + c[(0, 2)];
+        let shear = c[(3, 3)] + c[(4, 4)] + c[(5, 5)];
+        let bulk = (normal + 2.0 * coupled) / 9.0;
+        let shear = (normal - coupled + 3.0 * shear) / 15.0;
+        return Some(Isotropic {
+            youngs_modulus: 9.0 * bulk * shear / (3.0 * bulk + shear),
+            poisson_ratio: (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear),
+        });
+    }
+    let area = (c[(0, 0)] + c[(1, 1)] + 2.0 * c[(0, 1)]) / 4.0;
+    let shear = (c[(0, 0)] + c[(1, 1)] - 2.0 * c[(0, 1)] + 4.0 * c[(5, 5)]) / 8.0;
+    let poisson_ratio = match dimension {
+        Dimension::PlaneStress { .. } => (area - shear) / (area + shear),
+        _ => (area - shear) / (2.0 * area),
+    };
+    Some(Isotropic {
+        youngs_modulus: 2.0 * shear * (1.0 + poisson_ratio),
+        poisson_ratio,
+    })
+}
+
+impl Hooke {
+    /// Of a body; none where the constants are of no solid.
+    pub fn of(given: &Given) -> Option<Self> {
+        let Some(own) = unturned(given.values, given.dimension) else {
+            return Some(Self(isotropic(given)));
+        };
+        let degrees = ANGLES.map(|key| given.values.number(key));
+        let turned = if degrees == [0.0; 3] {
+            own
+        } else {
+            turned(&own, degrees.map(f64::to_radians))
+        };
+        turned
+            .iter()
+            .all(|entry| entry.is_finite())
+            .then_some(Self(turned))
+    }
+
+    /// S = C : E, Pa.
+    pub fn stress<const D: usize>(&self, strain: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+        let mut stress = SMatrix::zeros();
+        for i in components::<D>() {
+            let (a, b) = VOIGT[i];
+            let mut sum = 0.0;
+            for j in components::<D>() {
+                let (c, d) = VOIGT[j];
+                let factor = if c == d { 1.0 } else { 2.0 };
+                sum += self.0[(i, j)] * factor * strain[(c, d)];
+            }
+            stress[(a, b)] = sum;
+            stress[(b, a)] = sum;
+        }
+        stress
+    }
+
+    /// C_ijkl M_jl, for a symmetric M.
+    pub fn contracted<const D: usize>(&self, m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+        SMatrix::from_fn(|i, k| {
+            let mut sum = 0.0;
+            for j in 0..D {
+                for l in 0..D {
+                    sum += self.0[(voigt(i, j), voigt(k, l))] * m[(j, l)];
+                }
+            }
+            sum
+        })
+    }
+
+    /// The largest eigenvalue of C : E = λ E, Pa.
+    pub fn largest(&self) -> f64 {
+        eigenvalues(&self.0, Dimension::Space)
+            .into_iter()
+            .fold(0.0, f64::max)
+    }
+}
+
+/// The components that there are in `D` dimensions, by their place in Voigt's order.
+fn components<const D: usize>() -> impl Iterator<Item = usize> {
+    const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
+    let used: &[usize] = match D {
+        3 => &ALL,
+        2 => &PLANE,
+        _ => &ALL[..1],
+    };
+    used.iter().copied()
+}
+
+/// The place of a component in Voigt's order.
+fn voigt(a: usize, b: usize) -> usize {
+    if a == b { a } else { 6 - a - b }
+}
+
+fn isotropic(given: &Given) -> Matrix6<f64> {
+    let Isotropic {
+        youngs_modulus: young,
+        poisson_ratio: ratio,
+    } = given.elastic;
+    let shear = given.elastic.shear_modulus();
+    let lambda = match given.dimension {
+        Dimension::PlaneStress { .. } => young * ratio / (1.0 - ratio * ratio),
+        _ => given.elastic.lame_lambda(),
+    };
+    Matrix6::from_fn(|a, b| match (a, b) {
+        _ if a < 3 && b < 3 => lambda + if a == b { 2.0 * shear } else { 0.0 },
+        _ if a == b => shear,
+        _ => 0.0,
+    })
+}
+
+/// The matrix in the body's axes, of one in axes turned by Bunge's angles (rad).
+fn turned(own: &Matrix6<f64>, [first, second, third]: [f64; 3]) -> Matrix6<f64> {
+    let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
+    let (z, x) = (Vector3::z_axis(), Vector3::x_axis());
+    let turn = (about(z, first) * about(x, second) * about(z, third)).into_inner();
+    // C_ijkl = R_ia R_jb R_kc R_ld C_abcd.
+    Matrix6::from_fn(|m, n| {
+        let ((i, j), (k, l)) = (VOIGT[m], VOIGT[n]);
+        let mut sum = 0.0;
+        for (a, b) in pairs() {
+            for (c, d) in pairs() {
+                let factor = turn[(i, a)] * turn[(j, b)] * turn[(k, c)] * turn[(l, d)];
+                sum += factor * own[(voigt(a, b), voigt(c, d))];
+            }
+        }
+        sum
+    })
+}
+
+fn pairs() -> impl Iterator<Item = (usize, usize)> {
+    (0..3).flat_map(|a| (0..3).map(move |b| (a, b)))
+}

@@ -1,0 +1,250 @@
+//! Correspondence: a classical law for the stress at each point, from the deformation gradient of its
+//! family.
+//!
+//! Silling et al. 2007, §18; Willberg, Hesse & Heinecke 2022, eq. 6–15. With the shape tensor
+//! K = Σ ω ξ⊗ξ Ṽ and the displacement gradient H = (Σ ω η⊗ξ Ṽ) K⁻¹, F = I + H, both over the intact
+//! bonds, and a first Piola–Kirchhoff stress P that follows from F, the force state is
+//!
+//! T⟨ξ⟩ = ω P K⁻¹ ξ + ω B z,  z = η − H ξ.
+//!
+//! z is the part of the motion that F does not see, and B z is what works against it
+//! ([`Control`]). In the loops this is T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H. The strain energy
+//! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
+
+mod control;
+mod family;
+mod hooke;
+mod stress;
+
+use nalgebra::SMatrix;
+
+use super::bond::Weights;
+use super::{
+    Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Values, Word,
+};
+use crate::lanes::{Lanes, Simd};
+use control::Control;
+use family::{ShapeTensor, extremes, symmetric};
+use hooke::Hooke;
+use stress::Stress;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correspondence {
+    stress: Stress,
+    control: Control,
+}
+
+const STRESS: Key = Key {
+    name: "stress",
+    meaning: "how stress follows from the deformation gradient F: S = C:E (\"st-venant-kirchhoff\"), C:E \
+              taken for the Cauchy stress (\"willberg2022\", for small rotations), or a compressible \
+              solid of large strains (\"neo-hooke\")",
+    kind: Kind::Word(&[
+        Word::new("st-venant-kirchhoff"),
+        Word::new("willberg2022"),
+        Word::new("neo-hooke"),
+    ]),
+};
+
+const KEYS: &[Key] = hooke::keys_with_hooke![STRESS, control::KIND, control::COEFFICIENT];
+
+impl Declared for Correspondence {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: KEYS,
+        any_poisson_ratio: true,
+        no_line: Some("`correspondence` has no 1-D form; `pmb` is the same there for ν = 0.25"),
+        breaks_by_energy: true,
+        examples: &[
+            "poisson_ratio = 0.4",
+            "poisson_ratio = 0.3, stress = 'neo-hooke', zero_energy = 'silling2017'",
+            "poisson_ratio = 0.2, stress = 'willberg2022'",
+            "poisson_ratio = 0.25, zero_energy = 'none'",
+        ],
+        fault: Some(hooke::fault),
+        elastic: Some(hooke::average),
+        invariants,
+        ..Declaration::new(
+            "correspondence",
+            "of the stress at the family's deformation gradient",
+            build,
+        )
+    }];
+}
+
+fn invariants(values: &Values) -> Invariants {
+    let by_word = values.word(STRESS.name) == "willberg2022";
+    Invariants {
+        conservative: !by_word,
+        objective: !by_word,
+        // The control of Wan et al. turns points whose family is not whole, by the square of z.
+        angular_momentum: values.word(control::KIND.name) != "wan2019",
+    }
+}
+
+fn build(given: &Given) -> Built {
+    let hooke = Hooke::of(given).expect("the constants have been looked at");
+    Built::plain(Correspondence {
+        stress: Stress::of(given.values.word(STRESS.name), given, hooke),
+        control: Control::of(given, hooke),
+    })
+}
+
+impl Described for Correspondence {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("stress", self.stress.name().to_owned()),
+            ("zero energy", self.control.described()),
+        ]
+    }
+}
+
+/// The constants of a point: a spring constant that its energy nowhere exceeds, and that of Silling's
+/// control (N/m⁷); then A, and the diagonal and mixed entries of B.
+type Point<const D: usize> = ([Lanes; 2], ([[Lanes; D]; D], ([Lanes; D], [Lanes; D])));
+
+/// W − ½ P : H (J/m³), and whether the shape tensor is singular.
+const OWN: usize = 2;
+
+impl<const D: usize> Law<D> for Correspondence {
+    type Point = Point<D>;
+    type Memory = [Lanes; 0];
+    /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
+    type WholeSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
+    /// K as in the whole sum, and Σ ω η⊗ξ Ṽ (m⁵).
+    type Sum = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D]);
+    type Force = [Lanes; D];
+    const CONSTANTS: usize = 2;
+    const STAGES: usize = 1;
+    const OWN_NUMBERS: usize = OWN;
+    const LEAST_DIMENSION: usize = 2;
+    const SUM_READS_STRETCH: bool = false;
+    const FORCE_READS_SHORTENING: bool = false;
+
+    #[inline(always)]
+    fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
+        (shape_share(&bond.reference), [Lanes::splat(1.0)])
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
+        let weight = sums[2 * D];
+        numbers[1] = self.control.constant(weight);
+        numbers[0] = match shape.inverse() {
+            None => 0.0,
+            Some(inverse) => {
+                let control = self.control.matrix(&inverse, numbers[1]);
+                let [_, largest] = extremes(&control);
+                (self.stress.largest_modulus() / shape.smallest()).max(largest)
+            }
+        };
+    }
+
+    #[inline(always)]
+    fn share<const S: usize>(&self, bond: &Bond<D>, _: &Self::Point, _: &[Lanes; 0]) -> Self::Sum {
+        let xi = &bond.reference;
+        let motion = bond.moved.map(|eta| xi.map(|xi| eta * xi));
+        (shape_share(xi), motion)
+    }
+
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
+        let (constants, found) = numbers.split_at_mut(2);
+        let own = D * D + 2 * D;
+        found[..own + OWN].fill(0.0);
+        let moved = SMatrix::<f64, D, D>::from_fn(|a, b| sums[2 * D + D * a + b]);
+        let stress = shape.inverse().and_then(|inverse| {
+            let gradient = moved * inverse;
+            let (stress, energy) = self.stress.at(&gradient)?;
+            Some((inverse, gradient, stress, energy))
+        });
+        let Some((inverse, gradient, stress, energy)) = stress else {
+            found[own + 1] = 1.0;
+            return;
+        };
+        let control = self.control.matrix(&inverse, constants[1]);
+        let direct = stress * inverse - control * gradient;
+        for a in 0..D {
+            for b in 0..D {
+                found[D * a + b] = direct[(a, b)];
+            }
+            found[D * D + a] = control[(a, a)];
+        }
+        for (k, (a, b)) in family::mixed::<D>().enumerate() {
+            found[D * D + D + k] = control[(a, b)];
+        }
+        found[own] = energy - 0.5 * stress.dot(&gradient);
+    }
+
+    #[inline(always)]
+    fn force(&self, bond: &Bond<D>, (_, end): &Point<D>, _: &[Lanes; 0]) -> [Lanes; D] {
+        let (direct, control) = end;
+        let mut force = [Lanes::splat(0.0); D];
+        for a in 0..D {
+            for b in 0..D {
+                let of_control = symmetric(control, a, b);
+                force[a] += direct[a][b] * bond.reference[b] + of_control * bond.moved[b];
+            }
+        }
+        force
+    }
+
+    #[inline(always)]
+    fn bond_force<S: Simd>(
+        simd: S,
+        _: &[Self; 2],
+        bond: &Bond<D>,
+        [(_, here), (_, there)]: &[Point<D>; 2],
+        _: &[[Lanes; 0]; 2],
+        weights: Weights,
+    ) -> [Lanes; D] {
+        // The tensors of both ends first, then their product with the bond.
+        let mut force = [Lanes::splat(0.0); D];
+        for a in 0..D {
+            for b in 0..D {
+                let direct = weights.sum(here.0[a][b], there.0[a][b]);
+                force[a] = simd.multiply_add(direct, bond.reference[b], force[a]);
+                let control = weights.sum(symmetric(&here.1, a, b), symmetric(&there.1, a, b));
+                force[a] = simd.multiply_add(control, bond.moved[b], force[a]);
+            }
+        }
+        force
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, end: &Point<D>, memory: &[Lanes; 0]) -> Lanes {
+        let force = self.force(bond, end, memory);
+        let mut work = force[0] * bond.moved[0];
+        for d in 1..D {
+            work += force[d] * bond.moved[d];
+        }
+        work * 0.5
+    }
+
+    fn point_energy(&self, numbers: &[f64]) -> f64 {
+        numbers[2 + D * D + 2 * D]
+    }
+
+    fn is_singular(&self, numbers: &[f64]) -> bool {
+        numbers[2 + D * D + 2 * D + 1] > 0.0
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, _: Lanes, end: &Point<D>) -> Lanes {
+        end.0[0]
+    }
+
+    fn resists_across(&self) -> bool {
+        true
+    }
+}
+
+/// ξ⊗ξ by diagonal and mixed entries.
+#[inline(always)]
+fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) {
+    let mut mixed = [Lanes::splat(0.0); D];
+    for (k, (a, b)) in family::mixed::<D>().enumerate() {
+        mixed[k] = xi[a] * xi[b];
+    }
+    (xi.map(|xi| xi * xi), mixed)
+}

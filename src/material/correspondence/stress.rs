@@ -1,0 +1,220 @@
+//! The first Piola–Kirchhoff stress and the strain energy density of a deformation gradient.
+
+use nalgebra::SMatrix;
+
+use super::super::Given;
+use super::family::determinant;
+use super::hooke::Hooke;
+use crate::dimension::Dimension;
+
+/// How stress follows from the deformation gradient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stress {
+    /// P = F S, S = C : E with E = ½ (FᵀF − I): of an energy, and the same in every frame.
+    StVenantKirchhoff(Hooke),
+    /// C : E taken for the Cauchy stress, P = J σ F⁻ᵀ (Willberg et al. 2022, eq. 9, where F⁻¹ is
+    /// printed): the same as the above for small strains, but not in a frame that has turned.
+    Willberg2022(Hooke),
+    /// W = ½ μ (tr C − 3 − ln det C) + ⅛ λ (ln det C)² with C = FᵀF, in plane stress with the thickness
+    /// at which no stress is left across it.
+    NeoHooke(NeoHooke),
+}
+
+/// The constants of the compressible neo-Hookean solid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NeoHooke {
+    /// λ, Pa.
+    lambda: f64,
+    /// μ, Pa.
+    shear: f64,
+    plane_stress: bool,
+    /// Largest eigenvalue of Hooke's matrix at rest, Pa.
+    largest: f64,
+}
+
+impl Stress {
+    /// That of this name in decks.
+    pub fn of(name: &str, given: &Given, hooke: Hooke) -> Self {
+        match name {
+            "willberg2022" => Self::Willberg2022(hooke),
+            "neo-hooke" => Self::NeoHooke(NeoHooke {
+                lambda: given.elastic.lame_lambda(),
+                shear: given.elastic.shear_modulus(),
+                plane_stress: matches!(given.dimension, Dimension::PlaneStress { .. }),
+                largest: hooke.largest(),
+            }),
+            _ => Self::StVenantKirchhoff(hooke),
+        }
+    }
+
+    /// For people to read.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::StVenantKirchhoff(_) => "St. Venant–Kirchhoff",
+            Self::Willberg2022(_) => "C:E as Cauchy stress (Willberg et al. 2022)",
+            Self::NeoHooke(_) => "neo-Hooke",
+        }
+    }
+
+    /// The largest modulus at rest: W ≤ ½ c |H|², Pa.
+    pub fn largest_modulus(&self) -> f64 {
+        match self {
+            Self::StVenantKirchhoff(hooke) | Self::Willberg2022(hooke) => hooke.largest(),
+            Self::NeoHooke(law) => law.largest,
+        }
+    }
+
+    /// P (Pa) and W (J/m³) at a displacement gradient H = F − I; none where the law has no stress,
+    /// because the body is turned inside out.
+    pub fn at<const D: usize>(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+    ) -> Option<(SMatrix<f64, D, D>, f64)> {
+        let deformation = SMatrix::<f64, D, D>::identity() + gradient;
+        // Twice the strain, without the difference of FᵀF and I.
+        let doubled = gradient + gradient.transpose() + gradient.tr_mul(gradient);
+        match self {
+            Self::StVenantKirchhoff(hooke) => {
+                let strain = doubled * 0.5;
+                let stress = hooke.stress(&strain);
+                Some((deformation * stress, 0.5 * stress.dot(&strain)))
+            }
+            Self::Willberg2022(hooke) => {
+                let strain = doubled * 0.5;
+                let stress = hooke.stress(&strain);
+                let inverse = deformation.try_inverse()?;
+                let volume = determinant(&deformation);
+                let piola = stress * inverse.transpose() * volume;
+                Some((piola, 0.5 * stress.dot(&strain)))
+            }
+            Self::NeoHooke(law) => {
+                if determinant(&deformation) <= 0.0 {
+                    return None;
+                }
+                let inverse = deformation.try_inverse()?.transpose();
+                let (log, energy) = law.in_plane(&doubled);
+                // F − F⁻ᵀ = F⁻ᵀ (FᵀF − I).
+                let shear = inverse * doubled * law.shear;
+                Some((shear + inverse * (0.5 * law.lambda * log), energy))
+            }
+        }
+    }
+}
+
+impl NeoHooke {
+    /// ln det FᵀF, that across the plane included, and W, from FᵀF − I of the plane or of space.
+    fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
+        let own = (growth(doubled)).ln_1p();
+        // q = ln of the square of the stretch across the plane.
+        let across = if self.plane_stress && D == 2 {
+            self.across(own)
+        } else {
+            0.0
+        };
+        let log = own + across;
+        let trace = doubled.trace() + across.exp_m1();
+        let energy = 0.5 * self.shear * (trace - log) + 0.125 * self.lambda * log * log;
+        (log, energy)
+    }
+
+    /// The q at which μ (e^q − 1) + ½ λ (own + q) = 0, by Newton's method.
+    fn across(&self, own: f64) -> f64 {
+        let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
+        for _ in 0..20 {
+            let rest = self.shear * q.exp_m1() + 0.5 * self.lambda * (own + q);
+            let step = rest / (self.shear * q.exp() + 0.5 * self.lambda);
+            q -= step;
+            if step.abs() <= 1e-15 * q.abs() {
+                break;
+            }
+        }
+        q
+    }
+}
+
+/// det (I + M) − 1 without a difference of large numbers.
+fn growth<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
+    match D {
+        1 => m[(0, 0)],
+        2 => m.trace() + determinant(m),
+        _ => {
+            let minor = |a: usize, b: usize| m[(a, a)] * m[(b, b)] - m[(a, b)] * m[(b, a)];
+            m.trace() + (minor(0, 1) + minor(1, 2) + minor(0, 2)) + determinant(m)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Matrix3};
+
+    use super::*;
+    use crate::elastic::Isotropic;
+    use crate::material::Values;
+
+    const ELASTIC: Isotropic = Isotropic {
+        youngs_modulus: 3.0,
+        poisson_ratio: 0.3,
+    };
+
+    fn all(dimension: Dimension) -> [Stress; 3] {
+        let values = Values::defaults(super::super::KEYS);
+        let given = Given {
+            dimension,
+            elastic: ELASTIC,
+            horizon: 1.0,
+            values: &values,
+            from_fracture_energy: false,
+        };
+        let hooke = Hooke::of(&given).unwrap();
+        ["st-venant-kirchhoff", "willberg2022", "neo-hooke"]
+            .map(|name| Stress::of(name, &given, hooke))
+    }
+
+    /// P is the slope of W, by central differences.
+    fn is_slope<const D: usize>(law: &Stress, gradient: SMatrix<f64, D, D>) {
+        let (stress, _) = law.at(&gradient).unwrap();
+        let step = 1e-5;
+        for a in 0..D {
+            for b in 0..D {
+                let energy = |sign: f64| {
+                    let mut moved = gradient;
+                    moved[(a, b)] += sign * step;
+                    law.at(&moved).unwrap().1
+                };
+                let slope = (energy(1.0) - energy(-1.0)) / (2.0 * step);
+                let error = (slope - stress[(a, b)]).abs();
+                assert!(error < 1e-8, "{law:?} {a}{b}: {slope} {}", stress[(a, b)]);
+            }
+        }
+    }
+
+    #[test]
+    fn stress_is_the_slope_of_energy_where_there_is_one() {
+        let plane = Matrix2::new(0.1, 0.2, -0.05, -0.15);
+        let space = Matrix3::new(0.1, 0.2, -0.1, 0.05, -0.12, 0.3, 0.0, 0.15, 0.2);
+        for dimension in [
+            Dimension::PlaneStress { thickness: 1.0 },
+            Dimension::PlaneStrain { thickness: 1.0 },
+        ] {
+            let [svk, _, neo] = all(dimension);
+            is_slope(&svk, plane);
+            is_slope(&neo, plane);
+        }
+        let [svk, _, neo] = all(Dimension::Space);
+        is_slope(&svk, space);
+        is_slope(&neo, space);
+    }
+
+    #[test]
+    fn small_strains_have_hookes_stress_in_all_of_them() {
+        let strain = Matrix3::new(1.0, 0.3, -0.2, 0.3, -0.5, 0.1, -0.2, 0.1, 0.7) * 1e-9;
+        let (lambda, shear) = (ELASTIC.lame_lambda(), ELASTIC.shear_modulus());
+        let wanted = Matrix3::identity() * (lambda * strain.trace()) + strain * (2.0 * shear);
+        for law in all(Dimension::Space) {
+            let (stress, _) = law.at(&strain).unwrap();
+            let error = (stress - wanted).norm() / wanted.norm();
+            assert!(error < 1e-8, "{law:?} {error}");
+        }
+    }
+}

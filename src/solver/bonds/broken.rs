@@ -1,0 +1,224 @@
+//! What comes of bonds that break.
+//!
+//! A bond breaks where the forces are summed, by what the force states of both ends say, and is not in
+//! these sums any more. Numbers of points that follow from sums over bonds, and the forces that follow
+//! from them, are then found anew: only at the points that a broken bond changes.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use crate::comm::{self, Communicator};
+use crate::families::Which;
+use crate::solver::model::Model;
+
+use super::evaluate::{ForceTimes, News};
+use super::force::Evolution;
+use super::sweep::BrokenSums;
+use super::{Forces, Stage};
+
+/// Ranges of points between which no more lie than these are worked on as one.
+const GAP: usize = 64;
+
+/// What broken bonds change at a point in a force evaluation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Broken<const D: usize> {
+    /// Local index of the point, an owned one.
+    pub point: usize,
+    /// Number of its bonds that have broken.
+    pub count: u64,
+    /// Energy that its share of them held, J, and what it loses otherwise because they are gone.
+    pub energy: f64,
+    /// How much of that bonds held above their criterion when they were seen to break, J.
+    pub overshoot: f64,
+    /// The force density on the point that is gone with them, N/m³.
+    pub force: [f64; D],
+}
+
+impl<const D: usize> Broken<D> {
+    /// From the sums over the bonds of a point that break.
+    pub(super) fn new(told: &BrokenSums) -> Self {
+        let [count, energy, overshoot, force @ ..] = told.sums;
+        Self {
+            point: told.point,
+            count: count as u64,
+            energy,
+            overshoot,
+            force: std::array::from_fn(|d| force[d]),
+        }
+    }
+
+    /// Where no bond has broken.
+    fn none(point: usize) -> Self {
+        Self {
+            point,
+            count: 0,
+            energy: 0.0,
+            overshoot: 0.0,
+            force: [0.0; D],
+        }
+    }
+}
+
+impl<const D: usize> Forces<D> {
+    /// What bonds that broke in the last [evaluation](Self::evaluate) have changed, by ascending point.
+    pub fn broken(&self) -> &[Broken<D>] {
+        &self.broken
+    }
+
+    /// After forces were summed: brings what came of broken bonds together by point, and finds anew
+    /// what they change. Collective.
+    pub(super) fn settle(
+        &mut self,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+        displacement: &[Vec<f64>; D],
+        force: &mut [Vec<f64>; D],
+        times: &mut ForceTimes,
+    ) {
+        self.broken.sort_by_key(|broken| broken.point);
+        self.broken.dedup_by(|later, first| {
+            let same = later.point == first.point;
+            if same {
+                first.count += later.count;
+                first.energy += later.energy;
+                first.overshoot += later.overshoot;
+                for d in 0..D {
+                    first.force[d] += later.force[d];
+                }
+            }
+            same
+        });
+        if self.numbers.stages == 0 || !self.breaks {
+            return;
+        }
+        let mut whole = [f64::from(u8::from(self.broken.is_empty()))];
+        comm::min(comm, &mut whole);
+        if whole[0] > 0.0 {
+            return;
+        }
+        let start = Instant::now();
+        let halo_before = times.halo;
+        let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
+        for points in self.ranges(own.iter().copied()) {
+            self.find_numbers(points, model, force);
+        }
+        let changed = self.send_numbers(comm, model, displacement, own, times);
+        for points in self.ranges(changed.into_iter()) {
+            self.find_forces(points, force);
+        }
+        times.bonds += start.elapsed() - (times.halo - halo_before);
+    }
+
+    /// Finds the numbers of some points anew, and books the energy that they lose by it.
+    fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, force: &mut [Vec<f64>; D]) {
+        let before = self.stored_at(model, points.clone()).energy;
+        for stage in (0..self.numbers.stages).map(Stage::PointSum) {
+            self.clear(stage, points.clone());
+            self.run(stage, points.clone(), force, Evolution::None);
+            self.finish(stage, points.clone(), model, Evolution::None);
+        }
+        let after = self.stored_at(model, points.clone()).energy;
+        for broken in &mut self.broken {
+            if points.contains(&broken.point) {
+                let k = broken.point - points.start;
+                broken.energy += model.volume[broken.point] * (before[k] - after[k]);
+            }
+        }
+    }
+
+    /// Sends the new numbers of points to those who read them. Returns the owned points whose forces
+    /// they change; perhaps more.
+    fn send_numbers(
+        &mut self,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+        displacement: &[Vec<f64>; D],
+        own: Vec<usize>,
+        times: &mut ForceTimes,
+    ) -> Vec<usize> {
+        let start = Instant::now();
+        let owned = model.owned();
+        let mut flags = vec![0.0; model.volume.len()];
+        for point in &own {
+            flags[*point] = 1.0;
+        }
+        let Self { numbers, halo, .. } = self;
+        let changing = numbers.first_changing..numbers.read;
+        let columns = numbers.columns[changing.clone()].iter();
+        let columns: Vec<&Vec<f64>> = columns.chain([&flags]).collect();
+        halo.pack(columns.iter().map(|column| column.as_slice()));
+        halo.exchange(comm, &mut |_| {});
+        let columns = numbers.columns[changing].iter_mut();
+        let mut columns: Vec<&mut Vec<f64>> = columns.chain([&mut flags]).collect();
+        halo.unpack(columns.iter_mut().map(|column| column.as_mut_slice()));
+        times.halo += start.elapsed();
+        self.update(News::Numbers, Which::All, model, displacement);
+        let mut changed = own.clone();
+        for interaction in &self.interactions {
+            for point in &own {
+                let bonds = &interaction.bonds;
+                bonds.for_each_neighbour(*point, &mut |there| changed.push(there));
+            }
+        }
+        changed.retain(|point| *point < owned);
+        // Who is bonded to a ghost only that knows itself.
+        if flags[owned..].iter().any(|flag| *flag > 0.0) {
+            changed.extend(model.interior..owned);
+        }
+        changed
+    }
+
+    /// Finds the forces on some points anew, and notes what they have lost.
+    fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
+        let before = force
+            .each_ref()
+            .map(|column| column[points.clone()].to_vec());
+        for column in force.iter_mut() {
+            column[points.clone()].fill(0.0);
+        }
+        self.run(Stage::Force, points.clone(), force, Evolution::None);
+        for (k, point) in points.enumerate() {
+            let lost: [f64; D] = std::array::from_fn(|d| before[d][k] - force[d][point]);
+            if lost == [0.0; D] {
+                continue;
+            }
+            let place = match self
+                .broken
+                .binary_search_by_key(&point, |broken| broken.point)
+            {
+                Ok(place) => place,
+                Err(place) => {
+                    self.broken.insert(place, Broken::none(point));
+                    place
+                }
+            };
+            for d in 0..D {
+                self.broken[place].force[d] += lost[d];
+            }
+        }
+    }
+
+    /// The points in ascending ranges, each with all points whose bonds are worked on together.
+    fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+        let with_others = |point: usize| {
+            let bonds = self
+                .interactions
+                .iter()
+                .map(|interaction| &interaction.bonds);
+            let together = bonds.map(|bonds| bonds.together(point));
+            together.fold(point..point + 1, |all, one| {
+                all.start.min(one.start)..all.end.max(one.end)
+            })
+        };
+        let mut ranges: Vec<Range<usize>> = points.map(with_others).collect();
+        ranges.sort_unstable_by_key(|range| range.start);
+        let mut merged: Vec<Range<usize>> = Vec::new();
+        for range in ranges {
+            match merged.last_mut() {
+                Some(last) if range.start <= last.end + GAP => last.end = last.end.max(range.end),
+                _ => merged.push(range),
+            }
+        }
+        merged
+    }
+}
