@@ -136,6 +136,30 @@ end = 8
 every_steps = 10
 ";
 
+/// A notched plate that is relaxed while it is torn, and then let go.
+const SLOW: &str = "
+dimension = 'plane-stress'
+grid = { spacing = 1, horizon = 3 }
+material.sheet.pmb = { density = 2, youngs_modulus = 5 }
+damage.brittle.critical_stretch = { critical_stretch = 0.02, alpha = 0.1 }
+body.plate = { material = 'sheet', damage = 'brittle', shape.box = { lower = [0, 0], upper = [24, 16] } }
+crack.notch.segment = { from = [-1, 8], to = [8, 8] }
+set.top.where = 'y > 13'
+set.bottom.where = 'y < 3'
+set.right.where = 'x > 22'
+condition.down = { set = 'bottom', velocity = [0, '-0.04'] }
+condition.up = { set = 'top', displacement = [0, '0.04*t'] }
+condition.push = { set = 'right', body_force = ['1e-4*t', 0] }
+history.reactions = ['top']
+time = { end = 8, density_scale = 4 }
+[[stage]]
+end = 3
+method = 'relaxation'
+relaxation = { load_steps = 6, tolerance = 1e-4 }
+[[stage]]
+on = ['down']
+";
+
 /// Fewer points than ranks.
 const FEW: &str = "
 dimension = '1d'
@@ -251,6 +275,11 @@ fn scattered_points_from_a_file() {
     let law = "[material.rubber.elastic_plastic_pmb]\nyield_stretch = 0.02";
     let deck = BLOCK.replace("[material.rubber.pmb]", law);
     same_everywhere("plastic-block", &deck, true);
+}
+
+#[test]
+fn a_plate_relaxed_and_let_go() {
+    same_everywhere("slow", SLOW, true);
 }
 
 #[test]

@@ -7,8 +7,9 @@ use fissure::deck::{self, Plan};
 use fissure::error::Result;
 use fissure::solver::Simulation;
 use fissure::solver::assign::cutoffs;
+use fissure::solver::motion::Clock;
 use fissure::solver::observers::HistoryObserver;
-use fissure::solver::simulation::choose_step;
+use fissure::solver::simulation::choose_steps;
 use fissure::solver::size::is_feasible;
 use fissure::survey::{Cost, Interior, Size, Survey, interior, size};
 
@@ -87,11 +88,15 @@ fn look<const D: usize>(plan: &Plan, arguments: &CheckArguments) -> Result<Repor
     let ghosts = say::ghost_share(plan, &survey, arguments.ranks);
     let cost = Cost::of(&simulation, columns);
     say::cost(&mut report, &cost, arguments.ranks, ghosts);
-    say::time(&mut report, plan, simulation.stable_step);
-    say::steps(&mut report, &simulation.clock);
-    let steps = simulation.clock.last();
+    say::time(&mut report, plan, simulation.scaled_stable_step());
+    say::steps(&mut report, &simulation.expected_clock());
+    let (steps, relaxes) = (simulation.last_step(), plan.relaxes());
     let seconds = seconds_a_step(&mut simulation);
-    say::run_time(&mut report, seconds, steps, arguments.ranks);
+    if relaxes {
+        say::iteration_time(&mut report, seconds, arguments.ranks);
+    } else {
+        say::run_time(&mut report, seconds, steps, arguments.ranks);
+    }
     for warning in &survey.warnings {
         report.say(format_args!("warning: {warning}"));
     }
@@ -130,7 +135,9 @@ fn estimate(plan: &Plan, arguments: &CheckArguments, size: &Size) -> Result<Repo
         .fold(f64::INFINITY, f64::min);
     // Where all points come from files nothing is known of the step.
     if stable.is_finite() {
-        let clock = choose_step(plan, stable)?;
+        let steps = choose_steps(plan, stable)?;
+        let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
+        let clock = Clock::new(plan.time.end / all, plan.time.end);
         let cost = Cost::estimate(plan, size.all_points(), size.directed_bonds, &clock);
         say::cost(&mut report, &cost, arguments.ranks, None);
         say::time(&mut report, plan, stable);

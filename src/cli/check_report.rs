@@ -231,6 +231,19 @@ pub fn run_time(report: &mut Report, seconds: f64, steps: u64, ranks: u32) {
     );
 }
 
+/// How long an iteration of a load step takes, from the wall-clock time of one on this rank.
+pub fn iteration_time(report: &mut Report, seconds: f64, ranks: u32) {
+    let threads = rayon::current_num_threads();
+    report.line(
+        "run time",
+        format_args!(
+            "about {} for an iteration, {ranks} rank(s) × {threads} thread(s) like these; a load step \
+             takes some hundreds to ten thousands",
+            duration(seconds / f64::from(ranks))
+        ),
+    );
+}
+
 /// Ghosts of a rank as a share of its own points, if the ranks' parts were cubes.
 pub fn ghost_share(plan: &Plan, survey: &Survey, ranks: u32) -> Option<f64> {
     if ranks == 1 {

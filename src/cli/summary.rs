@@ -19,11 +19,13 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("broken bonds", count(broken));
     line("steps", count(summary.steps));
     let step = si(summary.step, "s");
-    let share = summary.step / summary.stable_step;
-    line(
-        "time step",
-        format!("{step} ({share:.2} of the stable one)"),
-    );
+    let share = summary.stable_step.map_or(String::new(), |stable| {
+        format!(" ({:.2} of the stable one)", summary.step / stable)
+    });
+    line("time step", format!("{step}{share}"));
+    if summary.evaluations > summary.steps {
+        line("evaluations", count(summary.evaluations));
+    }
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
@@ -71,5 +73,5 @@ fn phases(seconds: &Phases) -> [(&'static str, f64); 7] {
 fn bond_updates(summary: &Summary) -> f64 {
     let seconds = &summary.seconds;
     let time_loop = seconds.bonds + seconds.halo + seconds.motion;
-    2.0 * summary.bonds as f64 * summary.steps as f64 / time_loop
+    2.0 * summary.bonds as f64 * summary.evaluations as f64 / time_loop
 }

@@ -5,8 +5,9 @@ use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
     Action, Body, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule, History,
-    Initial, Interface, InterfaceRule, Interval, Law, Material, Output, Places, Plan, PointSource,
-    PreCrack, Quadrature, Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
+    Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan,
+    PointSource, PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time, Toughness,
+    VolumeCorrection,
 };
 use super::resolve::ALL_VARIABLES;
 use super::source::Source;
@@ -47,7 +48,10 @@ impl Plan {
             time: Time {
                 end,
                 step: StepRule::Automatic(DEFAULT_SAFETY),
+                method: Method::Explicit,
+                density_scale: 1.0,
             },
+            stages: Vec::new(),
             output: Output {
                 every: Interval::Seconds(end / OUTPUTS),
                 fields: DEFAULT_FIELDS.to_vec(),
@@ -133,6 +137,33 @@ impl Plan {
         });
     }
 
+    /// The stages of the run, of which there is at least one.
+    pub fn all_stages(&self) -> Vec<Stage> {
+        if self.stages.is_empty() {
+            return vec![Stage {
+                time: self.time,
+                acting: vec![true; self.conditions.len()],
+            }];
+        }
+        let mut stages = self.stages.clone();
+        if let Some(last) = stages.last_mut() {
+            last.time.end = self.time.end;
+        }
+        stages
+    }
+
+    /// Whether any stage of the run is a relaxation.
+    pub fn relaxes(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.is_relaxation())
+    }
+
+    /// Whether bodies have another density in the equation of motion of any stage.
+    pub fn scales_density(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.density_scale != 1.0)
+    }
+
     /// Adds an initial velocity (m/s) of a set, given by its index: an expression a component.
     pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
         self.initials.push(Initial {
@@ -142,6 +173,13 @@ impl Plan {
             displacement: None,
             velocity: Some((velocity, 0..0)),
         });
+    }
+}
+
+impl Time {
+    /// Whether the method is relaxation.
+    pub fn is_relaxation(&self) -> bool {
+        matches!(self.method, Method::Relaxation(_))
     }
 }
 

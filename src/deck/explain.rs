@@ -1,6 +1,6 @@
 //! A deck with every default filled in.
 
-use super::grammar::{DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, common_keys};
+use super::grammar::{DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, common_keys};
 use super::number::{Edges, Number, Written, default_number};
 use super::plan::{CheckpointRule, Interval, Plan};
 use crate::dimension::Dimension;
@@ -46,6 +46,11 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         if condition.traction.is_some() || condition.pressure.is_some() {
             condition.depth = condition.depth.take().or_else(|| edge(grid));
         }
+    }
+    let time = deck.time.get_mut();
+    if plan.relaxes() {
+        let default = || Spanned::new(0..0, Relaxation::default());
+        time.relaxation.get_or_insert_with(default);
     }
     let output = deck.output.get_mut();
     fill_interval(

@@ -65,6 +65,9 @@ pub struct Deck {
     pub condition: Tables<Condition>,
     /// End time and step.
     pub time: Spanned<Time>,
+    /// The stages of the run in their order; without them there is one, that of `[time]`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stage: Vec<Spanned<Stage>>,
     /// What is written to the result, and how often.
     #[serde(default = "nowhere")]
     pub output: Spanned<Output>,
@@ -559,10 +562,106 @@ pub struct Time {
     /// Automatic step as a fraction of the stable one.
     #[serde(default = "default_safety")]
     pub safety: Number,
+    /// How the points come to move: `"explicit"`, by the equation of motion, or `"relaxation"`, from one
+    /// equilibrium to the next.
+    #[serde(default = "explicit")]
+    pub method: Spanned<Method>,
+    /// How equilibria are found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<Spanned<Relaxation>>,
+    /// How many times its density a body has in the equation of motion; more than 1 to take larger steps
+    /// through slow loading.
+    #[serde(default = "default_density_scale")]
+    pub density_scale: Number,
+}
+
+fn default_density_scale() -> Number {
+    default_number(1.0)
 }
 
 fn default_safety() -> Number {
     default_number(0.8)
+}
+
+/// A stage of the run. What it does not say is as in `[time]`.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stage {
+    /// When it ends, s; the last stage ends with the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Spanned<Method>>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub safety: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<Spanned<Relaxation>>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density_scale: Option<Number>,
+    /// Names of the loads and supports that act; all if neither this nor `off` is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on: Option<Spanned<Vec<Text>>>,
+    /// Names of the loads and supports that do not act.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub off: Option<Spanned<Vec<Text>>>,
+}
+
+fn explicit() -> Spanned<Method> {
+    Spanned::new(0..0, Method::Explicit)
+}
+
+/// How the points come to move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Velocity Verlet.
+    Explicit,
+    /// Adaptive dynamic relaxation in load steps; t is the load parameter.
+    Relaxation,
+}
+
+/// How equilibria are found.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Relaxation {
+    /// Number of load steps.
+    #[serde(default = "default_load_steps")]
+    pub load_steps: NonZeroU64,
+    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    #[serde(default = "default_tolerance")]
+    pub tolerance: Number,
+    /// The most iterations of a load step.
+    #[serde(default = "default_iterations")]
+    pub iterations: NonZeroU64,
+}
+
+impl Default for Relaxation {
+    fn default() -> Self {
+        Self {
+            load_steps: default_load_steps(),
+            tolerance: default_tolerance(),
+            iterations: default_iterations(),
+        }
+    }
+}
+
+fn default_load_steps() -> NonZeroU64 {
+    NonZeroU64::new(20).expect("not 0")
+}
+
+fn default_tolerance() -> Number {
+    default_number(1e-6)
+}
+
+fn default_iterations() -> NonZeroU64 {
+    NonZeroU64::new(100_000).expect("not 0")
 }
 
 /// The result file.

@@ -22,6 +22,7 @@ mod resolve;
 mod sets;
 mod shapes;
 pub mod source;
+mod time;
 mod toml_error;
 mod validate;
 

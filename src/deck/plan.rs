@@ -47,6 +47,9 @@ pub struct Plan {
     pub conditions: Vec<Condition>,
     /// The time axis.
     pub time: Time,
+    /// The stages of the run in their order; without them there is one, in which all conditions act. The
+    /// last one ends with [`Self::time`], of which nothing else counts then.
+    pub stages: Vec<Stage>,
     /// The result file.
     pub output: Output,
     /// The history.
@@ -405,6 +408,39 @@ pub struct Time {
     pub end: f64,
     /// The step.
     pub step: StepRule,
+    /// How the points come to move.
+    pub method: Method,
+    /// How many times its density a body has in the equation of motion.
+    pub density_scale: f64,
+}
+
+/// A stage of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// Its end, counted from the start of the run, and how it gets there.
+    pub time: Time,
+    /// Whether each condition acts.
+    pub acting: Vec<bool>,
+}
+
+/// How the points come to move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// By the equation of motion, with velocity Verlet.
+    Explicit,
+    /// From one equilibrium to the next; t is the load parameter, and [`Time::step`] is not used.
+    Relaxation(Relaxation),
+}
+
+/// How equilibria are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relaxation {
+    /// Number of load steps.
+    pub load_steps: u64,
+    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    pub tolerance: f64,
+    /// The most iterations of a load step.
+    pub iterations: u64,
 }
 
 /// How the time step is chosen.

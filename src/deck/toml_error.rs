@@ -17,7 +17,8 @@ use crate::material::declarations;
 pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
     let span = error.span().unwrap_or(0..0);
     let message = error.message().trim();
-    if source.text[span.start..].starts_with("[[") {
+    let marked = &source.text[span.start..];
+    if marked.starts_with("[[") && !marked.starts_with("[[stage]]") {
         let message = "a section has single brackets, as in `[body.plate]`";
         return source.error(span, message);
     }
@@ -199,12 +200,14 @@ fn label(path: &[String]) -> String {
         },
         "interface" if path.get(1).is_some_and(|key| key == "pair") => 3,
         "body" | "set" | "initial" | "condition" => 2,
-        "grid" | "interface" | "time" | "output" | "parameters" => 1,
+        "time" if path.len() > 2 => 2,
+        "grid" | "interface" | "time" | "stage" | "output" | "parameters" => 1,
         _ => 0,
     };
     let (header, keys) = path.split_at(count.min(path.len()));
     let header = match header {
         [] => Vec::new(),
+        [stage] if stage == "stage" => vec!["[[stage]]".to_owned()],
         _ => vec![format!("[{}]", header.join("."))],
     };
     [header, keys.to_vec()].concat().join(" ")

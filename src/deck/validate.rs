@@ -8,7 +8,7 @@ use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
 use super::{
-    bodies, conditions, damage, history, interface, materials, names, outputs, sets, shapes,
+    bodies, conditions, damage, history, interface, materials, names, outputs, sets, shapes, time,
 };
 use crate::dimension::Dimension;
 use crate::error::Result;
@@ -40,7 +40,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let cracks = resolve_each(&deck.crack, |name, table| {
         shapes::crack(&scope, name, table)
     })?;
-    let time = time(&scope, deck)?;
+    let time = time::time(&scope, deck)?;
     Ok(Plan {
         source: source.clone(),
         warnings: Vec::new(),
@@ -59,6 +59,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         cracks: cracks.into_values().collect(),
         initials: conditions::initials(&scope, deck, &sets)?,
         conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
+        stages: time::stages(&scope, deck, &time)?,
         output: outputs::output(&scope, deck, time.end)?,
         history: history::history(&scope, deck, &sets, time.end, horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
@@ -182,31 +183,4 @@ fn family(scope: &Scope, deck: &Deck) -> Result<plan::FamilyRule> {
             Err(scope.error(grid.family.span(), message))
         }
     }
-}
-
-fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {
-    let time = deck.time.get_ref();
-    let end = scope.positive(&time.end, "[time] end")?;
-    let safety = scope.within(
-        &time.safety,
-        "[time] safety",
-        f64::MIN_POSITIVE..1.0 + f64::EPSILON,
-        "above 0 and at most 1",
-    )?;
-    let step = match &time.step {
-        None => plan::StepRule::Automatic(safety),
-        Some(number) => {
-            let step = scope.positive(number, "[time] step")?;
-            if step > end {
-                let message = format!(
-                    "[time] step: {} s is longer than the run, {} s",
-                    shown(step),
-                    shown(end)
-                );
-                return Err(scope.error(number.span(), message));
-            }
-            plan::StepRule::Fixed(step)
-        }
-    };
-    Ok(plan::Time { end, step })
 }

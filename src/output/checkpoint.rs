@@ -22,7 +22,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 3;
+const VERSION: i64 = 4;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -210,6 +210,7 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
     let values = file.open_dataset("/values")?;
     let lengths = file.open_dataset("/bond_bytes")?;
     let bonds = file.open_dataset("/bonds")?;
+    let progress = file.integers_attribute("/", "progress")?;
     let (first, count) = (order.first(), order.count());
     let width = values.columns();
     let values = file.read_rows(&values, first, count)?;
@@ -223,6 +224,7 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
         values,
         lengths,
         bonds,
+        progress: progress.into_iter().map(|word| word as u64).collect(),
     })
 }
 
@@ -246,6 +248,8 @@ fn write_file(
         header.start.1 as i64,
     ];
     file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
+    let progress: Vec<i64> = saved.progress.iter().map(|word| *word as i64).collect();
+    file.set_attribute("/", "progress", Attribute::Integers(&progress))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
     file.set_attribute("/", "rounding", Attribute::Text(&header.rounding))?;
     let points = Rows::Fixed(header.points);

@@ -1,7 +1,7 @@
 //! What a run has decided by itself, for the reader of a log.
 
 use crate::comm;
-use crate::deck::plan::StepRule;
+use crate::deck::plan::{Method, StepRule};
 use crate::solver::Simulation;
 
 /// Names and what was decided; the same on all ranks. Collective.
@@ -75,8 +75,11 @@ fn bonds<const D: usize>(simulation: &Simulation<'_, D>) -> String {
 }
 
 fn step<const D: usize>(simulation: &Simulation<'_, D>) -> String {
-    let (step, stable) = (simulation.clock.step(), simulation.stable_step);
-    let source = match simulation.plan.time.step {
+    let (step, stable) = (simulation.clock.step(), simulation.scaled_stable_step());
+    if let Method::Relaxation(rule) = simulation.time_rule().method {
+        return format!("{step:.4e} s, {} load steps of relaxation", rule.load_steps);
+    }
+    let source = match simulation.time_rule().step {
         StepRule::Automatic(_) => "chosen",
         StepRule::Fixed(_) => "of the deck",
     };

@@ -56,6 +56,12 @@ use recorder::{Recorder, Start, can_continue};
 use restart::{Restart, restart};
 use watch::Watch;
 
+/// Kinetic energy as a share of the strain energy above which loading is not slow.
+const INERTIA_SHARE: f64 = 0.05;
+
+/// The share of a run at its start in which little strain energy is there to compare with.
+const START_SHARE: f64 = 0.1;
+
 /// How a run ended, and what it did; the same on all ranks.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -153,7 +159,7 @@ impl<'a> Job<'a> {
         simulation.check()?;
         self.observer.message(&Message::SetUp {
             step: simulation.clock.step(),
-            stable_step: simulation.stable_step,
+            stable_step: simulation.scaled_stable_step(),
             survey: Survey::new(&mut simulation),
         });
         if !simulation.forces.instructions().are_fused() {
@@ -186,7 +192,7 @@ impl<'a> Job<'a> {
         Ok(Outcome {
             stopped,
             number: simulation.clock.number(),
-            last: simulation.clock.last(),
+            last: simulation.last_step(),
             time: simulation.clock.time(),
             last_row: recorder.last_row,
             files: self.files.clone(),
@@ -223,32 +229,33 @@ impl<'a> Job<'a> {
         let signals = self.options.signals.clone();
         let started = self.options.started;
         let limit = self.options.wall_time.map(|limit| (started, limit));
-        let mut watch = Watch::new(
-            signals.as_ref(),
-            self.plan.checkpoint,
-            limit,
-            simulation.clock.number(),
-        );
+        let mut watch = Watch::new(signals.as_ref(), self.plan.checkpoint, limit);
         let mut contact = Some(ContactWatch::new(simulation));
-        while !simulation.clock.is_over() {
+        let mut slow = true;
+        while !simulation.is_over() {
             simulation.advance();
             let clock = simulation.clock;
-            let complete = clock.is_over();
+            let complete = simulation.is_over();
+            let step = simulation.load_step.is_settled.then_some(&clock);
+            let due = step.is_some_and(|clock| recorder.is_due(clock));
             let mut stop = None;
-            if complete || watch.is_due(&clock) || recorder.is_due(&clock) {
+            if watch.is_due(step) || due || complete || simulation.load_step.has_failed {
                 if let Err(error) = simulation.check() {
                     // The reader of the result should see where it went wrong.
                     recorder.write(simulation, true, true)?;
                     return Ok(Left::Failed(error));
                 }
-                if recorder.is_due(&clock)
+                if due
                     && let Some(found) = contact.as_ref().and_then(|watch| watch.look(simulation))
                 {
                     self.warn_of_contact(&found, clock.time());
                     contact = None;
                 }
-                recorder.record(simulation, self.observer)?;
-                let decision = watch.look(self.comm, &clock);
+                if due {
+                    recorder.record(simulation, self.observer)?;
+                    slow = slow && !self.warn_of_inertia(simulation, recorder);
+                }
+                let decision = watch.look(self.comm, step);
                 if complete || decision.checkpoint || decision.stop.is_some() {
                     watch.wrote_checkpoint(checkpoints.write(simulation, recorder)?);
                 }
@@ -273,6 +280,31 @@ impl<'a> Job<'a> {
             place.join(", ")
         );
         self.observer.message(&Message::Warning(text));
+    }
+
+    /// Says, of a run with another density, that it is not slow; returns whether it was said.
+    fn warn_of_inertia<const D: usize>(
+        &mut self,
+        simulation: &Simulation<'a, D>,
+        recorder: &Recorder<'a>,
+    ) -> bool {
+        let (time, end) = (simulation.clock.time(), self.plan.time.end);
+        let scaled = simulation.time_rule().density_scale != 1.0;
+        let Some(row) = recorder.last_row.as_ref().filter(|_| scaled) else {
+            return false;
+        };
+        let (kinetic, strain) = (row.energies.kinetic, row.energies.strain);
+        if time < START_SHARE * end || kinetic <= INERTIA_SHARE * strain {
+            return false;
+        }
+        let text = format!(
+            "at t = {time:.4e} s the kinetic energy is {:.1} % of the strain energy, above {} %: with \
+             this density_scale the loading is not slow",
+            100.0 * kinetic / strain,
+            100.0 * INERTIA_SHARE
+        );
+        self.observer.message(&Message::Warning(text));
+        true
     }
 
     fn begin_run<const D: usize>(
@@ -301,7 +333,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Continued {
             number: simulation.clock.number(),
             time: simulation.clock.time(),
-            complete: simulation.clock.is_over(),
+            complete: simulation.is_over(),
         });
         let metadata = self.metadata(simulation);
         if can_continue(simulation, &self.files, &header)? {

@@ -99,7 +99,7 @@ impl<const D: usize> View for Simulation<'_, D> {
     }
 
     fn last(&self) -> u64 {
-        self.clock.last()
+        self.last_step()
     }
 
     fn time(&self) -> f64 {

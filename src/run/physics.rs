@@ -20,6 +20,9 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
     plan.source = Source::default();
     plan.warnings.clear();
     plan.title.clear();
+    if let Some(last) = plan.stages.last_mut() {
+        last.time.end = 0.0;
+    }
     plan.time.end = 0.0;
     plan.output = Output {
         every: Interval::Steps(1),

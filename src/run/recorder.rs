@@ -79,7 +79,7 @@ impl<'a> Recorder<'a> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
         let order = id_order(simulation);
-        let clock = &simulation.clock;
+        let clock = &simulation.expected_clock();
         let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.history.every));
         let layout = Layout::new(simulation, &order, outputs.count(clock), metadata);
         let fixed = layout.fixed();

@@ -56,7 +56,7 @@ pub fn restart<const D: usize>(
     }
     let order: IdOrder = id_order(simulation);
     let saved = read_saved(comm, &path, &order)?;
-    simulation.restore(&order, &saved, header.number, header.step)?;
+    simulation.restore(&order, &saved)?;
     Ok(Restart {
         checkpoints: CheckpointWriter::after(checkpoints, physics, fingerprint),
         header,

@@ -14,10 +14,12 @@ pub struct Summary {
     pub bonds: u64,
     /// Number of steps that this run made.
     pub steps: u64,
-    /// Length of a step, s.
+    /// Number of force evaluations: one a step, or one an iteration of a load step.
+    pub evaluations: u64,
+    /// Length of a step of the last stage, s.
     pub step: f64,
-    /// The largest step that is known to be stable, s.
-    pub stable_step: f64,
+    /// The largest step that is known to be stable in the last stage, s; none where that is a relaxation.
+    pub stable_step: Option<f64>,
     /// Number of ranks.
     pub ranks: usize,
     /// The vector instructions that were used.
@@ -74,7 +76,8 @@ impl Summary {
             bonds: comm::total(simulation.comm, simulation.forces.directed_bonds()) / 2,
             steps,
             step: simulation.clock.step(),
-            stable_step: simulation.stable_step,
+            evaluations: times.evaluations,
+            stable_step: (!simulation.relaxes()).then(|| simulation.scaled_stable_step()),
             ranks: simulation.comm.size(),
             instructions: simulation.forces.instructions().name(),
             checkpoints,

@@ -9,8 +9,9 @@ use crate::solver::observers::Schedule;
 
 use super::signals::Signals;
 
-/// The ranks look at signals and clocks together, at most this many steps and about this long apart.
-const MOST_STEPS: u64 = 10;
+/// The ranks look at signals and clocks together, at most this many turns of the time loop (steps, or
+/// iterations of a load step) and about this long apart.
+const MOST_TURNS: u64 = 10;
 const SECONDS_APART: f64 = 0.2;
 
 /// Part of a wall-clock limit that is kept for the last checkpoint, at least and at most so long.
@@ -44,18 +45,19 @@ pub struct Watch<'a> {
     limit: Option<(Instant, f64)>,
     last_checkpoint: Instant,
     cost: Duration,
+    /// Turns so far.
+    turns: u64,
     last_look: (Instant, u64),
     next_look: u64,
 }
 
 impl<'a> Watch<'a> {
-    /// For a run that has made `number` steps. `limit` is a wall-clock time and when it began; without
-    /// it that of the Slurm job counts.
+    /// For the rest of a run. `limit` is a wall-clock time and when it began; without it that of the
+    /// Slurm job counts.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
         limit: Option<(Instant, Duration)>,
-        number: u64,
     ) -> Self {
         let schedule = match rule {
             CheckpointRule::WallClock(_) => None,
@@ -71,25 +73,27 @@ impl<'a> Watch<'a> {
                 .map(|(start, limit)| (start, limit.as_secs_f64())),
             last_checkpoint: Instant::now(),
             cost: Duration::ZERO,
-            last_look: (Instant::now(), number),
-            next_look: number + 1,
+            turns: 0,
+            last_look: (Instant::now(), 0),
+            next_look: 1,
         }
     }
 
-    /// Whether the ranks look together after this step.
-    pub fn is_due(&self, clock: &Clock) -> bool {
-        clock.number() >= self.next_look || self.is_scheduled(clock)
+    /// Counts a turn. Whether the ranks look together after it; `step` is the clock if it ended a step.
+    pub fn is_due(&mut self, step: Option<&Clock>) -> bool {
+        self.turns += 1;
+        self.turns >= self.next_look || self.is_scheduled(step)
     }
 
-    fn is_scheduled(&self, clock: &Clock) -> bool {
-        self.schedule.is_some_and(|schedule| schedule.is_due(clock))
+    fn is_scheduled(&self, step: Option<&Clock>) -> bool {
+        let due = |clock| self.schedule.is_some_and(|schedule| schedule.is_due(clock));
+        step.is_some_and(due)
     }
 
-    /// What to do after this step: the same on all ranks. Collective.
-    pub fn look(&mut self, comm: &dyn Communicator, clock: &Clock) -> Decision {
-        let number = clock.number();
+    /// What to do after this turn, which may have ended a step: the same on all ranks. Collective.
+    pub fn look(&mut self, comm: &dyn Communicator, step: Option<&Clock>) -> Decision {
         let (then, before) = self.last_look;
-        let per_step = then.elapsed().as_secs_f64() / (number - before).max(1) as f64;
+        let per_turn = then.elapsed().as_secs_f64() / (self.turns - before).max(1) as f64;
         let due = match self.rule {
             CheckpointRule::WallClock(seconds) => {
                 self.last_checkpoint.elapsed().as_secs_f64() >= seconds
@@ -105,14 +109,14 @@ impl<'a> Watch<'a> {
             flag(self.signals.is_some_and(Signals::stop)),
             flag(late),
             flag(due || self.signals.is_some_and(Signals::take_request)),
-            per_step,
+            per_turn,
         ];
         comm.max(&mut votes);
-        let steps = (SECONDS_APART / votes[3].max(1e-9)) as u64;
-        self.next_look = number + steps.clamp(1, MOST_STEPS);
-        self.last_look = (Instant::now(), number);
+        let turns = (SECONDS_APART / votes[3].max(1e-9)) as u64;
+        self.next_look = self.turns + turns.clamp(1, MOST_TURNS);
+        self.last_look = (Instant::now(), self.turns);
         Decision {
-            checkpoint: votes[2] > 0.0 || self.is_scheduled(clock),
+            checkpoint: votes[2] > 0.0 || self.is_scheduled(step),
             stop: match (votes[0] > 0.0, votes[1] > 0.0) {
                 (true, _) => Some(Reason::Signal),
                 (_, true) => Some(Reason::WallTime),

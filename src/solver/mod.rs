@@ -9,5 +9,6 @@ pub mod motion;
 pub mod observers;
 pub mod simulation;
 pub mod size;
+mod stages;
 
 pub use simulation::Simulation;

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::plan::{Plan, StepRule};
+use crate::deck::plan::{Method, Plan, Stage, StepRule, Time};
 use crate::deck::shown;
 use crate::error::{Error, Result};
 use crate::partition::distribute;
@@ -17,6 +17,7 @@ use super::grids::grids;
 use super::model::Model;
 use super::motion::clock::steps_to;
 use super::motion::fields::Needs;
+use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::{Clock, Fields, verlet};
 use super::size;
@@ -37,16 +38,26 @@ pub struct Simulation<'a, const D: usize> {
     pub fields: Fields<D>,
     /// Their bonds.
     pub forces: Forces<D>,
-    /// Loads and supports.
+    /// Loads and supports that act in the present stage.
     pub conditions: Conditions<D>,
+    /// Those of the other stages, by stage.
+    pub(super) waiting: Vec<Option<Conditions<D>>>,
+    /// The stages of the run.
+    pub stages: Vec<Stage>,
+    /// Index of the present stage.
+    pub stage: usize,
+    /// Step (s) of each stage, and how many of them it takes.
+    pub(super) steps: Vec<(f64, f64)>,
     /// Volume of each owned point's whole family, broken bonds included, m³.
     pub family_volume: Vec<f64>,
     /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
     pub cut: Vec<u64>,
-    /// The stable step, s.
+    /// The stable step with the density of the materials, s.
     pub stable_step: f64,
-    /// Time and step.
+    /// Time and step of the present stage.
     pub clock: Clock,
+    /// How far the load step has come; settled without relaxation.
+    pub load_step: LoadStep,
     /// Where the time went.
     pub times: Times,
     bad: Option<BadPoint>,
@@ -61,6 +72,8 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Integration and conditions.
     pub motion: Duration,
+    /// Number of force evaluations in the time loop.
+    pub evaluations: u64,
 }
 
 /// The first point of a rank whose velocity was not finite.
@@ -118,20 +131,32 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let interactions = assign(plan, &model, &blocks, bonds);
         let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
         between()?;
-        let stable = stable_step(comm, &model, &forces.stiffness(&model));
-        let clock = choose_step(plan, stable)?;
+        let stiffness = forces.stiffness(&model);
+        let stable = stable_step(comm, &model, &stiffness);
+        let stages = plan.all_stages();
+        let steps = choose_steps(plan, stable)?;
+        let clock = Clock::new(steps[0].0, stages[0].time.end);
         let family_volume = forces.family_volume(&model);
         let cut = pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 
-        let conditions = Conditions::new(plan, comm, &model)?;
+        let each = stages.iter().map(|stage| &stage.acting);
+        let each = each.map(|acting| Conditions::new(plan, comm, &model, acting));
+        let mut waiting = each
+            .map(|conditions| conditions.map(Some))
+            .collect::<Result<Vec<_>>>()?;
+        let all = || waiting.iter().flatten();
         let needs = Needs {
-            loads: conditions.have_loads(),
-            supports: conditions.have_supports(),
+            loads: all().any(Conditions::have_loads),
+            supports: all().any(Conditions::have_supports),
             damping: model.damping.iter().any(|rate| *rate > 0.0),
+            relaxation: plan.relaxes(),
             damage: plan.bodies.iter().any(|body| body.damage.is_some()),
         };
         let mut fields = Fields::new(&model, needs);
+        if let Some(density) = &mut fields.fictitious_density {
+            *density = fictitious_density(&stiffness);
+        }
         apply_initials(plan, comm, &model, &mut fields)?;
         are_finite(plan, comm, &model, 0.0)?;
         let mut simulation = Self {
@@ -140,21 +165,31 @@ impl<'a, const D: usize> Simulation<'a, D> {
             model,
             fields,
             forces,
-            conditions,
+            conditions: waiting[0].take().unwrap_or_default(),
+            waiting,
+            stages,
+            stage: 0,
+            steps,
             family_volume,
             cut,
             stable_step: stable,
             clock,
+            load_step: LoadStep::default(),
             times: Times::default(),
             bad: None,
         };
+        simulation.scale_density();
         simulation
             .conditions
             .place(&mut simulation.fields, 0.0, 0.0);
         simulation
             .conditions
             .load(&mut simulation.fields, 0.0, true);
-        simulation.evaluate(Evolution::Step(0.0));
+        simulation.evaluate(match simulation.time_rule().method {
+            Method::Explicit => Evolution::Step(0.0),
+            // This is no equilibrium.
+            Method::Relaxation(_) => Evolution::None,
+        });
         simulation.guide();
         simulation.fields.add_damped_energy(&simulation.model, 0.0);
         simulation.bad = simulation.first_bad();
@@ -165,8 +200,24 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Makes one step.
+    /// How the present stage gets to its end.
+    pub fn time_rule(&self) -> Time {
+        self.stages[self.stage].time
+    }
+
+    /// Makes one step, or one iteration of a load step. Collective.
     pub fn advance(&mut self) {
+        if self.is_stage_over() && self.stage + 1 < self.stages.len() {
+            self.begin_stage(self.stage + 1);
+        }
+        match self.time_rule().method {
+            Method::Explicit => self.make_step(),
+            Method::Relaxation(rule) => self.relax(&rule),
+        }
+    }
+
+    /// Makes one step by the equation of motion. Collective.
+    fn make_step(&mut self) {
         let start = Instant::now();
         let step = self.clock.step();
         self.conditions.before_moving(&self.fields);
@@ -181,8 +232,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.conditions.load(fields, time, false);
         let finite = verlet::kick(model, fields, step);
         let finite = self.guide() && finite;
-        if !finite && self.bad.is_none() {
-            self.bad = self.first_bad();
+        if !finite {
+            self.note_bad();
         }
         let (model, fields) = (&self.model, &mut self.fields);
         self.conditions.add_work(model, fields);
@@ -198,6 +249,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             displacement: &mut fields.displacement,
             force: &mut fields.internal_force,
         };
+        self.times.evaluations += 1;
         let times = &mut self.times.forces;
         self.forces
             .evaluate(self.comm, &self.model, acting, evolution, times);
@@ -207,10 +259,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
-    fn guide(&mut self) -> bool {
+    pub(super) fn guide(&mut self) -> bool {
         let (time, step) = (self.clock.time(), self.clock.step());
-        self.conditions
-            .guide(&self.model, &mut self.fields, time, step)
+        let method = self.time_rule().method;
+        let (model, fields) = (&self.model, &mut self.fields);
+        match method {
+            Method::Explicit => self.conditions.guide(model, fields, time, step),
+            Method::Relaxation(_) => self.conditions.hold(model, fields),
+        }
     }
 
     /// Finds from the state, after it has been put back, what is not part of it. Collective.
@@ -219,6 +275,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.conditions.load(&mut self.fields, time, true);
         self.fields.add_damped_energy(&self.model, 0.0);
         self.evaluate(Evolution::None);
+    }
+
+    /// Takes note of a motion that is not finite.
+    pub(super) fn note_bad(&mut self) {
+        if self.bad.is_none() {
+            self.bad = self.first_bad();
+        }
     }
 
     /// The point with the smallest id among those with a motion or force that is not finite.
@@ -246,7 +309,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Looks on all ranks whether every value is still finite.
     ///
     /// # Errors
-    /// Names the first point (earliest step, then smallest id) that was not.
+    /// Names the first point (earliest step, then smallest id) that was not; or no equilibrium has been
+    /// found.
     pub fn check(&self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -254,7 +318,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         comm::min(self.comm, &mut earliest);
         let [step, time] = earliest;
         if step == f64::MAX {
-            return Ok(());
+            return self.load_step.outcome(self.clock.time());
         }
         let valued = are_finite(self.plan, self.comm, &self.model, time);
         valued.map_err(|error| Error::run(error.message))?;
@@ -286,7 +350,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                         body.name,
                         &position[..D],
                         self.clock.step(),
-                        self.stable_step,
+                        self.scaled_stable_step(),
                     ))
                 })
             }
@@ -295,34 +359,50 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// The clock of a run. An automatic step divides the run evenly.
+/// The step (s) of each stage of a run, and how many of them it takes, with a stable step (s). An automatic
+/// step divides the stage evenly.
 ///
 /// # Errors
 /// When there is no stable step, or there are more steps than can be counted.
-pub fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
-    let end = plan.time.end;
-    let (step, steps) = match plan.time.step {
-        StepRule::Fixed(step) => (step, steps_to(end, step)),
-        StepRule::Automatic(_) if stable.is_infinite() => {
+pub fn choose_steps(plan: &Plan, stable: f64) -> Result<Vec<(f64, f64)>> {
+    let mut start = 0.0;
+    let choose = |stage: Stage| {
+        let (time, length) = (stage.time, stage.time.end - start);
+        start = time.end;
+        choose_step(plan, &time, length, stable)
+    };
+    plan.all_stages().into_iter().map(choose).collect()
+}
+
+/// The step (s) of a stage of some length (s), and how many of them it takes.
+fn choose_step(plan: &Plan, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
+    let (step, steps) = match (time.method, time.step) {
+        (Method::Relaxation(rule), _) => {
+            let steps = rule.load_steps as f64;
+            (length / steps, steps)
+        }
+        (Method::Explicit, StepRule::Fixed(step)) => (step, steps_to(length, step)),
+        (Method::Explicit, StepRule::Automatic(_)) if stable.is_infinite() => {
             return Err(plan.source.error(
                 plan.places.horizon.clone(),
                 "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
                  in m and larger than the distance of the points?",
             ));
         }
-        StepRule::Automatic(safety) => {
-            let steps = (end / (safety * stable)).ceil();
-            (end / steps, steps)
+        (Method::Explicit, StepRule::Automatic(safety)) => {
+            let stable = stable * time.density_scale.sqrt();
+            let steps = (length / (safety * stable)).ceil();
+            (length / steps, steps)
         }
     };
     if steps > 1e15 {
         let message = format!(
             "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",
-            shown(end)
+            shown(length)
         );
         return Err(plan.source.error(plan.places.step.clone(), message));
     }
-    Ok(Clock::new(step, end))
+    Ok((step, steps))
 }
 
 /// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id

@@ -53,7 +53,7 @@ impl Cost {
             columns: columns as f64,
             saved: simulation.saved_width(),
         };
-        cost(simulation.plan, counts, &simulation.clock)
+        cost(simulation.plan, counts, &simulation.expected_clock())
     }
 
     /// Of a run of so many points and bonds, counted from both ends, and such steps, by estimate.
@@ -87,7 +87,12 @@ fn saved_width(plan: &Plan) -> usize {
     };
     let worked = usize::from(!plan.conditions.is_empty());
     let damped = plan.bodies.iter().any(|body| body.material.damping > 0.0);
-    2 * dimension + 1 + supported + worked + usize::from(damped)
+    let relaxed = if plan.relaxes() {
+        2 * dimension + supported
+    } else {
+        0
+    };
+    2 * dimension + 1 + supported + worked + usize::from(damped) + relaxed
 }
 
 fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {

@@ -2,7 +2,8 @@
 
 use crate::comm::threads;
 use crate::deck::plan::{
-    History, Interface, InterfaceRule, Plan, PointSource, Selector, Set, Shape, StepRule, Time,
+    History, Interface, InterfaceRule, Method, Plan, PointSource, Selector, Set, Shape, StepRule,
+    Time,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -77,7 +78,10 @@ fn block(plan: &Plan, body: usize) -> Option<Plan> {
         time: Time {
             end: 1.0,
             step: StepRule::Fixed(1.0),
+            method: Method::Explicit,
+            density_scale: 1.0,
         },
+        stages: Vec::new(),
         ..plan.clone()
     };
     let dimension = plan.dimension.count();

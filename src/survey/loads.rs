@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use crate::comm::sum::reduce;
 use crate::comm::{ExactSum, total};
 use crate::deck::expression::Expression;
-use crate::deck::plan::{Action, Condition, Plan, PointSource};
+use crate::deck::plan::{Action, Condition, Plan, PointSource, Stage};
 use crate::deck::shown;
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
@@ -66,6 +66,10 @@ fn twice_prescribed<const D: usize>(
             let (Some(old), Some(new)) = (motion(first), motion(second)) else {
                 continue;
             };
+            let both = |stage: &Stage| stage.acting[earlier] && stage.acting[later];
+            if !simulation.stages.iter().any(both) {
+                continue;
+            }
             let differs = |d: &usize| {
                 let same = old[*d] == new[*d] && first.quantity == second.quantity;
                 old[*d].is_some() && new[*d].is_some() && !same

@@ -194,16 +194,17 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Strin
         warnings.push(plan.source.warning(plan.places.step.clone(), message));
     };
     let clock = simulation.clock;
-    let (step, stable) = (clock.step(), simulation.stable_step);
-    if step > stable {
+    let (step, stable) = (clock.step(), simulation.scaled_stable_step());
+    if step > stable && !simulation.relaxes() {
         warn(format!(
             "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s"
         ));
     }
-    if clock.last() > MANY_STEPS {
+    let last = simulation.last_step();
+    if last > MANY_STEPS {
         warn(format!(
             "[time] end: the run takes {:.1e} steps of {step:.4e} s",
-            clock.last() as f64
+            last as f64
         ));
     }
 }

@@ -47,6 +47,13 @@ pub struct ForceTimes {
     pub halo: Duration,
 }
 
+impl ForceTimes {
+    /// All of it.
+    pub fn whole(&self) -> Duration {
+        self.bonds + self.halo
+    }
+}
+
 /// What a force evaluation changes.
 pub struct Acting<'a, const D: usize> {
     /// Displacements of the local points, m; those of ghosts are brought up to date.

@@ -45,7 +45,11 @@ pub fn are_finite<const D: usize>(
             }
         }
     }
-    for condition in &plan.conditions {
+    let stages = plan.all_stages();
+    let now = stages.iter().find(|stage| time < stage.time.end);
+    let acting = now.or(stages.last()).map(|stage| &stage.acting);
+    let conditions = plan.conditions.iter().zip(acting.into_iter().flatten());
+    for (condition, _) in conditions.filter(|(_, acting)| **acting) {
         let key = format!("[condition.{}] {}", condition.name, condition.quantity);
         let (place, set) = (&condition.place, condition.set);
         match &condition.action {

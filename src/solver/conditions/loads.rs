@@ -80,6 +80,16 @@ impl<const D: usize> Load<D> {
         }
     }
 
+    /// Remembers force and place at an earlier time (s), when points had these displacements (m).
+    pub fn remember(&mut self, displacement: &[Vec<f64>; D], time: f64, now: f64) {
+        self.update(time);
+        self.before.copy_from_slice(&self.force);
+        self.update(now);
+        for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
+            *from = std::array::from_fn(|d| displacement[d][*point as usize]);
+        }
+    }
+
     /// Adds the work of the step (J), by the trapezoid rule.
     pub fn add_work(&self, model: &Model<D>, displacement: &[Vec<f64>; D], work: &mut [f64]) {
         for (k, point) in self.points.iter().enumerate() {

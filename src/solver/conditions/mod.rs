@@ -20,7 +20,8 @@ pub use initial::apply_initials;
 use loads::Load;
 use supports::{Motion, Support};
 
-/// All loads and supports of this rank's points.
+/// Loads and supports of this rank's points.
+#[derive(Default)]
 pub struct Conditions<const D: usize> {
     loads: Vec<Load<D>>,
     supports: Vec<Support>,
@@ -58,15 +59,21 @@ pub fn not_empty(
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Finds the points of every condition. Where two supports prescribe the same component of a
-    /// point, the later one holds.
+    /// Finds the points of every condition that is `acting`. Where two supports prescribe the same
+    /// component of a point, the later one holds.
     ///
     /// # Errors
     /// On an empty set; the same on all ranks.
-    pub fn new(plan: &Plan, comm: &dyn Communicator, model: &Model<D>) -> Result<Self> {
+    pub fn new(
+        plan: &Plan,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+        acting: &[bool],
+    ) -> Result<Self> {
         let mut loads = Vec::new();
         let mut supports: Vec<Support> = Vec::new();
-        for condition in &plan.conditions {
+        let conditions = plan.conditions.iter().zip(acting);
+        for (condition, _) in conditions.filter(|(_, acting)| **acting) {
             let points = members(plan, model, condition.set);
             let key = format!("[condition.{}] set", condition.name);
             let place = (&key[..], condition.span.clone());
@@ -162,6 +169,30 @@ impl<const D: usize> Conditions<D> {
             finite &= support.guide(model, fields, time, step);
         }
         finite
+    }
+
+    /// Finds the reactions that keep supported points where they are, at rest. Returns whether they are
+    /// finite.
+    pub fn hold(&self, model: &Model<D>, fields: &mut Fields<D>) -> bool {
+        let mut finite = true;
+        for support in &self.supports {
+            finite &= support.hold(model, fields);
+        }
+        finite
+    }
+
+    /// Remembers forces and places of the last equilibrium, at the time `then` (s), for the work until
+    /// the one at `now` (s).
+    pub fn remember_equilibrium(&mut self, fields: &Fields<D>, then: f64, now: f64) {
+        let Some(displacement) = &fields.equilibrium_displacement else {
+            return;
+        };
+        for load in &mut self.loads {
+            load.remember(displacement, then, now);
+        }
+        for support in &mut self.supports {
+            support.remember(displacement, fields.equilibrium_reaction.as_ref());
+        }
     }
 
     /// After forces and reactions are known at the new place: adds up the work of the step, by the

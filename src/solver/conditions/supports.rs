@@ -165,6 +165,35 @@ impl Support {
         finite
     }
 
+    /// Finds the reactions that keep the points where they are, at rest. Returns whether they are
+    /// finite.
+    pub fn hold<const D: usize>(&self, model: &Model<D>, fields: &mut Fields<D>) -> bool {
+        let mut finite = true;
+        for point in &self.points {
+            let point = *point as usize;
+            fields.velocity[self.component][point] = 0.0;
+            let reaction = -fields.acting(model, self.component, point);
+            if let Some(field) = &mut fields.reaction {
+                field[self.component][point] = reaction;
+            }
+            finite &= reaction.is_finite();
+        }
+        finite
+    }
+
+    /// Remembers reaction (N/m³) and place of an earlier time, when points had these displacements (m).
+    pub fn remember<const D: usize>(
+        &mut self,
+        displacement: &[Vec<f64>; D],
+        reaction: Option<&[Vec<f64>; D]>,
+    ) {
+        for (k, point) in self.points.iter().enumerate() {
+            let point = *point as usize;
+            self.moved_from[k] = displacement[self.component][point];
+            self.before[k] = reaction.map_or(0.0, |field| field[self.component][point]);
+        }
+    }
+
     /// Adds the work of the step (J), by the trapezoid rule. `displacement` and `reaction` (N/m³) are
     /// those of the support's component.
     pub fn add_work<const D: usize>(

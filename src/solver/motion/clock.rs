@@ -25,12 +25,22 @@ impl Clock {
         }
     }
 
-    /// After so many steps of one size (s).
-    pub fn after(number: u64, step: f64, end: f64) -> Self {
-        let mut clock = Self::new(step, end);
-        clock.number = number;
-        clock.before = number.saturating_sub(1) as f64 * step;
-        clock
+    /// All of it but the end, as a checkpoint holds it.
+    pub fn words(&self) -> [u64; 5] {
+        let [since, before, step] = [self.since.0, self.before, self.step].map(f64::to_bits);
+        [since, self.since.1, before, step, self.number]
+    }
+
+    /// What [`Self::words`] gave, in a run that ends at `end` (s).
+    pub fn of_words([since, at, before, step, number]: [u64; 5], end: f64) -> Self {
+        let [since, before, step] = [since, before, step].map(f64::from_bits);
+        Self {
+            since: (since, at),
+            before,
+            step,
+            number,
+            end,
+        }
     }
 
     /// Time reached, s.
@@ -71,6 +81,17 @@ impl Clock {
         self.step = step;
     }
 
+    /// Whether the next step has another size than the last one, or is the first.
+    pub fn is_new_size(&self) -> bool {
+        self.number == self.since.1
+    }
+
+    /// Goes on with steps of another size (s) until another end (s).
+    pub fn set_stage(&mut self, step: f64, end: f64) {
+        self.set_step(step);
+        self.end = end;
+    }
+
     /// Number of the step that reaches the end, if the step keeps its size.
     pub fn last(&self) -> u64 {
         let (time, number) = self.since;
@@ -109,7 +130,7 @@ mod tests {
             assert_eq!(clock.time_before(), (number - 1) as f64 * 0.1);
         }
         assert!(clock.is_over());
-        assert_eq!(Clock::after(10, 0.1, 1.0), clock);
+        assert_eq!(Clock::of_words(clock.words(), 1.0), clock);
     }
 
     #[test]
@@ -117,7 +138,9 @@ mod tests {
         let mut clock = Clock::new(0.25, 1.0);
         clock.advance();
         clock.advance();
+        assert!(!clock.is_new_size());
         clock.set_step(0.125);
+        assert!(clock.is_new_size());
         assert_eq!((clock.time(), clock.last()), (0.5, 6));
         clock.advance();
         assert_eq!((clock.time(), clock.time_before()), (0.625, 0.5));
@@ -125,6 +148,7 @@ mod tests {
         clock.advance();
         assert_eq!(clock.time(), 1.0);
         assert!(clock.is_over());
+        assert_eq!(Clock::of_words(clock.words(), 1.0), clock);
     }
 
     #[test]

@@ -190,6 +190,34 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
+    /// u̇ of the relaxation at half iterations, m an iteration; none without relaxation.
+    relaxation_velocity: Option<[Vec<f64>; D]> = Description {
+        name: "relaxation_velocity",
+        unit: "m",
+        ..STATE
+    };
+    /// u at the last equilibrium, m; none without relaxation.
+    equilibrium_displacement: Option<[Vec<f64>; D]> = Description {
+        name: "equilibrium_displacement",
+        unit: "m",
+        ..STATE
+    };
+    /// What supports exerted at the last equilibrium, N/m³; none without relaxation or supports.
+    equilibrium_reaction: Option<[Vec<f64>; D]> = Description {
+        name: "equilibrium_reaction",
+        unit: "N/m^3",
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// Density of the relaxation, with which an iteration is stable, N/m⁴; none without relaxation.
+    fictitious_density: Option<Vec<f64>> = Description {
+        name: "fictitious_density",
+        unit: "N/m^4",
+        state: false,
+        undone: false,
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
     /// Energy taken by viscous damping, J; none without it.
     damped_energy: Option<Vec<f64>> = Description {
         name: "damped_energy",
@@ -206,6 +234,8 @@ pub struct Needs {
     pub supports: bool,
     /// Whether there is viscous damping.
     pub damping: bool,
+    /// Whether there is relaxation.
+    pub relaxation: bool,
     /// Whether bonds can break.
     pub damage: bool,
 }
@@ -227,6 +257,10 @@ impl<const D: usize> Fields<D> {
             overshoot_energy: needs.damage.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
             damping_power: needs.damping.then(scalar),
+            relaxation_velocity: needs.relaxation.then(|| vector(owned)),
+            equilibrium_displacement: needs.relaxation.then(|| vector(owned)),
+            equilibrium_reaction: (needs.relaxation && needs.supports).then(|| vector(owned)),
+            fictitious_density: needs.relaxation.then(scalar),
             damped_energy: needs.damping.then(scalar),
         }
     }
@@ -244,6 +278,13 @@ impl<const D: usize> Fields<D> {
             force -= damping * model.density_of(point) * self.velocity[d][point];
         }
         force
+    }
+
+    /// The force density of all forces on an owned point, N/m³; 0 in equilibrium.
+    #[inline]
+    pub fn total_force(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
+        let reaction = self.reaction.as_ref().map_or(0.0, |field| field[d][point]);
+        self.acting(model, d, point) + reaction
     }
 
     /// Finds the power of damping at the present velocities, and adds the energy that it takes in a step

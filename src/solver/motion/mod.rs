@@ -2,6 +2,7 @@
 
 pub mod clock;
 pub mod fields;
+pub mod relaxation;
 pub mod saved;
 pub mod stable_step;
 pub mod undo;

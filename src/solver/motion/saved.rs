@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::solver::Simulation;
 
 use super::Clock;
+use super::relaxation::LoadStep;
 
 /// The state of the points of this rank's block of ids.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,9 +20,31 @@ pub struct Saved {
     pub lengths: Vec<u32>,
     /// What is kept of the bonds of the points, one after the other.
     pub bonds: Vec<u8>,
+    /// Stage, clock and load step, the same on all ranks.
+    pub progress: Vec<u64>,
 }
 
+/// Words of the clock among those of the progress.
+const CLOCK: usize = 5;
+
 impl<const D: usize> Simulation<'_, D> {
+    /// Stage, clock and load step.
+    fn progress(&self) -> Vec<u64> {
+        let clock = self.clock.words().into_iter();
+        let stage = [self.stage as u64].into_iter();
+        stage.chain(clock).chain(self.load_step.words()).collect()
+    }
+
+    /// Goes back to what [`Self::progress`] gave.
+    fn continue_from(&mut self, progress: &[u64]) {
+        let (stage, rest) = progress.split_at(1);
+        let (clock, load_step) = rest.split_at(CLOCK);
+        self.enter(stage[0] as usize);
+        let clock = std::array::from_fn(|k| clock[k]);
+        self.clock = Clock::of_words(clock, self.time_rule().end);
+        self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
+    }
+
     /// The columns of the state.
     fn state(&self) -> impl Iterator<Item = &Vec<f64>> {
         let fields = self.fields.each().filter(|(field, _)| field.state);
@@ -53,24 +76,20 @@ impl<const D: usize> Simulation<'_, D> {
             values: order.collect(self.comm, &values, width),
             bonds: order.collect_ragged(self.comm, &bonds, &lengths, &block_lengths),
             lengths: block_lengths,
+            progress: self.progress(),
         }
     }
 
-    /// Goes back to a saved state, after step `number` of steps of `step` (s). Collective.
+    /// Goes back to a saved state. Collective.
     ///
     /// # Errors
     /// When the state is that of other points or bonds; the same on all ranks.
-    pub fn restore(
-        &mut self,
-        order: &IdOrder,
-        saved: &Saved,
-        number: u64,
-        step: f64,
-    ) -> Result<()> {
+    pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
         let (owned, width) = (self.model.owned(), self.saved_width());
         let lengths = self.forces.saved_lengths(owned);
         let expected = order.collect(self.comm, &lengths, 1);
-        let fits = saved.width == width && saved.lengths == expected;
+        let progress = saved.progress.len() == self.progress().len();
+        let fits = saved.width == width && saved.lengths == expected && progress;
         let fits = if fits {
             Ok(())
         } else {
@@ -88,7 +107,7 @@ impl<const D: usize> Simulation<'_, D> {
                 *number = *value;
             }
         }
-        self.clock = Clock::after(number, step, self.plan.time.end);
+        self.continue_from(&saved.progress);
         self.find_anew();
         Ok(())
     }

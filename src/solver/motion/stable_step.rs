@@ -30,7 +30,7 @@ pub fn stable_step<const D: usize>(
 }
 
 /// The largest eigenvalue of a symmetric matrix given as xx, yy, zz, xy, yz, xz.
-fn largest_eigenvalue(entries: &[f64; 6]) -> f64 {
+pub(super) fn largest_eigenvalue(entries: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *entries;
     let matrix = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     matrix.symmetric_eigenvalues().max().max(0.0)

@@ -94,6 +94,13 @@ impl HistoryObserver {
         ]
         .map(|(name, unit)| (name.to_owned(), unit))
         .into();
+        if simulation.fields.relaxation_velocity.is_some() {
+            columns.push(("residual".to_owned(), "1"));
+            columns.push(("iterations".to_owned(), "1"));
+        }
+        if plan.scales_density() {
+            columns.push(("kinetic_ratio".to_owned(), "1"));
+        }
         let vector = |columns: &mut Vec<_>, name: String, unit| {
             columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), unit)));
         };
@@ -264,6 +271,13 @@ impl HistoryObserver {
             broken as f64,
             cracked_points as f64,
         ];
+        if fields.relaxation_velocity.is_some() {
+            let load_step = simulation.load_step;
+            values.extend([load_step.residual, load_step.iterations as f64]);
+        }
+        if simulation.plan.scales_density() {
+            values.push(energies.kinetic / energies.strain);
+        }
         values.extend(&own[3..]);
         values.extend(&lower[..D]);
         values.extend(&upper[..D]);

@@ -1,0 +1,226 @@
+//! The time axis of a deck and the stages of its run, validated.
+
+use serde_spanned::Spanned;
+
+use super::grammar::{self, Deck, Text};
+use super::number::{Number, shown};
+use super::plan::{self, Method, StepRule};
+use super::resolve::{Scope, find};
+use crate::error::Result;
+
+/// A stretch of time with the keys of `[time]` or of a stage.
+struct Stretch<'a> {
+    /// The table, as messages name it.
+    key: &'static str,
+    /// Length, s.
+    length: f64,
+    /// When it ends, s.
+    end: f64,
+    step: Option<&'a Number>,
+    safety: &'a Number,
+    method: grammar::Method,
+    relaxation: Option<&'a Spanned<grammar::Relaxation>>,
+    density_scale: &'a Number,
+}
+
+/// Validates the time axis.
+///
+/// # Errors
+/// On a wrong number, and on keys of a method that nothing uses.
+pub fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {
+    let time = deck.time.get_ref();
+    let end = scope.positive(&time.end, "[time] end")?;
+    let method = *time.method.get_ref();
+    let methods: Vec<grammar::Method> = match &deck.stage[..] {
+        [] => vec![method],
+        stages => stages.iter().map(|stage| method_of(deck, stage)).collect(),
+    };
+    if let (Some(table), false) = (
+        &time.relaxation,
+        methods.contains(&grammar::Method::Relaxation),
+    ) {
+        let message = "[time] relaxation: only `method = \"relaxation\"` has these keys";
+        return Err(scope.error(table.span(), message));
+    }
+    if methods[0] == grammar::Method::Relaxation {
+        at_rest(scope, deck)?;
+    }
+    let stretch = Stretch {
+        key: "[time]",
+        length: end,
+        end,
+        step: time.step.as_ref(),
+        safety: &time.safety,
+        // With stages, what a relaxation does not use may be meant for others.
+        method: if deck.stage.is_empty() {
+            method
+        } else {
+            grammar::Method::Explicit
+        },
+        relaxation: time.relaxation.as_ref(),
+        density_scale: &time.density_scale,
+    };
+    stretch.time(scope)
+}
+
+/// Validates the stages of the run, whose time axis is `whole`.
+///
+/// # Errors
+/// On ends that do not follow one another up to that of the run, on unknown names and on wrong numbers.
+pub fn stages(scope: &Scope, deck: &Deck, whole: &plan::Time) -> Result<Vec<plan::Stage>> {
+    let time = deck.time.get_ref();
+    let mut start = 0.0;
+    let mut stages = Vec::new();
+    for (number, table) in (1..).zip(&deck.stage) {
+        let stage = table.get_ref();
+        let is_last = number == deck.stage.len();
+        let end = stage_end(scope, table, (start, whole.end), is_last)?;
+        let method = method_of(deck, table);
+        let relaxes = method == grammar::Method::Relaxation;
+        if let (Some(table), false) = (&stage.relaxation, relaxes) {
+            let message = "[[stage]] relaxation: only `method = \"relaxation\"` has these keys";
+            return Err(scope.error(table.span(), message));
+        }
+        let inherited_step = time.step.as_ref().filter(|_| !relaxes);
+        let stretch = Stretch {
+            key: "[[stage]]",
+            length: end - start,
+            end,
+            step: stage.step.as_ref().or(inherited_step),
+            safety: stage.safety.as_ref().unwrap_or(&time.safety),
+            method,
+            relaxation: stage.relaxation.as_ref().or(time.relaxation.as_ref()),
+            density_scale: stage.density_scale.as_ref().unwrap_or(&time.density_scale),
+        };
+        stages.push(plan::Stage {
+            time: stretch.time(scope)?,
+            acting: acting(scope, deck, stage)?,
+        });
+        start = end;
+    }
+    Ok(stages)
+}
+
+/// The method of a stage: its own or that of `[time]`.
+fn method_of(deck: &Deck, stage: &Spanned<grammar::Stage>) -> grammar::Method {
+    let method = stage.get_ref().method.as_ref();
+    *method.unwrap_or(&deck.time.get_ref().method).get_ref()
+}
+
+/// When a stage ends (s), after its start and at most at the end of the run.
+fn stage_end(
+    scope: &Scope,
+    table: &Spanned<grammar::Stage>,
+    (start, whole): (f64, f64),
+    is_last: bool,
+) -> Result<f64> {
+    let Some(number) = &table.get_ref().end else {
+        if is_last {
+            return Ok(whole);
+        }
+        let message = "[[stage]]: needs `end`; only the last stage ends with the run";
+        return Err(scope.error(table.span(), message));
+    };
+    let end = scope.positive(number, "[[stage]] end")?;
+    let words = if end <= start {
+        format!("must be after its start, {} s", shown(start))
+    } else if is_last && end != whole {
+        let whole = shown(whole);
+        format!("the last stage ends with the run, [time] end = {whole} s; leave it out here")
+    } else if !is_last && end >= whole {
+        format!("must be before the end of the run, {} s", shown(whole))
+    } else {
+        return Ok(end);
+    };
+    let message = format!("[[stage]] end: {words}, is {} s", shown(end));
+    Err(scope.error(number.span(), message))
+}
+
+/// Whether each condition acts in a stage.
+fn acting(scope: &Scope, deck: &Deck, stage: &grammar::Stage) -> Result<Vec<bool>> {
+    let (names, key, named): (&[Text], _, _) = match (&stage.on, &stage.off) {
+        (None, None) => return Ok(vec![true; deck.condition.len()]),
+        (Some(on), None) => (on.get_ref(), "[[stage]] on", true),
+        (None, Some(off)) => (off.get_ref(), "[[stage]] off", false),
+        (Some(_), Some(off)) => {
+            let message = "[[stage]] off: give either `on` or `off`";
+            return Err(scope.error(off.span(), message));
+        }
+    };
+    let mut acting = vec![!named; deck.condition.len()];
+    for name in names {
+        let known = deck.condition.keys().map(String::as_str);
+        acting[find(scope.source, name, known, key)?] = named;
+    }
+    Ok(acting)
+}
+
+impl Stretch<'_> {
+    fn time(&self, scope: &Scope) -> Result<plan::Time> {
+        let named = |key: &str| format!("{} {key}", self.key);
+        let safety = scope.within(
+            self.safety,
+            &named("safety"),
+            f64::MIN_POSITIVE..1.0 + f64::EPSILON,
+            "above 0 and at most 1",
+        )?;
+        let step = match self.step {
+            None => StepRule::Automatic(safety),
+            Some(number) => StepRule::Fixed(self.step(scope, number)?),
+        };
+        let density_scale = scope.positive(self.density_scale, &named("density_scale"))?;
+        let method = match self.method {
+            grammar::Method::Explicit => Method::Explicit,
+            grammar::Method::Relaxation => {
+                let table = self.relaxation.map(|table| table.get_ref().clone());
+                Method::Relaxation(self.relaxation(scope, &table.unwrap_or_default())?)
+            }
+        };
+        Ok(plan::Time {
+            end: self.end,
+            step,
+            method,
+            density_scale,
+        })
+    }
+
+    /// A fixed step, s.
+    fn step(&self, scope: &Scope, number: &Number) -> Result<f64> {
+        let key = format!("{} step", self.key);
+        let step = scope.positive(number, &key)?;
+        let words = if self.method == grammar::Method::Relaxation {
+            "relaxation has load steps, `relaxation.load_steps` of them".to_owned()
+        } else if step > self.length {
+            let (step, length) = (shown(step), shown(self.length));
+            let whole = if self.key == "[time]" { "run" } else { "stage" };
+            format!("{step} s is longer than the {whole}, {length} s")
+        } else {
+            return Ok(step);
+        };
+        Err(scope.error(number.span(), format!("{key}: {words}")))
+    }
+
+    fn relaxation(&self, scope: &Scope, table: &grammar::Relaxation) -> Result<plan::Relaxation> {
+        let key = format!("{} relaxation tolerance", self.key);
+        let range = f64::MIN_POSITIVE..1.0;
+        Ok(plan::Relaxation {
+            load_steps: table.load_steps.get(),
+            tolerance: scope.within(&table.tolerance, &key, range, "above 0 and below 1")?,
+            iterations: table.iterations.get(),
+        })
+    }
+}
+
+/// An error if anything moves at the start.
+fn at_rest(scope: &Scope, deck: &Deck) -> Result<()> {
+    for (name, table) in &deck.initial {
+        if let Some(velocity) = &table.get_ref().velocity {
+            let message = format!(
+                "[initial.{name}] velocity: the run begins with relaxation, in which nothing has a \
+                 velocity"
+            );
+            return Err(scope.error(velocity.span(), message));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,85 @@
+//! Stages of a run: each with its method, its end, and the loads and supports that act.
+
+use super::Simulation;
+use super::motion::Clock;
+use super::motion::fields::Fields;
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Whether the present stage has come to its end.
+    pub fn is_stage_over(&self) -> bool {
+        self.clock.is_over() && self.load_step.is_settled
+    }
+
+    /// Whether the run has come to its end.
+    pub fn is_over(&self) -> bool {
+        self.is_stage_over() && self.stage + 1 == self.stages.len()
+    }
+
+    /// Number of the last step of the run, if steps keep their size.
+    pub fn last_step(&self) -> u64 {
+        let later = self.steps[self.stage + 1..].iter();
+        self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
+    }
+
+    /// A clock that makes as many steps as the run.
+    pub fn expected_clock(&self) -> Clock {
+        if self.stages.len() == 1 {
+            return self.clock;
+        }
+        let end = self.plan.time.end;
+        Clock::new(end / self.last_step() as f64, end)
+    }
+
+    /// The stable step with the density of the present stage, s.
+    pub fn scaled_stable_step(&self) -> f64 {
+        self.stable_step * self.time_rule().density_scale.sqrt()
+    }
+
+    /// Goes on with another stage from where the points are. Nothing moves in a relaxation, nor after
+    /// one.
+    pub(super) fn begin_stage(&mut self, stage: usize) {
+        let relaxed = self.relaxes();
+        self.enter(stage);
+        let (step, _) = self.steps[stage];
+        self.clock.set_stage(step, self.time_rule().end);
+        if relaxed || self.relaxes() {
+            let Fields { velocity, .. } = &mut self.fields;
+            velocity
+                .iter_mut()
+                .for_each(|component| component.fill(0.0));
+        }
+        let forces = [&mut self.fields.external_force, &mut self.fields.reaction];
+        let components = forces.into_iter().flatten().flatten();
+        components.for_each(|component| component.fill(0.0));
+        self.conditions
+            .load(&mut self.fields, self.clock.time(), true);
+        if !self.guide() {
+            self.note_bad();
+        }
+    }
+
+    /// Makes conditions and density those of a stage.
+    pub(super) fn enter(&mut self, stage: usize) {
+        if stage != self.stage
+            && let Some(conditions) = self.waiting[stage].take()
+        {
+            let others = std::mem::replace(&mut self.conditions, conditions);
+            self.waiting[self.stage] = Some(others);
+        }
+        self.stage = stage;
+        self.scale_density();
+    }
+
+    /// Gives the blocks the density that they have in the present stage.
+    pub(super) fn scale_density(&mut self) {
+        let scale = self.time_rule().density_scale;
+        for (density, body) in self.model.density.iter_mut().zip(&self.plan.bodies) {
+            *density = scale * body.material.density;
+        }
+    }
+
+    /// Whether the present stage is a relaxation.
+    pub fn relaxes(&self) -> bool {
+        self.fields.relaxation_velocity.is_some() && self.time_rule().is_relaxation()
+    }
+}

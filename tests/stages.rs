@@ -1,0 +1,162 @@
+//! Stages of a run: a body relaxed under a load stays at rest when its motion is followed, and springs
+//! back when the load is taken off; and bodies of another density move as they must.
+
+use crate::support::{simulate, simulate_on};
+use fissure::solver::Simulation;
+use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
+
+/// A bar that is held at one end, pulled at the other, and then let go or not.
+fn bar(second: &str) -> String {
+    format!(
+        "dimension = '1d'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [30] }} }}
+        set.left.where = 'x < 3'
+        set.right.where = 'x > 29'
+        condition.hold = {{ set = 'left', displacement = [0] }}
+        condition.pull = {{ set = 'right', force = ['0.01*min(t, 1)'] }}
+        time.end = 41
+        [[stage]]
+        end = 1
+        method = 'relaxation'
+        relaxation = {{ load_steps = 2, tolerance = 1e-10 }}
+        [[stage]]
+        {second}
+        "
+    )
+}
+
+/// Energies at the end of the first stage, and the extremes of the end's displacement and the energies
+/// after it.
+struct Seen {
+    preload: Energies,
+    displacement: f64,
+    lowest: f64,
+    highest: f64,
+    kinetic: f64,
+    error: f64,
+}
+
+fn see(deck: &str) -> Seen {
+    simulate(deck, |mut simulation: Simulation<1>| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let mut energies = |simulation: &mut Simulation<1>| {
+            let snapshot = Snapshot::new(simulation);
+            observer.row(simulation, &snapshot).energies
+        };
+        let last = simulation.model.owned() - 1;
+        energies(&mut simulation);
+        while !(simulation.is_stage_over() && simulation.clock.number() > 0) {
+            simulation.advance();
+        }
+        assert_eq!((simulation.stage, simulation.clock.time()), (0, 1.0));
+        let displacement = simulation.fields.displacement[0][last];
+        let mut seen = Seen {
+            preload: energies(&mut simulation),
+            displacement,
+            lowest: f64::MAX,
+            highest: f64::MIN,
+            kinetic: 0.0,
+            error: 0.0,
+        };
+        while !simulation.is_over() {
+            simulation.advance();
+            let displacement = simulation.fields.displacement[0][last];
+            seen.lowest = seen.lowest.min(displacement);
+            seen.highest = seen.highest.max(displacement);
+            let now = energies(&mut simulation);
+            seen.kinetic = seen.kinetic.max(now.kinetic);
+            seen.error = seen.error.max((now.error - seen.preload.error).abs());
+        }
+        assert!((simulation.clock.time() - 41.0).abs() < 1e-9);
+        assert_eq!(simulation.clock.number(), simulation.last_step());
+        seen
+    })
+}
+
+#[test]
+fn a_relaxed_body_stays_at_rest() {
+    let seen = see(&bar("safety = 0.5"));
+    let strain = seen.preload.strain;
+    assert!(strain > 0.0 && seen.preload.kinetic == 0.0);
+    assert!(seen.kinetic < 1e-12 * strain, "{:e}", seen.kinetic);
+    assert!(seen.highest - seen.lowest < 1e-6 * seen.displacement);
+}
+
+#[test]
+fn a_body_that_is_let_go_swings_about_its_place() {
+    let seen = see(&bar("safety = 0.1\n off = ['pull']"));
+    let strain = seen.preload.strain;
+    // Half a swing takes less than 2 L/c = 32 s, L = 28 m, c = √3 m/s.
+    assert!((seen.lowest + seen.displacement).abs() < 0.1 * seen.displacement);
+    assert!(
+        (0.9..1.001).contains(&(seen.kinetic / strain)),
+        "{}",
+        seen.kinetic / strain
+    );
+    assert!(seen.error < 1e-3 * strain, "{:e}", seen.error / strain);
+}
+
+#[test]
+fn ranks_do_not_change_a_bit() {
+    let run = |ranks: usize| {
+        let deck = bar("off = ['pull']");
+        let mut parts = simulate_on(ranks, &deck, |mut simulation: Simulation<1>| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            let (model, fields) = (&simulation.model, &simulation.fields);
+            let bits = |point: usize| fields.displacement[0][point].to_bits();
+            (0..model.owned())
+                .map(|point| (model.ids[point], bits(point)))
+                .collect::<Vec<_>>()
+        })
+        .concat();
+        parts.sort_unstable();
+        parts
+    };
+    let one = run(1);
+    assert_eq!(run(2), one);
+    assert_eq!(run(3), one);
+}
+
+#[test]
+fn a_body_of_nine_times_the_density_moves_a_third_as_fast() {
+    let deck = |scale: f64, end: f64| {
+        format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [30] }} }}
+            initial.stretch.displacement = ['0.001*x']
+            time = {{ end = {end}, density_scale = {scale}, safety = 0.5 }}
+            "
+        )
+    };
+    let run = |deck: &str| {
+        simulate(deck, |mut simulation: Simulation<1>| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            let snapshot = Snapshot::new(&mut simulation);
+            let row = observer.row(&mut simulation, &snapshot);
+            let columns = observer.columns().iter();
+            let ratio = columns
+                .zip(&row.values)
+                .find(|(column, _)| column.0 == "kinetic_ratio")
+                .map(|(_, value)| *value);
+            let last = simulation.model.owned() - 1;
+            let displacement = simulation.fields.displacement[0][last];
+            (simulation.clock.step(), displacement, row.energies, ratio)
+        })
+    };
+    let (step, displacement, energies, none) = run(&deck(1.0, 7.0));
+    let (scaled_step, scaled_displacement, scaled, ratio) = run(&deck(9.0, 21.0));
+    assert!((scaled_step / step - 3.0).abs() < 1e-12);
+    assert!((scaled_displacement - displacement).abs() < 1e-9 * displacement.abs());
+    assert!((scaled.kinetic - energies.kinetic).abs() < 1e-9 * energies.kinetic);
+    assert_eq!(none, None);
+    assert_eq!(ratio, Some(scaled.kinetic / scaled.strain));
+}
