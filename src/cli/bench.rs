@@ -109,7 +109,7 @@ fn deck(arguments: &BenchArguments) -> String {
     format!(
         "title = 'Benchmark'
         dimension = '3d'
-        grid = {{ spacing = 1e-3, horizon = 3.015e-3, family = '{family}' }}
+        grid = {{ volume_correction = 'none', spacing = 1e-3, horizon = 3.015e-3, family = '{family}' }}
         material.block.{law}
         damage.block.critical_stretch = {{ critical_stretch = 1e3, alpha = 0 }}
         [body.block]

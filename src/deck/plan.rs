@@ -423,6 +423,10 @@ pub struct Output {
     pub every: Interval,
     /// Which fields.
     pub fields: Vec<Field>,
+    /// Whether the fields are rounded to 4-byte numbers.
+    pub single: bool,
+    /// Index of the set whose points the result holds, and where it is named; `None` for all points.
+    pub set: Option<(usize, Range<usize>)>,
 }
 
 /// The history.
@@ -522,13 +526,14 @@ pub enum Field {
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
-    /// θ.
+    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane.
     Dilatation,
     /// m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
-    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz.
+    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz = ν (xx + yy), in 1-D
+    /// yy = zz = ν/(1 − ν) xx.
     Stress,
-    /// Number of intact bonds.
+    /// Number of intact bonds, with points in the own family or that have the point in theirs.
     Neighbours,
     /// The rank that owns the point.
     Rank,

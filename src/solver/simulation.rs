@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::plan::{Plan, StepRule};
+use crate::deck::plan::{Action, Condition, Initial, Plan, StepRule};
 use crate::deck::shown;
 use crate::error::{Error, Result};
 use crate::partition::distribute;
@@ -43,6 +43,9 @@ pub struct Simulation<'a, const D: usize> {
     pub family_volume: Vec<f64>,
     /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
     pub cut: Vec<u64>,
+    /// Bonds of the owned points that were intact before any could break, counted from their ends here;
+    /// `None` where none breaks at the start.
+    pub intact_at_start: Option<u64>,
     /// The stable step, s.
     pub stable_step: f64,
     /// Time and step.
@@ -133,6 +136,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let mut fields = Fields::new(&model, needs);
         apply_initials(plan, comm, &model, &mut fields)?;
         are_finite(plan, comm, &model, 0.0)?;
+        let intact_at_start = starts_deformed(plan).then(|| {
+            let mut intact = 0;
+            forces.for_each_intact(|_, _| intact += 1);
+            intact
+        });
         let mut simulation = Self {
             plan,
             comm,
@@ -142,6 +150,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             conditions,
             family_volume,
             cut,
+            intact_at_start,
             stable_step: stable,
             clock,
             times: Times::default(),
@@ -320,6 +329,14 @@ pub fn choose_step(plan: &Plan, stable: f64) -> Result<Clock> {
         return Err(plan.source.error(plan.places.step.clone(), message));
     }
     Ok(Clock::new(step, end))
+}
+
+/// Whether bonds may break in the place where the points begin.
+fn starts_deformed(plan: &Plan) -> bool {
+    let displaced = |initial: &Initial| initial.displacement.is_some();
+    let placed = |condition: &Condition| matches!(condition.action, Action::Displacement(_));
+    plan.bodies.iter().any(|body| body.damage.is_some())
+        && (plan.initials.iter().any(displaced) || plan.conditions.iter().any(placed))
 }
 
 /// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id
