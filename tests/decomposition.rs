@@ -12,6 +12,7 @@ thickness = 0.01
 [parameters]
 dx = 1e-3
 [grid]
+volume_correction = 'none'
 spacing = 'dx'
 horizon = '3*dx'
 [material]
@@ -77,6 +78,7 @@ second.normalised_pmb = { density = 2, youngs_modulus = 5 }
 third.ordinary = { density = 3, youngs_modulus = 8, poisson_ratio = 0.1, influence = 'gaussian' }
 [damage.brittle.critical_stretch]
 fracture_energy = 0.05
+alpha = 0.25
 [body.left]
 material = 'first'
 damage = 'brittle'
@@ -118,6 +120,7 @@ fn with_one_law(law: &str) -> String {
 const BLOCK: &str = "
 dimension = '3d'
 [grid]
+volume_correction = 'none'
 horizon = 2.2
 [material.rubber.pmb]
 density = 2
@@ -163,7 +166,7 @@ on = ['down']
 /// Fewer points than ranks.
 const FEW: &str = "
 dimension = '1d'
-grid = { spacing = 1, horizon = 1.5 }
+grid = { volume_correction = 'none', spacing = 1, horizon = 1.5 }
 material.rubber.pmb = { density = 2, youngs_modulus = 5, damping = 0.1 }
 body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [3] } }
 initial.pull.displacement = ['0.01*x']
@@ -239,7 +242,10 @@ fn a_plate_of_two_materials_with_listed_bonds() {
 #[test]
 fn bonds_as_long_as_the_volume_correction_reaches() {
     let horizon = "horizon = '2.5*dx'\nvolume_correction = 'linear'";
-    let deck = PLATE.replace("horizon = '3*dx'", horizon);
+    let plain = "volume_correction = 'none'\n";
+    let deck = PLATE
+        .replace(plain, "")
+        .replace("horizon = '3*dx'", horizon);
     same_everywhere("tie", &deck, true);
 }
 

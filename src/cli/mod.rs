@@ -38,7 +38,7 @@ macro_rules! tell {
 pub(crate) use tell;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -157,10 +157,12 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 #[command(after_help = "\
 Examples:
   fissure check plate.toml
-  fissure check plate.toml --ranks 256          memory estimated for 256 ranks")]
+  fissure check plate.toml --ranks 256          memory estimated for 256 ranks
+  fissure check -q *.toml                       whether decks are right")]
 struct CheckArguments {
-    /// The deck.
-    deck: PathBuf,
+    /// The deck, or several, all of which are looked at.
+    #[arg(required = true, value_name = "DECK")]
+    decks: Vec<PathBuf>,
 
     /// Give a parameter of the deck another value; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -226,8 +228,9 @@ struct PlotArguments {
 Example:
   fissure explain plate.toml > plate_in_full.toml")]
 struct DeckArguments {
-    /// The deck.
-    deck: PathBuf,
+    /// The deck, or several.
+    #[arg(required = true, value_name = "DECK")]
+    decks: Vec<PathBuf>,
 
     /// Give a parameter of the deck another value; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -341,6 +344,24 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => init::init(&arguments, verbosity),
     };
     finish(outcome, true)
+}
+
+/// Works on one deck after the other. An error of one does not keep the others from being looked at: it is
+/// printed, but for the last one, which is returned.
+///
+/// # Errors
+/// The last error of a deck.
+fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<()> {
+    let mut latest = Ok(());
+    for deck in decks {
+        let done = work(deck);
+        if done.is_err()
+            && let Err(error) = std::mem::replace(&mut latest, done)
+        {
+            tell!("error: {error}");
+        }
+    }
+    latest
 }
 
 /// Prints what a command was asked for. A reader that has closed the output has had enough.

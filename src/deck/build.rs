@@ -29,7 +29,7 @@ impl Plan {
             title: String::new(),
             dimension,
             horizon,
-            volume_correction: VolumeCorrection::None,
+            volume_correction: VolumeCorrection::Exact,
             quadrature: Quadrature::Midpoint,
             family: FamilyRule::Auto,
             interface: Interface {
@@ -55,6 +55,8 @@ impl Plan {
             output: Output {
                 every: Interval::Seconds(end / OUTPUTS),
                 fields: DEFAULT_FIELDS.to_vec(),
+                single: false,
+                set: None,
             },
             history: History {
                 every: Interval::Seconds(end / ROWS),

@@ -112,9 +112,10 @@ pub struct Grid {
     /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
-    /// What the volumes of points near the edge of a family count: `"none"`, `"linear"` or `"exact"`.
-    #[serde(default = "no_correction")]
-    pub volume_correction: Spanned<VolumeCorrection>,
+    /// What the volumes of points near the edge of a family count: `"exact"`, `"linear"` or `"none"`; if not
+    /// given, `"exact"` where all points are centres of square or cubic cells, and else `"none"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_correction: Option<Spanned<VolumeCorrection>>,
     /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
@@ -141,18 +142,14 @@ pub enum Family {
     Lattice,
 }
 
-fn no_correction() -> Spanned<VolumeCorrection> {
-    Spanned::new(0..0, VolumeCorrection::None)
-}
-
 /// How volumes near the edge of a family are corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum VolumeCorrection {
     /// Points within the horizon count whole.
     None,
-    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too; LAMMPS ends this
-    /// taper at δ.
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too (PA-HHB); LAMMPS ends
+    /// this taper at δ, Peridigm has none.
     Linear,
     /// Points count the share of their cell within the horizon.
     Exact,
@@ -306,7 +303,7 @@ pub struct CriticalStretch {
     /// The critical stretch s0 itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub critical_stretch: Option<Number>,
-    /// α in s ≥ s0 − α s_min; 0.25 if not given, 0 for a plain critical stretch.
+    /// α in s ≥ s0 − α s_min; 0 if not given, a plain critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
     /// Sets of points whose bonds never break.
@@ -352,7 +349,7 @@ fn no_alpha() -> Number {
 }
 
 fn default_alpha() -> Number {
-    default_number(0.25)
+    default_number(0.0)
 }
 
 /// A body: a shape filled with lattice points, or a file of points.
@@ -677,6 +674,23 @@ pub struct Output {
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
+    /// Of the fields that change in time: `"double"`, 8 bytes a number, or `"single"`, 4 bytes.
+    #[serde(default)]
+    pub precision: Precision,
+    /// The set whose points the result holds; all points if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub set: Option<Text>,
+}
+
+/// How long the numbers of a result are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 8 bytes: every bit.
+    #[default]
+    Double,
+    /// 4 bytes: seven digits.
+    Single,
 }
 
 /// The history: sums and probes over time.

@@ -477,6 +477,10 @@ pub struct Output {
     pub every: Interval,
     /// Which fields.
     pub fields: Vec<Field>,
+    /// Whether the fields are rounded to 4-byte numbers.
+    pub single: bool,
+    /// Index of the set whose points the result holds, and where it is named; `None` for all points.
+    pub set: Option<(usize, Range<usize>)>,
 }
 
 /// The history.
@@ -608,11 +612,12 @@ pub enum Field {
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
-    /// θ.
+    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane.
     Dilatation,
     /// m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
-    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz.
+    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz = ν (xx + yy), in 1-D
+    /// yy = zz = ν/(1 − ν) xx.
     Stress,
     /// Σ T⊗Y Ṽ over the volume that the deformed body has for one of the undeformed: Cauchy's stress,
     /// Pa, in the same order.
@@ -621,7 +626,7 @@ pub enum Field {
     VonMisesStress,
     /// F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row; I where too few are left.
     DeformationGradient,
-    /// Number of intact bonds.
+    /// Number of intact bonds, with points in the own family or that have the point in theirs.
     Neighbours,
     /// Number of the point's bonds that have broken since the start.
     BrokenBonds,

@@ -38,7 +38,7 @@ pub struct HistoryObserver {
     fronts: Vec<Front>,
     cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
-    /// Energy (J) and intact bonds in the first row.
+    /// Energy (J) in the first row, and intact bonds before.
     start: Option<(f64, u64)>,
 }
 
@@ -66,8 +66,12 @@ pub struct Energies {
 pub struct HistoryRow {
     /// Values in the order of the columns; the same on all ranks.
     pub values: Vec<f64>,
+    /// Number of the step that it is of.
+    pub number: u64,
     /// The energies among them.
     pub energies: Energies,
+    /// Energy at the start, which the error of the balance refers to, J.
+    pub first_energy: f64,
     /// Bonds broken since the start.
     pub broken: u64,
 }
@@ -174,12 +178,13 @@ impl HistoryObserver {
         &self.columns
     }
 
-    /// Energy (J) and intact bonds in the first row, which later ones refer to.
+    /// Energy (J) in the first row and bonds that were intact before any could break, which later rows
+    /// refer to.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
 
-    /// Goes on with a history whose first row had this energy (J) and so many intact bonds.
+    /// Goes on with a history that [started](Self::start) so.
     pub fn continue_from(&mut self, start: (f64, u64)) {
         self.start = Some(start);
     }
@@ -242,13 +247,14 @@ impl HistoryObserver {
             let all = simulation.forces.singular(model);
             all.iter().filter(|value| **value > 0.0).count() as u64
         });
-        let mut counts = [intact, cracked.points, singular.unwrap_or(0)];
+        let at_start = simulation.intact_at_start.unwrap_or(intact);
+        let mut counts = [intact, cracked.points, at_start, singular.unwrap_or(0)];
         comm.sum(&mut counts);
-        let [intact, cracked_points, singular_points] = counts;
+        let [intact, cracked_points, at_start, singular_points] = counts;
         let (lower, upper) = cracked.extent(comm);
 
         let energy = own[0] + own[1] + own[2] + dissipated - work;
-        let (first_energy, first_intact) = *self.start.get_or_insert((energy, intact));
+        let (first_energy, first_intact) = *self.start.get_or_insert((energy, at_start));
         let energies = Energies {
             kinetic: own[0],
             strain: own[1],
@@ -304,7 +310,9 @@ impl HistoryObserver {
         }
         HistoryRow {
             values,
+            number: simulation.clock.number(),
             energies,
+            first_energy,
             broken,
         }
     }

@@ -62,14 +62,21 @@ impl Snapshot {
             Field::StrainEnergyDensity => self.stored.energy.clone(),
             Field::Neighbours => self.stored.neighbours.clone(),
             Field::Dilatation => {
-                let [_, dilatation] = simulation.forces.dilatation(model);
+                let [_, mut dilatation] = simulation.forces.dilatation(model);
+                for (point, value) in dilatation.iter_mut().enumerate() {
+                    *value *= trace_share(simulation, point);
+                }
                 dilatation
             }
             Field::WeightedVolume => {
                 let [volume, _] = simulation.forces.dilatation(model);
                 volume
             }
-            Field::Stress => rows(&simulation.forces.stress(model), count, 6),
+            Field::Stress => {
+                let mut stress = simulation.forces.stress(model);
+                across(simulation, &mut stress);
+                rows(&stress, count, 6)
+            }
             Field::CauchyStress => {
                 let stress = self.field(simulation, Field::Stress);
                 cauchy_stress(simulation, stress)
@@ -131,6 +138,42 @@ fn von_mises(stress: &[f64]) -> f64 {
     };
     let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+}
+
+/// ν of an owned point's body.
+fn poisson_ratio<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    let block = usize::from(simulation.model.block[point]);
+    let elastic = simulation.plan.bodies[block].material.elastic;
+    elastic.poisson_ratio
+}
+
+/// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
+/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy).
+fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    match simulation.plan.dimension {
+        Dimension::PlaneStress { .. } => {
+            let ratio = poisson_ratio(simulation, point);
+            (1.0 - 2.0 * ratio) / (1.0 - ratio)
+        }
+        Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => 1.0,
+    }
+}
+
+/// The stress across the directions of the setting where there is no strain, by Hooke's law: zz = ν (xx +
+/// yy) in plane strain, yy = zz = ν/(1 − ν) xx in 1-D.
+fn across<const D: usize>(simulation: &Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
+    let [xx, yy, zz, ..] = stress;
+    for point in 0..zz.len() {
+        let ratio = poisson_ratio(simulation, point);
+        match simulation.plan.dimension {
+            Dimension::PlaneStrain { .. } => zz[point] = ratio * (xx[point] + yy[point]),
+            Dimension::Line { .. } => {
+                zz[point] = ratio / (1.0 - ratio) * xx[point];
+                yy[point] = zz[point];
+            }
+            Dimension::PlaneStress { .. } | Dimension::Space => {}
+        }
+    }
 }
 
 /// Rows of so many components, 0 where there is no column.
