@@ -354,9 +354,7 @@ fn goes_on_from_within_a_load_step_to_the_same_bits() {
             let mut turns = stop;
             while !simulation.is_over() {
                 simulation.advance();
-                simulation
-                    .check()
-                    .unwrap_or_else(|error| panic!("{error}"));
+                simulation.check().unwrap_or_else(|error| panic!("{error}"));
                 turns += 1;
             }
             (state(&simulation).1, settled, turns)

@@ -5,8 +5,9 @@ use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
 use super::plan::{
     Action, Body, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule, History,
-    Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan, PointSource,
-    PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time, Toughness, VolumeCorrection,
+    Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan,
+    PointSource, PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time, Toughness,
+    VolumeCorrection,
 };
 use super::resolve::ALL_VARIABLES;
 use super::source::Source;
@@ -49,6 +50,7 @@ impl Plan {
                 step: StepRule::Automatic(DEFAULT_SAFETY),
                 method: Method::Explicit,
                 density_scale: 1.0,
+                adaptive: None,
             },
             stages: Vec::new(),
             output: Output {
@@ -153,6 +155,12 @@ impl Plan {
     pub fn relaxes(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.is_relaxation())
+    }
+
+    /// Whether the step of any stage follows the number of bonds that break in it.
+    pub fn adapts(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.adaptive.is_some())
     }
 
     /// Whether bodies have another density in the equation of motion of any stage.
