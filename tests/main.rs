@@ -1,6 +1,7 @@
 //! All tests but those of single files, as one program: what they call is generic, and would be
 //! compiled anew for each.
 
+mod adaptive;
 mod commands;
 mod communicator;
 mod contact;

@@ -60,11 +60,12 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Shows that a step, ending at `time` (s), has been made.
-    pub fn show(&mut self, step: u64, time: f64) {
+    /// Shows that a step, ending at `time` (s), has been made, of so many as now seems.
+    pub fn show(&mut self, step: u64, steps: u64, time: f64) {
         match self {
             Self::Silent => {}
             Self::Bar(bar) => {
+                bar.set_length(steps);
                 bar.set_position(step);
                 bar.set_message(format!("t = {}", si(time, "s")));
             }
@@ -74,6 +75,7 @@ impl Progress {
                 last,
                 due,
             } => {
+                *last = steps;
                 let elapsed = start.elapsed().as_secs_f64();
                 if elapsed < *due || step >= *last {
                     return;

@@ -162,7 +162,7 @@ impl Observer for Log {
     }
 
     fn step(&mut self, now: &dyn View) {
-        self.progress.show(now.number(), now.time());
+        self.progress.show(now.number(), now.last(), now.time());
     }
 
     fn end(&mut self, complete: bool) {

@@ -50,6 +50,7 @@ impl Plan {
                 step: StepRule::Automatic(DEFAULT_SAFETY),
                 method: Method::Explicit,
                 density_scale: 1.0,
+                adaptive: None,
             },
             stages: Vec::new(),
             output: Output {
@@ -158,6 +159,12 @@ impl Plan {
     pub fn relaxes(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.is_relaxation())
+    }
+
+    /// Whether the step of any stage follows the number of bonds that break in it.
+    pub fn adapts(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.adaptive.is_some())
     }
 
     /// Whether bodies have another density in the equation of motion of any stage.

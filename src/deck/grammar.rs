@@ -570,6 +570,9 @@ pub struct Time {
     /// through slow loading.
     #[serde(default = "default_density_scale")]
     pub density_scale: Number,
+    /// The step follows the number of bonds that break in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<Spanned<Adaptive>>,
 }
 
 fn default_density_scale() -> Number {
@@ -602,6 +605,9 @@ pub struct Stage {
     /// As in `[time]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_scale: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<Spanned<Adaptive>>,
     /// Names of the loads and supports that act; all if neither this nor `off` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on: Option<Spanned<Vec<Text>>>,
@@ -622,6 +628,53 @@ pub enum Method {
     Explicit,
     /// Adaptive dynamic relaxation in load steps; t is the load parameter.
     Relaxation,
+}
+
+/// A step that follows the number of bonds that break in it.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptive {
+    /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
+    #[serde(default = "default_most_broken")]
+    pub most_broken: NonZeroU64,
+    /// A step that breaks no more bonds of any point is calm.
+    #[serde(default = "default_stable_broken")]
+    pub stable_broken: Spanned<u64>,
+    /// Calm steps in a row before the step is raised.
+    #[serde(default = "default_calm_steps")]
+    pub steps: NonZeroU64,
+    /// What the step is multiplied with when one is undone.
+    #[serde(default = "default_reduce")]
+    pub reduce: Number,
+    /// What it is multiplied with when it is raised.
+    #[serde(default = "default_raise")]
+    pub raise: Number,
+    /// The smallest step in s; a hundredth of the largest if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smallest: Option<Number>,
+    /// The largest step in s; that of `step` or `safety` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest: Option<Number>,
+}
+
+fn default_most_broken() -> NonZeroU64 {
+    NonZeroU64::new(2).expect("not 0")
+}
+
+fn default_stable_broken() -> Spanned<u64> {
+    Spanned::new(0..0, 1)
+}
+
+fn default_calm_steps() -> NonZeroU64 {
+    NonZeroU64::new(10).expect("not 0")
+}
+
+fn default_reduce() -> Number {
+    default_number(0.5)
+}
+
+fn default_raise() -> Number {
+    default_number(1.5)
 }
 
 /// How equilibria are found.

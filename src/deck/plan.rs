@@ -412,6 +412,27 @@ pub struct Time {
     pub method: Method,
     /// How many times its density a body has in the equation of motion.
     pub density_scale: f64,
+    /// How the step follows the number of bonds that break in it, if it does.
+    pub adaptive: Option<Adaptive>,
+}
+
+/// How the step follows the number of bonds that break in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adaptive {
+    /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
+    pub most_broken: u64,
+    /// A step that breaks no more bonds of any point is calm.
+    pub stable_broken: u64,
+    /// Calm steps in a row before the step is raised.
+    pub steps: u64,
+    /// What the step is multiplied with when one is undone.
+    pub reduce: f64,
+    /// What it is multiplied with when it is raised.
+    pub raise: f64,
+    /// The smallest step, s; `None` is a hundredth of the largest.
+    pub smallest: Option<f64>,
+    /// The largest step, s; `None` is the one that [`Time::step`] says.
+    pub largest: Option<f64>,
 }
 
 /// A stage of the run.

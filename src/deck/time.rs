@@ -21,6 +21,7 @@ struct Stretch<'a> {
     method: grammar::Method,
     relaxation: Option<&'a Spanned<grammar::Relaxation>>,
     density_scale: &'a Number,
+    adaptive: Option<&'a Spanned<grammar::Adaptive>>,
 }
 
 /// Validates the time axis.
@@ -59,6 +60,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {
         },
         relaxation: time.relaxation.as_ref(),
         density_scale: &time.density_scale,
+        adaptive: time.adaptive.as_ref(),
     };
     stretch.time(scope)
 }
@@ -82,6 +84,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &plan::Time) -> Result<Vec<plan
             return Err(scope.error(table.span(), message));
         }
         let inherited_step = time.step.as_ref().filter(|_| !relaxes);
+        let inherited_rule = time.adaptive.as_ref().filter(|_| !relaxes);
         let stretch = Stretch {
             key: "[[stage]]",
             length: end - start,
@@ -91,6 +94,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &plan::Time) -> Result<Vec<plan
             method,
             relaxation: stage.relaxation.as_ref().or(time.relaxation.as_ref()),
             density_scale: stage.density_scale.as_ref().unwrap_or(&time.density_scale),
+            adaptive: stage.adaptive.as_ref().or(inherited_rule),
         };
         stages.push(plan::Stage {
             time: stretch.time(scope)?,
@@ -176,11 +180,13 @@ impl Stretch<'_> {
                 Method::Relaxation(self.relaxation(scope, &table.unwrap_or_default())?)
             }
         };
+        let adaptive = self.adaptive.map(|table| self.adaptive(scope, table));
         Ok(plan::Time {
             end: self.end,
             step,
             method,
             density_scale,
+            adaptive: adaptive.transpose()?,
         })
     }
 
@@ -198,6 +204,61 @@ impl Stretch<'_> {
             return Ok(step);
         };
         Err(scope.error(number.span(), format!("{key}: {words}")))
+    }
+
+    fn adaptive(
+        &self,
+        scope: &Scope,
+        table: &Spanned<grammar::Adaptive>,
+    ) -> Result<plan::Adaptive> {
+        let key = format!("{} adaptive", self.key);
+        if self.method == grammar::Method::Relaxation {
+            let message = format!("{key}: relaxation has no time steps");
+            return Err(scope.error(table.span(), message));
+        }
+        let rule = table.get_ref();
+        let named = |name: &str| format!("{key} {name}");
+        let step = |number: &Option<Number>, name: &str| {
+            let number = number.as_ref();
+            number
+                .map(|number| scope.positive(number, &named(name)))
+                .transpose()
+        };
+        let (smallest, largest) = (
+            step(&rule.smallest, "smallest")?,
+            step(&rule.largest, "largest")?,
+        );
+        if let (Some(low), Some(high), Some(number)) = (smallest, largest, &rule.smallest)
+            && low > high
+        {
+            let (low, high) = (shown(low), shown(high));
+            let message = format!("{key} smallest: {low} s is more than `largest`, {high} s");
+            return Err(scope.error(number.span(), message));
+        }
+        if rule.stable_broken.get_ref() > &rule.most_broken.get() {
+            let message = format!(
+                "{key} stable_broken: must be at most `most_broken`, {}, is {}",
+                rule.most_broken,
+                rule.stable_broken.get_ref()
+            );
+            return Err(scope.error(rule.stable_broken.span(), message));
+        }
+        let shorter = f64::MIN_POSITIVE..1.0;
+        let longer = 1.0 + f64::EPSILON..f64::INFINITY;
+        Ok(plan::Adaptive {
+            most_broken: rule.most_broken.get(),
+            stable_broken: *rule.stable_broken.get_ref(),
+            steps: rule.steps.get(),
+            reduce: scope.within(
+                &rule.reduce,
+                &named("reduce"),
+                shorter,
+                "above 0 and below 1",
+            )?,
+            raise: scope.within(&rule.raise, &named("raise"), longer, "above 1")?,
+            smallest,
+            largest,
+        })
     }
 
     fn relaxation(&self, scope: &Scope, table: &grammar::Relaxation) -> Result<plan::Relaxation> {

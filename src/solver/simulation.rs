@@ -15,11 +15,12 @@ use super::bonds::{Acting, Evolution, ForceTimes, Forces};
 use super::conditions::{Conditions, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
+use super::motion::adaptive::StepControl;
 use super::motion::clock::steps_to;
 use super::motion::fields::Needs;
 use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
-use super::motion::{Clock, Fields, verlet};
+use super::motion::{Clock, Fields, Kept, verlet};
 use super::size;
 
 /// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
@@ -61,6 +62,10 @@ pub struct Simulation<'a, const D: usize> {
     pub clock: Clock,
     /// How far the load step has come; settled without relaxation.
     pub load_step: LoadStep,
+    /// What an adaptive step follows.
+    pub step_control: StepControl,
+    /// What the run was before the present step; empty where steps are not undone.
+    pub(super) kept: Kept,
     /// Where the time went.
     pub times: Times,
     bad: Option<BadPoint>,
@@ -184,10 +189,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
             stable_step: stable,
             clock,
             load_step: LoadStep::default(),
+            step_control: StepControl::default(),
+            kept: Kept::default(),
             times: Times::default(),
             bad: None,
         };
         simulation.scale_density();
+        simulation.begin_adapting();
         simulation
             .conditions
             .place(&mut simulation.fields, 0.0, 0.0);
@@ -219,14 +227,18 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if self.is_stage_over() && self.stage + 1 < self.stages.len() {
             self.begin_stage(self.stage + 1);
         }
-        match self.time_rule().method {
-            Method::Explicit => self.make_step(),
-            Method::Relaxation(rule) => self.relax(&rule),
+        let Time {
+            method, adaptive, ..
+        } = self.time_rule();
+        match (method, adaptive) {
+            (Method::Explicit, None) => self.make_step(),
+            (Method::Explicit, Some(rule)) => self.make_adaptive_step(&rule),
+            (Method::Relaxation(rule), _) => self.relax(&rule),
         }
     }
 
     /// Makes one step by the equation of motion. Collective.
-    fn make_step(&mut self) {
+    pub(super) fn make_step(&mut self) {
         let start = Instant::now();
         let step = self.clock.step();
         self.conditions.before_moving(&self.fields);

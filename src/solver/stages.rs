@@ -42,6 +42,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.enter(stage);
         let (step, _) = self.steps[stage];
         self.clock.set_stage(step, self.time_rule().end);
+        self.begin_adapting();
         if relaxed || self.relaxes() {
             let Fields { velocity, .. } = &mut self.fields;
             velocity
@@ -68,6 +69,13 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.stage = stage;
         self.scale_density();
+    }
+
+    /// Lets the step begin with the size that was chosen for the stage, where it is adaptive.
+    pub(super) fn begin_adapting(&mut self) {
+        if let Some(rule) = self.time_rule().adaptive {
+            self.step_control.begin(&rule, self.clock.step());
+        }
     }
 
     /// Gives the blocks the density that they have in the present stage.

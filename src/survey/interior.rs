@@ -80,6 +80,7 @@ fn block(plan: &Plan, body: usize) -> Option<Plan> {
             step: StepRule::Fixed(1.0),
             method: Method::Explicit,
             density_scale: 1.0,
+            adaptive: None,
         },
         stages: Vec::new(),
         ..plan.clone()

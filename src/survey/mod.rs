@@ -200,6 +200,14 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Strin
             "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s"
         ));
     }
+    let rule = simulation.time_rule().adaptive;
+    if let Some(largest) = rule.and_then(|rule| rule.largest)
+        && largest > stable
+    {
+        warn(format!(
+            "[time] adaptive largest: {largest:.4e} s is larger than the stable one, {stable:.4e} s"
+        ));
+    }
     let last = simulation.last_step();
     if last > MANY_STEPS {
         warn(format!(

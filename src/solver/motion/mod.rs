@@ -1,5 +1,6 @@
 //! Motion: the fields of the points, the clock, time integration.
 
+pub mod adaptive;
 pub mod clock;
 pub mod fields;
 pub mod relaxation;

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::solver::Simulation;
 
 use super::Clock;
+use super::adaptive::StepControl;
 use super::relaxation::LoadStep;
 
 /// The state of the points of this rank's block of ids.
@@ -20,28 +21,35 @@ pub struct Saved {
     pub lengths: Vec<u32>,
     /// What is kept of the bonds of the points, one after the other.
     pub bonds: Vec<u8>,
-    /// Stage, clock and load step, the same on all ranks.
+    /// Stage, clock, step and load step, the same on all ranks.
     pub progress: Vec<u64>,
 }
 
 /// Words of the clock among those of the progress.
 const CLOCK: usize = 5;
 
+/// Words of what an adaptive step follows.
+const STEP_CONTROL: usize = 6;
+
 impl<const D: usize> Simulation<'_, D> {
     /// Stage, clock and load step.
     fn progress(&self) -> Vec<u64> {
         let clock = self.clock.words().into_iter();
         let stage = [self.stage as u64].into_iter();
-        stage.chain(clock).chain(self.load_step.words()).collect()
+        let steps = self.step_control.words().into_iter();
+        let times = stage.chain(clock).chain(steps);
+        times.chain(self.load_step.words()).collect()
     }
 
     /// Goes back to what [`Self::progress`] gave.
     fn continue_from(&mut self, progress: &[u64]) {
         let (stage, rest) = progress.split_at(1);
-        let (clock, load_step) = rest.split_at(CLOCK);
+        let (clock, rest) = rest.split_at(CLOCK);
+        let (steps, load_step) = rest.split_at(STEP_CONTROL);
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
+        self.step_control = StepControl::of_words(std::array::from_fn(|k| steps[k]));
         self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
     }
 

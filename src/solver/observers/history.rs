@@ -102,6 +102,11 @@ impl HistoryObserver {
             columns.push(("residual".to_owned(), "1"));
             columns.push(("iterations".to_owned(), "1"));
         }
+        if plan.adapts() {
+            columns.push(("time_step".to_owned(), "s"));
+            columns.push(("undone_steps".to_owned(), "1"));
+            columns.push(("most_broken_bonds".to_owned(), "1"));
+        }
         if plan.scales_density() {
             columns.push(("kinetic_ratio".to_owned(), "1"));
         }
@@ -280,6 +285,13 @@ impl HistoryObserver {
         if fields.relaxation_velocity.is_some() {
             let load_step = simulation.load_step;
             values.extend([load_step.residual, load_step.iterations as f64]);
+        }
+        if simulation.plan.adapts() {
+            let control = &mut simulation.step_control;
+            let most = std::mem::take(&mut control.most_broken);
+            let counts = [control.undone, most].map(|count| count as f64);
+            values.push(simulation.clock.step());
+            values.extend(counts);
         }
         if simulation.plan.scales_density() {
             values.push(energies.kinetic / energies.strain);

@@ -1,0 +1,163 @@
+//! The adaptive step: one in which too many bonds of a point break is undone and made again, shorter.
+//!
+//! Willberg, Hesse & Heinecke 2022, §5. A bond that breaks sheds its load to others, which must feel it
+//! before they break themselves:
+//!
+//! ```text
+//! N_b > most broken, Δt > smallest        undo the step, Δt ← Δt · reduce
+//! N_b ≤ stable broken, so many steps      Δt ← Δt · raise, up to the largest
+//! ```
+//!
+//! N_b is the largest number of bonds of a point that break in a step, over all ranks, which therefore
+//! decide alike.
+
+use crate::deck::plan::Adaptive;
+use crate::solver::Simulation;
+
+/// The smallest step as a share of the largest, where the deck does not say.
+const SMALLEST_SHARE: f64 = 0.01;
+
+/// How much longer than the step the rest of a stage may be to count as one.
+const UP_TO_ROUNDING: f64 = 1e-9;
+
+/// What the rule remembers from step to step; the same on all ranks.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StepControl {
+    /// Size that the rule wants, s.
+    step: f64,
+    /// The smallest and the largest size, s.
+    limits: [f64; 2],
+    /// Steps in a row in which few bonds broke.
+    calm: u64,
+    /// Steps undone so far.
+    pub undone: u64,
+    /// The largest number of bonds of a point that a step has broken since the last row of the history.
+    pub most_broken: u64,
+}
+
+impl StepControl {
+    /// Begins a stage for which a step of this size (s) was chosen.
+    pub fn begin(&mut self, rule: &Adaptive, step: f64) {
+        let largest = rule.largest.unwrap_or(step);
+        let smallest = rule.smallest.unwrap_or(SMALLEST_SHARE * largest);
+        self.limits = [smallest.min(largest), largest];
+        self.step = step.min(largest);
+        self.calm = 0;
+    }
+
+    /// All of it, as a checkpoint holds it.
+    pub fn words(&self) -> [u64; 6] {
+        let [smallest, largest] = self.limits.map(f64::to_bits);
+        let counts = [self.calm, self.undone, self.most_broken];
+        let step = self.step.to_bits();
+        [step, smallest, largest, counts[0], counts[1], counts[2]]
+    }
+
+    /// What [`Self::words`] gave.
+    pub fn of_words([step, smallest, largest, calm, undone, most_broken]: [u64; 6]) -> Self {
+        Self {
+            step: f64::from_bits(step),
+            limits: [smallest, largest].map(f64::from_bits),
+            calm,
+            undone,
+            most_broken,
+        }
+    }
+
+    /// Whether a step of this size (s) that broke so many bonds of a point is undone; the next one has
+    /// the size that the rule wants then.
+    fn undoes(&mut self, rule: &Adaptive, size: f64, broken: u64) -> bool {
+        let [smallest, largest] = self.limits;
+        if broken > rule.most_broken && size > smallest {
+            self.step = (size * rule.reduce).max(smallest);
+            self.calm = 0;
+            self.undone += 1;
+            return true;
+        }
+        self.most_broken = self.most_broken.max(broken);
+        self.calm = if broken <= rule.stable_broken {
+            self.calm + 1
+        } else {
+            0
+        };
+        if self.calm >= rule.steps && self.step < largest {
+            self.step = (self.step * rule.raise).min(largest);
+            self.calm = 0;
+        }
+        false
+    }
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Makes one step by the equation of motion, as short as the rule wants it. Collective.
+    pub(in crate::solver) fn make_adaptive_step(&mut self, rule: &Adaptive) {
+        let mut kept = std::mem::take(&mut self.kept);
+        self.keep(&mut kept);
+        loop {
+            // The stage ends where it must.
+            let left = self.clock.end() - self.clock.time();
+            let wanted = self.step_control.step;
+            let is_last = left > 0.0 && left < (1.0 + UP_TO_ROUNDING) * wanted;
+            let size = if is_last { left } else { wanted };
+            if size != self.clock.step() {
+                self.clock.set_step(size);
+            }
+            self.make_step();
+            let broken = self.forces.broken().iter().map(|broken| broken.count);
+            let mut most = [broken.max().unwrap_or(0) as f64];
+            self.comm.max(&mut most);
+            if !self.step_control.undoes(rule, size, most[0] as u64) {
+                break;
+            }
+            self.undo(&kept);
+        }
+        self.kept = kept;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULE: Adaptive = Adaptive {
+        most_broken: 4,
+        stable_broken: 2,
+        steps: 3,
+        reduce: 0.5,
+        raise: 1.5,
+        smallest: Some(0.2),
+        largest: Some(1.0),
+    };
+
+    #[test]
+    fn too_many_broken_bonds_shorten_the_step_down_to_the_smallest() {
+        let mut control = StepControl::default();
+        control.begin(&RULE, 1.0);
+        assert!(control.undoes(&RULE, 1.0, 5));
+        assert!(control.undoes(&RULE, control.step, 5));
+        assert_eq!(control.step, 0.25);
+        assert!(control.undoes(&RULE, control.step, 5));
+        assert_eq!(control.step, 0.2);
+        assert!(!control.undoes(&RULE, control.step, 5));
+        assert_eq!((control.undone, control.most_broken), (3, 5));
+    }
+
+    #[test]
+    fn calm_steps_raise_it_again() {
+        let mut control = StepControl::default();
+        control.begin(&RULE, 0.5);
+        for broken in [0, 2, 3, 2, 1, 0] {
+            assert!(!control.undoes(&RULE, control.step, broken));
+        }
+        assert_eq!(control.step, 0.75);
+        for _ in 0..3 {
+            control.undoes(&RULE, control.step, 0);
+        }
+        assert_eq!(control.step, 1.0);
+        for _ in 0..9 {
+            control.undoes(&RULE, control.step, 0);
+        }
+        assert_eq!(control.step, 1.0);
+        assert_eq!(StepControl::of_words(control.words()), control);
+    }
+}

@@ -1,0 +1,143 @@
+//! The adaptive step: no step breaks more bonds of a point than the rule has it, what it dissipates depends
+//! less on the step, and it can be stopped at any step and goes on to the same bits on any ranks.
+
+use crate::support::{plan, simulate, simulate_on};
+use fissure::comm::{Communicator, IdOrder, threads};
+use fissure::solver::Simulation;
+use fissure::solver::motion::Saved;
+use fissure::solver::observers::{HistoryObserver, Snapshot};
+
+/// A notched plate that is torn fast.
+fn torn(time: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.sheet.pmb = {{ density = 2, youngs_modulus = 5 }}
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.03, alpha = 0 }}
+        body.plate = {{ material = 'sheet', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [30, 20] }} }}
+        crack.notch.segment = {{ from = [-1, 10], to = [8, 10] }}
+        set.top.where = 'y > 17'
+        set.bottom.where = 'y < 3'
+        condition.up = {{ set = 'top', velocity = [0, '0.05*ramp(t, 0, 2)'] }}
+        condition.down = {{ set = 'bottom', velocity = [0, '-0.05*ramp(t, 0, 2)'] }}
+        time = {{ end = 25, {time} }}
+        "
+    )
+}
+
+const RULE: &str = "adaptive = { most_broken = 3, stable_broken = 1, steps = 5 }";
+
+/// The rows of the history after each step, and the columns.
+fn rows(deck: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    simulate(deck, |mut simulation: Simulation<2>| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let mut rows = Vec::new();
+        loop {
+            let snapshot = Snapshot::new(&mut simulation);
+            rows.push(observer.row(&mut simulation, &snapshot).values);
+            if simulation.is_over() {
+                break;
+            }
+            simulation.advance();
+        }
+        let columns = observer.columns().iter().map(|column| column.0.clone());
+        (columns.collect(), rows)
+    })
+}
+
+#[test]
+fn no_step_breaks_more_bonds_of_a_point_than_it_may() {
+    let (columns, rows) = rows(&torn(&format!("safety = 0.8, {RULE}")));
+    let find = |name: &str| columns.iter().position(|column| column == name).unwrap();
+    let (time, size) = (find("time"), find("time_step"));
+    let (undone, most) = (find("undone_steps"), find("most_broken_bonds"));
+    let last = rows.last().unwrap();
+    assert!(last[undone] > 3.0, "{} steps undone", last[undone]);
+    assert!((last[time] - 25.0).abs() < 1e-9, "ends at {}", last[time]);
+    let largest = rows[0][size];
+    for pair in rows.windows(2) {
+        let [before, after] = pair else {
+            unreachable!()
+        };
+        assert!(after[most] <= 3.0, "{after:?}");
+        assert!(after[size] <= largest * (1.0 + 1e-12));
+        let moved = after[time] - before[time];
+        assert!(
+            (moved - after[size]).abs() < 1e-9 * largest,
+            "{moved} is not {}",
+            after[size]
+        );
+    }
+    // It was shorter, and was raised again.
+    let smallest = rows.iter().map(|row| row[size]).fold(f64::MAX, f64::min);
+    assert!(smallest <= 0.25 * largest, "{smallest} of {largest}");
+    let raises = rows.windows(2).filter(|pair| pair[1][size] > pair[0][size]);
+    assert!(raises.count() > 3);
+}
+
+/// The state of all points, by the parts of the ranks.
+fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
+    let owned = simulation.model.owned();
+    let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
+    let order = IdOrder::new(simulation.comm, ids, total);
+    let saved = simulation.save(&order);
+    (order, saved)
+}
+
+/// Parts of the ranks put together.
+fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
+    let values = parts.iter().flat_map(|part| &part.values);
+    let values = values.map(|value| value.to_bits()).collect();
+    let bonds = parts.iter().flat_map(|part| part.bonds.clone()).collect();
+    (values, bonds, parts[0].progress.clone())
+}
+
+#[test]
+fn ranks_do_not_change_a_bit() {
+    let deck = torn(&format!("safety = 0.8, {RULE}"));
+    let run = |ranks: usize| {
+        let parts = simulate_on(ranks, &deck, |mut simulation: Simulation<2>| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            state(&simulation).1
+        });
+        whole(parts)
+    };
+    let one = run(1);
+    assert!(run(2) == one);
+    assert!(run(3) == one);
+}
+
+#[test]
+fn goes_on_from_any_step_to_the_same_bits() {
+    let plan = plan(&torn(&format!("safety = 0.8, {RULE}")));
+    let run = |stop: u64| {
+        let parts = threads::run(2, |comm: &dyn Communicator| {
+            let mut simulation = Simulation::<2>::new(&plan, comm).unwrap();
+            for _ in 0..stop {
+                simulation.advance();
+            }
+            if stop > 0 {
+                let (order, saved) = state(&simulation);
+                simulation = Simulation::new(&plan, comm).unwrap();
+                simulation.restore(&order, &saved).unwrap();
+                assert_eq!(state(&simulation).1, saved);
+            }
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            (state(&simulation).1, simulation.clock.number())
+        });
+        let number = parts[0].1;
+        (
+            whole(parts.into_iter().map(|part| part.0).collect()),
+            number,
+        )
+    };
+    let (expected, number) = run(0);
+    for share in [0.3, 0.5, 0.6, 0.8] {
+        let stop = (share * number as f64) as u64;
+        assert!(run(stop).0 == expected, "stopped after {stop} of {number}");
+    }
+}
