@@ -27,12 +27,25 @@ pub fn interval(
         (Some(every), None) => scope
             .positive(every, &format!("{key} every"))
             .map(plan::Interval::Seconds),
-        (None, Some(steps)) => Ok(plan::Interval::Steps(steps.get_ref().get())),
+        (None, Some(steps)) => Ok(plan::Interval::Steps(countable(scope, key, steps)?)),
         (Some(_), Some(steps)) => Err(scope.error(
             steps.span(),
             format!("{key} every_steps: give either `every` or `every_steps`"),
         )),
     }
+}
+
+/// A number of steps that TOML can write: its integers end at 2⁶³.
+fn countable(scope: &Scope, key: &str, steps: &Spanned<NonZeroU64>) -> Result<u64> {
+    let number = steps.get_ref().get();
+    if number > i64::MAX as u64 {
+        let message = format!(
+            "{key} every_steps: must be at most {}, is {number}",
+            i64::MAX
+        );
+        return Err(scope.error(steps.span(), message));
+    }
+    Ok(number)
 }
 
 /// Validates what is written to the result; `end` (s) is the end of the run.
@@ -115,7 +128,7 @@ pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<plan::CheckpointRule> {
             }
         },
         (None, Some(steps), None) => {
-            let interval = Interval::Steps(steps.get_ref().get());
+            let interval = Interval::Steps(countable(scope, "[checkpoint]", steps)?);
             Ok(CheckpointRule::Simulation(interval))
         }
         (None, None, Some(time)) => {

@@ -63,6 +63,10 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
         shapes::shape(scope, &format!("{key} shape"), shape).map(plan::Selector::Within)
     } else {
         let given = set.ids.as_ref().map_or(&[][..], |ids| ids.get_ref());
+        if let Some(id) = given.iter().find(|id| *id.get_ref() > i64::MAX as u64) {
+            let message = format!("{key} ids: no point has the id {}", id.get_ref());
+            return Err(scope.error(id.span(), message));
+        }
         let mut ids: Vec<u64> = given.iter().map(|id| *id.get_ref()).collect();
         ids.sort_unstable();
         ids.dedup();

@@ -6,8 +6,8 @@ use crate::solver::conditions::members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 
-/// Bytes a point that a result holds once: position, id, block, volume.
-const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0;
+/// Bytes a point that a result holds once: position, id, block, volume, and the cell that shows it.
+const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 
 /// Bytes of a result or checkpoint that do not depend on the number of points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
@@ -19,7 +19,7 @@ const LISTED: f64 = 4.0 + 1.0 / 8.0;
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
 /// What a rank takes before it has points, alone and under a launcher (MPI's own buffers), bytes.
-const BASE: [f64; 2] = [14.0 * MEBI, 34.0 * MEBI];
+const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
 /// Bytes a point, and a bond of a list, at the fullest moment of the set-up, where it is not measured.
