@@ -23,6 +23,7 @@ mod laws;
 mod library;
 mod ordinary_history;
 mod plasticity;
+mod pmma;
 mod readers;
 mod relaxation;
 mod restart;
