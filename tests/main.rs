@@ -24,6 +24,7 @@ mod laws;
 mod library;
 mod ordinary_history;
 mod plasticity;
+mod pmma;
 mod readers;
 mod relaxation;
 mod restart;

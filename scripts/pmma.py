@@ -1,0 +1,308 @@
+"""Mixed-mode fracture of a PMMA plate: the experiment of Réthoré (2018) and the computation of Willberg,
+Hesse & Heinecke (2022).
+
+Runs `inputs/pmma_mixed_mode.toml` with one law or several on the same grid and draws the path of the crack
+against the measured one, and force and crack length over the displacement of the plate's right side.
+"""
+
+import argparse
+import csv
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import h5py
+import matplotlib
+import numpy
+
+matplotlib.use("Agg")
+from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+
+EXAMPLES = """\
+examples:
+  scripts/pmma --small                       2 mm, to see that it runs; seconds
+  scripts/pmma --dx 1e-3                     a coarse grid
+  scripts/pmma --dx 0.31e-3 --threads 2      the paper's grid
+  scripts/pmma --set speed=0.01              another parameter of the deck; may be repeated
+  scripts/pmma --reuse                       tables and pictures of runs that are there
+
+Initiation is the displacement at which the crack has become one horizon long. The deviation of a path is
+the largest distance, up or down, of its main branch from the measured path, between the first measured
+place it reaches and its tip. A crack at the hole's right side is damage beyond the deck's threshold right
+of the hole's centre.
+
+Writes pmma.md (the table), pmma.json, pmma_path.png and pmma_curves.png into the output folder.
+"""
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DECK = ROOT / "inputs/pmma_mixed_mode.toml"
+
+# Willberg et al. (2022), table 1, m.
+NOTCH = 1e-3 * numpy.array([[92.5, 35.0], [71.7, 21.0], [65.1, 18.0]])
+MEASURED = 1e-3 * numpy.array(
+    [
+        [65.1, 18.0],
+        [63.1, 20.0],
+        [61.1, 21.9],
+        [59.1, 23.3],
+        [57.1, 24.7],
+        [55.1, 25.8],
+        [53.1, 26.9],
+        [51.1, 27.7],
+        [49.1, 28.5],
+        [47.1, 29.1],
+        [45.1, 29.4],
+        [43.1, 29.7],
+        [41.1, 30.0],
+        [39.1, 30.3],
+        [37.1, 30.6],
+        [35.1, 31.0],
+        [15.0, 31.0],
+    ]
+)
+INITIATION = 0.43e-3  # m, the paper's section 6.3
+HOLE = (0.095, 0.035, 0.015)  # centre and radius, m
+CRACKED = 0.35  # the deck's damage_threshold
+
+# The tables of material and damage; those of the deck itself where there are none.
+LAWS = {
+    "correspondence": None,
+    "ordinary": """\
+[material.pmma.ordinary]
+density = "density"
+youngs_modulus = "youngs_modulus"
+poisson_ratio = "poisson_ratio"
+
+[damage.brittle.critical_stretch]
+fracture_energy = "fracture_energy"
+alpha = 0
+no_failure = ["left", "right"]
+
+""",
+}
+COLOURS = ("#1b6ca8", "#d1495b", "#66a182", "#8d6a9f")
+
+FORCES_AT = (0.1e-3, 0.2e-3, 0.3e-3, 0.4e-3)  # m
+LENGTHS_AT = (0.5e-3, 0.59e-3)  # m
+
+
+def arguments():
+    parser = argparse.ArgumentParser(
+        prog="scripts/pmma",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+    def several_laws(text):
+        names = text.split(",")
+        if wrong := [name for name in names if name not in LAWS]:
+            raise argparse.ArgumentTypeError(f"`{wrong[0]}` is none of {', '.join(LAWS)}")
+        return names
+
+    def spacing(text):
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not 0 < value <= 5e-3:
+            raise argparse.ArgumentTypeError(f"must be a spacing in m, at most 5e-3, is `{text}`")
+        return value
+
+    binary = os.environ.get("FISSURE", ROOT / "target/release/fissure")
+    add = parser.add_argument
+    add("--laws", type=several_laws, default=list(LAWS), metavar="LIST", help="[all]")
+    add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
+    add("--small", action="store_true", help="2 mm and a fast press")
+    add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
+    add("--reuse", action="store_true", help="take the runs that are there")
+    add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
+    add("--binary", type=pathlib.Path, default=binary, metavar="PATH", help=argparse.SUPPRESS)
+    add("--output", type=pathlib.Path, default=ROOT / "out/pmma", metavar="DIR")
+    options = parser.parse_args()
+    if options.small:
+        options.dx = 2e-3
+        options.set = ["speed=0.2", *options.set]
+    return options
+
+
+def deck(law):
+    """The deck's text with another law."""
+    text = DECK.read_text()
+    if LAWS[law] is None:
+        return text
+    tables = re.compile(r"\[material\.pmma\..*?(?=\[body\.plate\])", re.DOTALL)
+    if len(tables.findall(text)) != 1:
+        sys.exit(f"error: {DECK} has not one table [material.pmma.LAW] before [body.plate]")
+    return tables.sub(LAWS[law], text)
+
+
+def run(options, law):
+    """Runs the deck with a law; returns its folder."""
+    folder = options.output / f"{law}-{options.dx * 1e3:g}"
+    folder.mkdir(parents=True, exist_ok=True)
+    if options.reuse and (folder / "crack_main.csv").exists():
+        return folder
+    written = folder / "deck.toml"
+    written.write_text(deck(law))
+    command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
+    for assignment in [f"dx={options.dx!r}", *options.set]:
+        command += ["--set", assignment]
+    if options.threads:
+        command += ["--threads", str(options.threads)]
+    done = subprocess.run(command)
+    if done.returncode != 0:
+        sys.exit(done.returncode)
+    return folder
+
+
+def history(folder):
+    with open(folder / "history.csv") as file:
+        rows = list(csv.reader(file))
+    names = [re.sub(r" \[.*", "", name) for name in rows[0]]
+    return dict(zip(names, numpy.array(rows[1:], dtype=float).T))
+
+
+def branches(folder):
+    """The branches of the crack, an array of places (m) each."""
+    with open(folder / "crack_main.csv") as file:
+        rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
+    numbers = sorted({row[0] for row in rows})
+    return [numpy.array([row[1:3] for row in rows if row[0] == number]) for number in numbers]
+
+
+def deviation(path):
+    """Largest distance (m) of a path from the measured one, and how far left (m) it was looked at."""
+    # From left to right; where the path turns back, its last way counts.
+    left = max(path[:, 0].min(), MEASURED[-1, 0])
+    places = numpy.linspace(left, min(path[:, 0].max(), MEASURED[0, 0]), 400)
+    order = numpy.argsort(path[:, 0], kind="stable")
+    found = numpy.interp(places, path[order, 0], path[order, 1])
+    measured = numpy.interp(places, MEASURED[::-1, 0], MEASURED[::-1, 1])
+    return float(numpy.abs(found - measured).max()), float(left)
+
+
+def damage(folder):
+    """Places (m), damage at each output, times (s) and horizon (m)."""
+    with h5py.File(folder / "result.vtkhdf") as file:
+        places = file["VTKHDF/Points"][:]
+        times = file["VTKHDF/Steps/Values"][:]
+        values = file["VTKHDF/PointData/damage"][:].reshape(len(times), len(places))
+    return places, values, times
+
+
+def evaluate(folder, law, dx):
+    """What the table says of a run."""
+    columns = history(folder)
+    way = -columns["probe_right_displacement_x"]
+    force, length = columns["force_push"], columns["crack_main_length"]
+    horizon = 3 * dx
+
+    def at(values, displacement):
+        return float(numpy.interp(displacement, way, values)) if way[-1] >= displacement else None
+
+    grown = numpy.nonzero(length > horizon)[0]
+    result = {"law": law, "dx": dx, "points": len(damage(folder)[0])}
+    result["initiation"] = float(way[grown[0]]) if len(grown) else None
+    result["forces"] = [at(force, displacement) for displacement in FORCES_AT]
+    result["peak_force"] = float(force.max())
+    result["peak_at"] = float(way[force.argmax()])
+    result["lengths"] = [at(length, displacement) for displacement in LENGTHS_AT]
+    result["branches"] = float(columns["crack_main_branches"][-1])
+    # After the first tenth, when there is something to compare with.
+    late = way > 0.1 * way[-1]
+    result["kinetic_share"] = float((columns["kinetic_energy"][late] / columns["strain_energy"][late]).max())
+    result["deviation"] = result["reached"] = None
+    if lines := branches(folder):
+        result["deviation"], result["reached"] = deviation(lines[0])
+    places, values, times = damage(folder)
+    right = (places[:, 0] > HOLE[0]) & (numpy.hypot(places[:, 0] - HOLE[0], places[:, 1] - HOLE[1]) < 3 * HOLE[2])
+    cracked = (values[:, right] > CRACKED).any(axis=1)
+    at_right = numpy.interp(times, columns["time"], way)[cracked]
+    result["right_of_hole"] = float(at_right[0]) if len(at_right) else None
+    return result
+
+
+def table(results):
+    def number(value, factor=1e3, digits=2):
+        return "none" if value is None else f"{factor * value:.{digits}f}"
+
+    heads = ["law", "dx, mm", "points", "initiation, mm", "deviation of the path, mm", "as far left as x, mm"]
+    heads += ["crack right of the hole from, mm"]
+    heads += [f"force at {1e3 * displacement:g} mm, kN" for displacement in FORCES_AT]
+    heads += ["peak force, kN", "at, mm"]
+    heads += [f"crack at {1e3 * displacement:g} mm, mm" for displacement in LENGTHS_AT]
+    heads += ["branches", "kinetic/strain energy"]
+    rows = [heads, ["---"] * len(heads)]
+    for result in results:
+        row = [f"`{result['law']}`", f"{result['dx'] * 1e3:g}", str(result["points"])]
+        row += [number(result[key]) for key in ("initiation", "deviation", "reached", "right_of_hole")]
+        row += [number(force, 1e-3) for force in result["forces"]]
+        row += [number(result["peak_force"], 1e-3), number(result["peak_at"])]
+        row += [number(length, 1e3, 1) for length in result["lengths"]]
+        row += [f"{result['branches']:g}", f"{result['kinetic_share']:.1e}"]
+        rows.append(row)
+    rows.append(["measured", "", "", number(INITIATION), "0 (±4 wanted)"] + [""] * (len(heads) - 5))
+    return "".join("| " + " | ".join(row) + " |\n" for row in rows)
+
+
+def draw_path(runs, path):
+    figure, axes = pyplot.subplots(
+        len(runs), 1, figsize=(8, 0.4 + 4.2 * len(runs)), squeeze=False, layout="constrained"
+    )
+    for (law, dx, folder), axis in zip(runs, axes[:, 0]):
+        places, values, _ = damage(folder)
+        x, y = 1e3 * places[:, 0], 1e3 * places[:, 1]
+        # A point's cell in points of print: the plate is 140 mm wide, the axis about 7 inches.
+        size = (72 * 7 / 140 * 1e3 * dx) ** 2
+        marks = axis.scatter(x, y, c=values[-1], s=size, marker="s", linewidths=0, cmap="Greys", vmin=0, vmax=0.8)
+        figure.colorbar(marks, ax=axis, label="damage")
+        axis.plot(*(1e3 * MEASURED.T), color="#009e73", linewidth=1.5, label="measured path")
+        axis.plot(*(1e3 * NOTCH.T), color="#009e73", linewidth=1, linestyle=":", label="measured notch")
+        for number, branch in enumerate(branches(folder)):
+            label = "computed path" if number == 0 else None
+            axis.plot(*(1e3 * branch.T), color="#d1495b", linewidth=1.2, label=label)
+        axis.set(aspect="equal", xlabel="x, mm", ylabel="y, mm", title=f"{law}, dx = {dx * 1e3:g} mm")
+        axis.set(xlim=(0, 140), ylim=(0, 70))
+        axis.legend(loc="lower right", fontsize=8)
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+
+
+def draw_curves(runs, path):
+    figure, (forces, lengths) = pyplot.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    for (law, dx, folder), colour in zip(runs, COLOURS):
+        columns = history(folder)
+        way = -1e3 * columns["probe_right_displacement_x"]
+        label = f"{law}, dx = {dx * 1e3:g} mm"
+        forces.plot(way, 1e-3 * columns["force_push"], color=colour, linewidth=1, label=label)
+        lengths.plot(way, 1e3 * columns["crack_main_length"], color=colour, linewidth=1, label=label)
+    for axis in (forces, lengths):
+        axis.axvline(1e3 * INITIATION, color="#009e73", linestyle="--", linewidth=1, label="initiation, measured")
+        axis.set_xlabel("displacement of the right side, mm")
+        axis.set_xlim(left=0)
+    forces.set(ylabel="force, kN", ylim=(0, None))
+    lengths.set_ylabel("length of the crack, mm")
+    forces.legend(fontsize=8)
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+
+
+def main():
+    options = arguments()
+    options.output.mkdir(parents=True, exist_ok=True)
+    runs = [(law, options.dx, run(options, law)) for law in options.laws]
+    results = [evaluate(folder, law, dx) for law, dx, folder in runs]
+    (options.output / "pmma.json").write_text(json.dumps(results, indent=1) + "\n")
+    (options.output / "pmma.md").write_text(table(results))
+    draw_path(runs, options.output / "pmma_path.png")
+    draw_curves(runs, options.output / "pmma_curves.png")
+    print(f"{table(results)}\ntable and pictures in {options.output}")
+
+
+if __name__ == "__main__":
+    main()

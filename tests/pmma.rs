@@ -1,0 +1,99 @@
+//! The PMMA plate of Willberg, Hesse & Heinecke (2022) on a grid so coarse that it takes a second. The
+//! path needs a finer one: scripts/pmma and docs/pmma.md.
+
+use fissure::solver::Simulation;
+use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};
+
+use crate::support::simulate_input;
+
+const SPACING: f64 = 2e-3;
+
+/// The notch's tip, m.
+const TIP: [f64; 2] = [64.6e-3, 18.9e-3];
+
+/// What is looked at from time to time.
+struct Seen {
+    /// Of the right side, m.
+    displacement: f64,
+    /// By which it is pressed, N.
+    force: f64,
+    /// On the left side, N.
+    held: f64,
+    /// Of the crack, m.
+    length: f64,
+    /// Damaged places outside the notch, m.
+    damaged: Vec<[f64; 3]>,
+    branches: Vec<Branch>,
+}
+
+fn look(observer: &mut HistoryObserver, simulation: &mut Simulation<2>, notch: &[usize]) -> Seen {
+    let snapshot = Snapshot::new(simulation);
+    let row = observer.row(simulation, &snapshot).values;
+    let names = observer.columns();
+    let column = |wanted: &str| row[names.iter().position(|(name, _)| name == wanted).unwrap()];
+    let damage = |point: usize| snapshot.damage(&simulation.family_volume, point);
+    let damaged = (0..simulation.model.owned())
+        .filter(|point| damage(*point) > 0.35 && !notch.contains(point))
+        .map(|point| simulation.model.position(point))
+        .collect();
+    Seen {
+        displacement: -column("probe_right_displacement_x"),
+        force: column("force_push"),
+        held: column("force_hold"),
+        length: column("crack_main_length"),
+        damaged,
+        branches: observer.crack_paths(simulation, &snapshot).remove(0).1,
+    }
+}
+
+#[test]
+fn a_coarse_plate_cracks_from_the_tip_of_its_notch() {
+    let parameters = [
+        ("dx", "2e-3"),
+        ("speed", "0.1"),
+        ("end_displacement", "0.35e-3"),
+    ];
+    simulate_input::<2, _>("pmma_mixed_mode", &parameters, |mut simulation| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let snapshot = Snapshot::new(&mut simulation);
+        let damage = |point: usize| snapshot.damage(&simulation.family_volume, point);
+        let points = 0..simulation.model.owned();
+        let notch: Vec<usize> = points.filter(|point| damage(*point) > 0.35).collect();
+        assert!(notch.len() > 10);
+        let mut seen = vec![look(&mut observer, &mut simulation, &notch)];
+        while simulation.clock.number() < simulation.clock.last() {
+            simulation.advance();
+            if simulation.clock.number() % 5 == 0 {
+                seen.push(look(&mut observer, &mut simulation, &notch));
+            }
+        }
+        assert_eq!(seen[0].length, 0.0);
+
+        // Before anything breaks it is as stiff as the whole plate is, 10.8 kN/mm, and what presses it is held
+        // on the other side, but for waves.
+        let elastic: Vec<&Seen> = seen
+            .iter()
+            .filter(|seen| (0.1e-3..0.2e-3).contains(&seen.displacement))
+            .collect();
+        assert!(elastic.len() > 5);
+        let mean = |of: fn(&Seen) -> f64| {
+            elastic.iter().map(|seen| of(seen)).sum::<f64>() / elastic.len() as f64
+        };
+        let stiffness = mean(|seen| seen.force / seen.displacement);
+        assert!((10.3e6..11.3e6).contains(&stiffness), "{stiffness} N/m");
+        let ratio = mean(|seen| seen.held) / mean(|seen| seen.force);
+        assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+
+        // Damage starts within two horizons of the tip, and the crack runs to the left and up.
+        let first = seen.iter().find(|seen| !seen.damaged.is_empty()).unwrap();
+        for [x, y, _] in &first.damaged {
+            let distance = (x - TIP[0]).hypot(y - TIP[1]);
+            assert!(distance < 6.0 * SPACING, "damage at {x}, {y}");
+        }
+        let last = seen.last().unwrap();
+        assert!(last.length > 3.0 * SPACING, "{} m long", last.length);
+        let tip = last.branches[0].last().unwrap();
+        assert!(tip.place[0] < TIP[0] - 2.0 * SPACING, "{tip:?}");
+        assert!((tip.along - last.length).abs() < 1e-12 || last.branches.len() > 1);
+    });
+}
