@@ -66,6 +66,7 @@ pub fn plate(end: f64) -> Result<Plan> {
     let notch = Crack::Segment {
         from: [0.0, 0.015, 0.0],
         to: [0.02, 0.015, 0.0],
+        width: 0.0,
     };
     plan.add_crack("notch", notch);
     for (name, place, velocity) in [

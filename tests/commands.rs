@@ -270,7 +270,7 @@ fn too_many_points_to_make_are_counted_by_formula() {
     let deck = folder.write(
         "cube.toml",
         "dimension = '3d'
-        grid = { spacing = 5e-4, horizon = 1.5e-3 }
+        grid = { volume_correction = 'none', spacing = 5e-4, horizon = 1.5e-3 }
         material.glass.pmb = { density = 2440, youngs_modulus = 72e9 }
         body.cube = { material = 'glass', shape.box = { lower = [0, 0, 0], upper = [1, 1, 1] } }
         time.end = 1e-4
@@ -307,7 +307,7 @@ fn check_and_run_warn_of_the_same() {
         "plate.toml",
         "dimension = 'plane-stress'
 parameters.unused = 1
-grid = { spacing = 1, horizon = 3 }
+grid = { volume_correction = 'none', spacing = 1, horizon = 3 }
 material.glass.pmb = { density = 2, youngs_modulus = 5 }
 body.plate = { material = 'glass', shape.box = { lower = [0, 0], upper = [12, 8] } }
 body.ball = { material = 'glass', shape.disc = { centre = [16, 4], radius = 3 } }
@@ -343,5 +343,30 @@ time.end = 1
             "{}",
             text(&output)
         );
+    }
+}
+
+#[test]
+fn several_decks_are_looked_at_one_after_the_other() {
+    let folder = Folder::new("several");
+    let right = folder.write("right.toml", fissure::deck::EXAMPLE);
+    let wrong = |name: &str, horizon: &str| {
+        let deck = fissure::deck::EXAMPLE.replace("\"3*dx\"", horizon);
+        folder.write(name, &deck)
+    };
+    let (first, second) = (wrong("first.toml", "-1"), wrong("second.toml", "'none'"));
+    for command in ["check", "explain"] {
+        let decks = [&first, &right, &second, &right];
+        let output = finish(fissure(1).arg(command).arg("-q").args(decks));
+        assert_eq!(output.status.code(), Some(2));
+        let printed = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(printed.matches("error: ").count(), 2, "{printed}");
+        for name in ["first.toml:", "second.toml:"] {
+            assert_eq!(printed.matches(name).count(), 1, "{printed}");
+        }
+        let titles = text(&output).matches("\"Crack branching").count();
+        assert_eq!(titles, if command == "explain" { 2 } else { 0 });
+        let output = finish(fissure(1).arg(command).args([&right, &right]));
+        assert!(output.status.success());
     }
 }

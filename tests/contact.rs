@@ -7,7 +7,7 @@ use crate::support::command::{Folder, finish, fissure, text};
 fn ball_and_plate(velocity: &str, interface: &str) -> String {
     format!(
         "dimension = 'plane-strain'
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3 }}
         {interface}
         material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
         [body]

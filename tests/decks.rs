@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use fissure::comm::threads;
-use fissure::deck::{self, Plan, Source};
+use fissure::deck::{self, Deck, Plan, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
@@ -321,5 +321,47 @@ proptest! {
                 prop_assert_eq!(again.map_err(|error| error.message), Ok(text));
             }
         }
+    }
+}
+
+#[test]
+fn defaults_are_the_accurate_ones() {
+    use fissure::deck::plan::VolumeCorrection;
+
+    let deck = |grid: &str, body: &str| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid = {{ {grid} }}
+            material.glass.pmb = {{ density = 2440, youngs_modulus = 72e9 }}
+            damage.brittle.critical_stretch.fracture_energy = 135
+            body.plate = {{ material = 'glass', damage = 'brittle', {body} }}
+            time.end = 1e-5
+            "
+        );
+        let source = Source {
+            path: "tests/decks/good/deck.toml".into(),
+            text,
+        };
+        let deck = Deck::new(source).unwrap();
+        let plan = deck.plan().unwrap();
+        (deck.explain().unwrap(), plan)
+    };
+    let shape = "shape.box = { lower = [0, 0], upper = [0.06, 0.03] }";
+    let (full, plan) = deck("spacing = 1e-3, horizon = 3e-3", shape);
+    assert_eq!(plan.volume_correction, VolumeCorrection::Exact);
+    assert_eq!(plan.bodies[0].damage.as_ref().unwrap().alpha, 0.0);
+    assert!(full.contains("volume_correction = \"exact\""), "{full}");
+    // Points that are no centres of cells have no cells to share.
+    for (grid, body) in [
+        ("spacing = [1e-3, 2e-3], horizon = 6e-3", shape),
+        (
+            "spacing = 1e-3, horizon = 3e-3, quadrature = 'gauss'",
+            shape,
+        ),
+        ("horizon = 3e-3", "points.file = 'points.csv'"),
+    ] {
+        let (full, plan) = deck(grid, body);
+        assert_eq!(plan.volume_correction, VolumeCorrection::None, "{grid}");
+        assert!(full.contains("volume_correction = \"none\""), "{full}");
     }
 }

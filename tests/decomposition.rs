@@ -12,6 +12,7 @@ thickness = 0.01
 [parameters]
 dx = 1e-3
 [grid]
+volume_correction = 'none'
 spacing = 'dx'
 horizon = '3*dx'
 [material]
@@ -34,6 +35,10 @@ shape.box = { lower = [0, 0.012], upper = [0.04, 0.016] }
 [crack.notch.segment]
 from = [-1, 0]
 to = [0.012, 0]
+[crack.slit.segment]
+from = [0.02, -0.008]
+to = [0.025, -0.004]
+width = 1.2e-3
 [set]
 top.where = 'y > 0.013'
 bottom.where = 'y < -0.012 + dx'
@@ -52,6 +57,8 @@ fields = ['displacement', 'velocity', 'acceleration', 'force_density', 'damage',
 [history]
 every_steps = 3
 reactions = ['rim']
+force.slanted = { set = 'rim', direction = [1, 2] }
+crack.notch = { from = [0, 0], threshold = 0.2 }
 probe.ahead.at = [0.02, 0]
 front.wave = { from = [0.02, -0.012], direction = [0.1, 1], field = 'velocity', threshold = 0.5 }
 front.strain = { from = [0, 0], direction = [1, 0], length = 0.03, field = 'strain_energy_density', threshold = 1 }
@@ -71,6 +78,7 @@ second.normalised_pmb = { density = 2, youngs_modulus = 5 }
 third.ordinary = { density = 3, youngs_modulus = 8, poisson_ratio = 0.1, influence = 'gaussian' }
 [damage.brittle.critical_stretch]
 fracture_energy = 0.05
+alpha = 0.25
 [body.left]
 material = 'first'
 damage = 'brittle'
@@ -112,6 +120,7 @@ fn with_one_law(law: &str) -> String {
 const BLOCK: &str = "
 dimension = '3d'
 [grid]
+volume_correction = 'none'
 horizon = 2.2
 [material.rubber.pmb]
 density = 2
@@ -157,7 +166,7 @@ on = ['down']
 /// Fewer points than ranks.
 const FEW: &str = "
 dimension = '1d'
-grid = { spacing = 1, horizon = 1.5 }
+grid = { volume_correction = 'none', spacing = 1, horizon = 1.5 }
 material.rubber.pmb = { density = 2, youngs_modulus = 5, damping = 0.1 }
 body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [3] } }
 initial.pull.displacement = ['0.01*x']
@@ -233,7 +242,10 @@ fn a_plate_of_two_materials_with_listed_bonds() {
 #[test]
 fn bonds_as_long_as_the_volume_correction_reaches() {
     let horizon = "horizon = '2.5*dx'\nvolume_correction = 'linear'";
-    let deck = PLATE.replace("horizon = '3*dx'", horizon);
+    let plain = "volume_correction = 'none'\n";
+    let deck = PLATE
+        .replace(plain, "")
+        .replace("horizon = '3*dx'", horizon);
     same_everywhere("tie", &deck, true);
 }
 

@@ -11,7 +11,7 @@ use fissure::output::ResultReader;
 fn bar(time: &str) -> String {
     format!(
         "dimension = 'plane-stress'
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3 }}
         material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
         body.bar = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [60, 12] }} }}
         initial.pull.displacement = ['0.01*x*sin(x)', 0]
@@ -40,7 +40,7 @@ fn a_wrong_row_that_one_rank_reads() {
     let deck = folder.write(
         "deck.toml",
         "dimension = 'plane-stress'
-        grid = { horizon = 3 }
+        grid = { volume_correction = 'none', horizon = 3 }
         material.rubber.pmb = { density = 2, youngs_modulus = 5 }
         body.bar = { material = 'rubber', points.file = 'points.txt' }
         time = { end = 1 }
@@ -62,7 +62,9 @@ fn a_wrong_row_that_one_rank_reads() {
 #[test]
 fn a_value_that_is_not_finite() {
     let folder = Folder::new("nan");
-    let deck = folder.write("deck.toml", &bar("end = 400, step = 4"));
+    // The history would see the energy grow before.
+    let text = bar("end = 400, step = 4") + "history.every_steps = 1000";
+    let deck = folder.write("deck.toml", &text);
     let mut messages = Vec::new();
     for ranks in [1, 2, 3] {
         let out = folder.join(format!("out{ranks}"));
@@ -269,4 +271,62 @@ fn a_load_that_loses_its_value_is_named() {
     }
     messages.dedup();
     assert_eq!(messages.len(), 1, "{messages:?}");
+}
+
+#[test]
+fn a_run_that_blows_up_is_an_error_while_its_numbers_are_still_finite() {
+    let folder = Folder::new("blow-up");
+    let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    let block = |time: &str| bar(time).replace("pmb = { density = 2, youngs_modulus = 5 }", law);
+    let stable = crate::support::simulate::<2, _>(&block("end = 1"), |it| it.stable_step);
+    let run = |share: f64, steps: u32, ranks: usize| {
+        let step = share * stable;
+        let time = format!("end = {}, step = {step}", step * f64::from(steps));
+        let deck = folder.write("deck.toml", &(block(&time) + "history.every_steps = 1"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--overwrite");
+        command.arg("--output").arg(folder.join("out"));
+        command
+    };
+    let mut errors = Vec::new();
+    for ranks in [1, 2] {
+        let printed = failing(&mut run(1.6, 120, ranks), "are the steps too large?", 1);
+        assert_eq!(printed.matches("warning: step").count(), 1, "{printed}");
+        errors.push(
+            printed
+                .lines()
+                .find(|line| line.contains("error:"))
+                .unwrap()
+                .to_owned(),
+        );
+        let reader = ResultReader::open(&folder.join("out/result.vtkhdf")).unwrap();
+        let last = reader.times().unwrap().len() - 1;
+        let velocity = reader.field("velocity", last).unwrap();
+        assert!(velocity.iter().all(|value| value.is_finite()));
+    }
+    assert_eq!(errors[0], errors[1]);
+    // A step that is stable, and one that is only just, are left alone.
+    for share in [0.8, 0.99] {
+        let output = finish(&mut run(share, 400, 1));
+        let printed = text(&output);
+        assert!(output.status.success(), "{printed}");
+        assert!(!printed.contains("the energy has grown"), "{printed}");
+    }
+}
+
+#[test]
+fn a_motion_that_jumps_is_no_blow_up() {
+    let folder = Folder::new("jump");
+    let deck = bar("end = 8")
+        + "history.every_steps = 1
+        set.end.where = 'x < 3'
+        condition.jump = { set = 'end', displacement = ['0.5*step(t - 4)', 'free'] }";
+    let deck = folder.write("deck.toml", &deck);
+    let mut command = fissure(1);
+    command
+        .arg("run")
+        .arg(&deck)
+        .arg("--output")
+        .arg(folder.join("out"));
+    succeed(&mut command);
 }

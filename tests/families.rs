@@ -145,7 +145,7 @@ fn deck(template: &str, law: &str, ratio: &str, grid: &str, alpha: &str) -> Stri
 
 #[test]
 fn prototype_microelastic_bonds() {
-    let grid = "horizon = 3.015";
+    let grid = "horizon = 3.015\nvolume_correction = 'none'";
     compare::<3>(&deck(SOLID, "pmb", "", grid, "0.25"));
     compare::<2>(&deck(PLANE, "pmb", "", grid, "0"));
 }
@@ -188,6 +188,7 @@ fn plate_from_file(place: impl Fn(f64) -> f64) -> String {
 const FROM_FILE: &str = "
 dimension = 'plane-stress'
 [grid]
+volume_correction = 'none'
 horizon = 0.95
 [material.one.pmb]
 density = 2

@@ -16,7 +16,7 @@ fn last<const D: usize, const N: usize>(simulation: &mut Simulation<D>) -> [f64;
 fn bar(front: &str) -> String {
     format!(
         "dimension = '1d'
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3 }}
         material.rubber.proportional = {{ density = 2, youngs_modulus = 5 }}
         body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [20] }} }}
         history.front.wave = {{ {front} }}
@@ -50,7 +50,7 @@ fn a_front_looks_at_the_points_near_its_line() {
     let deck = |radius: &str, component: &str| {
         format!(
             "dimension = '3d'
-            grid = {{ spacing = 1, horizon = 2 }}
+            grid = {{ volume_correction = 'none', spacing = 1, horizon = 2 }}
             material.rubber.proportional = {{ density = 2, youngs_modulus = 5 }}
             body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0, 0], upper = [8, 5, 5] }} }}
             history.front.wave = {{ from = [8, 2.5, 2.5], direction = [-1, 0, 0], radius = {radius}, length = 6, field = 'velocity', threshold = 0.5{component} }}
@@ -76,7 +76,7 @@ fn cut(direction: [f64; 2], length: f64) -> String {
     let [x, y] = direction.map(|entry| entry / direction[0].hypot(direction[1]));
     format!(
         "dimension = 'plane-stress'
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3 }}
         material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
         body.plate = {{ material = 'glass', shape.box = {{ lower = [-20, -20], upper = [20, 20] }} }}
         crack.cut.segment = {{ from = [{}, {}], to = [{}, {}] }}

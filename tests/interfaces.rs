@@ -15,7 +15,7 @@ fn each_pair_has_its_rule() {
     let text = |interface: &str| {
         format!(
             "dimension = '1d'
-            grid = {{ spacing = 1, horizon = 1.5 }}
+            grid = {{ volume_correction = 'none', spacing = 1, horizon = 1.5 }}
             {interface}
             material.soft.pmb = {{ density = 1, youngs_modulus = 2 }}
             material.firm.pmb = {{ density = 1, youngs_modulus = 3 }}
@@ -75,7 +75,7 @@ fn bodies_with_the_rule_none_do_not_feel_each_other() {
     let force = |family: &str, interface: &str| {
         let text = format!(
             "dimension = 'plane-strain'
-            grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
+            grid = {{ volume_correction = 'none', spacing = 1, horizon = 3, family = '{family}' }}
             {interface}
             material.soft.pmb = {{ density = 1, youngs_modulus = 2 }}
             material.other.linear_microelastic = {{ density = 1, youngs_modulus = 2 }}

@@ -283,7 +283,7 @@ fn two_blocks() -> Vec<String> {
                 interface.rule = '{rule}'
                 material.soft.{soft}
                 material.hard.{hard}
-                damage.brittle.critical_stretch = {{ critical_stretch = 0.05 }}
+                damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = 0.25 }}
                 body.left = {{ material = 'soft', shape.box = {{ lower = [0, 0], upper = [10, 12] }} }}
                 body.right = {{ material = 'hard', damage = 'brittle', {right} shape.box = {{ lower = [10, 0], upper = [20, 12] }} }}
                 time = {{ end = 1 }}
@@ -438,7 +438,7 @@ fn intact_bonds<const D: usize>(simulation: &mut Simulation<D>) -> Vec<(u64, u64
 fn a_bond_breaks_at_the_critical_stretch_and_not_before() {
     // Two points, one bond: 1-D, α = 0.
     let text = "dimension = '1d'
-        grid = { spacing = 1, horizon = 1.5 }
+        grid = { volume_correction = 'none', spacing = 1, horizon = 1.5 }
         material.rubber.pmb = { density = 2, youngs_modulus = 5 }
         damage.brittle.critical_stretch = { critical_stretch = 0.125, alpha = 0 }
         body.bar = { material = 'rubber', damage = 'brittle', shape.box = { lower = [0], upper = [2] } }
@@ -467,7 +467,7 @@ fn compression_of_a_neighbour_bond_raises_the_threshold() {
     let text = |alpha: f64| {
         format!(
             "dimension = '1d'
-            grid = {{ spacing = 1, horizon = 1.5 }}
+            grid = {{ volume_correction = 'none', spacing = 1, horizon = 1.5 }}
             material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
             damage.brittle.critical_stretch = {{ critical_stretch = 0.1, alpha = {alpha} }}
             body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [3] }} }}
@@ -497,7 +497,7 @@ fn compression_of_a_neighbour_bond_raises_the_threshold() {
 fn bonds_of_a_no_failure_zone_hold() {
     let text = format!(
         "{}set.left.where = 'x < 8'
-        damage.brittle.critical_stretch = {{ critical_stretch = 0.05, no_failure = ['left'] }}",
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = 0.25, no_failure = ['left'] }}",
         deck("plane-stress", PMB, "none", ", damage = 'brittle'")
     );
     for ranks in [1, 3] {

@@ -29,7 +29,7 @@ fn pair(critical: f64) -> String {
     format!(
         "dimension = '1d'
         cross_section = {SECTION}
-        grid = {{ spacing = 1, horizon = {HORIZON} }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = {HORIZON} }}
         material.metal.{}
         damage.ductile.critical_stretch = {{ critical_stretch = {critical}, alpha = 0 }}
         body.bar = {{ material = 'metal', damage = 'ductile', shape.box = {{ lower = [0], upper = [2] }} }}
@@ -240,7 +240,7 @@ fn a_body_that_has_yielded_turns_with_its_forces() {
 fn cycles(step: f64) -> String {
     format!(
         "dimension = 'plane-stress'
-        grid = {{ spacing = 1, horizon = 2.1 }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 2.1 }}
         material.metal.{}
         body.plate = {{ material = 'metal', shape.box = {{ lower = [0, 0], upper = [10, 6] }} }}
         set.left.where = 'x < 2'

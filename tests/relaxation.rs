@@ -31,7 +31,7 @@ fn plate_with_hole(relaxation: &str) -> String {
     format!(
         "dimension = 'plane-stress'
         thickness = 0.5
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ spacing = 1, horizon = 3, volume_correction = 'none' }}
         material.sheet.linear_microelastic = {{ density = 2, youngs_modulus = 5 }}
         [body.plate]
         material = 'sheet'

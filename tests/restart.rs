@@ -18,7 +18,7 @@ fn plate(end: &str, extra: &str) -> String {
     format!(
         "dimension = 'plane-stress'
         parameters = {{ pull = 20e6, end = {end} }}
-        grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+        grid = {{ volume_correction = 'none', spacing = 1e-3, horizon = 3e-3 }}
         material.glass.pmb = {{ density = 2440, youngs_modulus = 72e9 }}
         damage.brittle.critical_stretch = {{ fracture_energy = 135, alpha = 0.25 }}
         body.plate = {{ material = 'glass', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [0.06, 0.03] }} }}
@@ -29,7 +29,7 @@ fn plate(end: &str, extra: &str) -> String {
         condition.hold = {{ set = 'bottom', displacement = ['free', '-1e-8*ramp(t, 0, 1e-5)'] }}
         time = {{ end = 'end', step = 1e-8 }}
         output.every_steps = 200
-        history = {{ every_steps = 50, reactions = ['bottom'], probe.tip.at = [0.02, 0.015], front.load = {{ from = [0.03, 0.03], direction = [0, -1], field = 'velocity', component = 'y', threshold = 0.1 }}, tip.notch = {{ from = [0, 0.015], direction = [1, 0] }} }}
+        history = {{ every_steps = 50, reactions = ['bottom'], probe.tip.at = [0.02, 0.015], front.load = {{ from = [0.03, 0.03], direction = [0, -1], field = 'velocity', component = 'y', threshold = 0.1 }}, tip.notch = {{ from = [0, 0.015], direction = [1, 0] }}, crack.notch = {{ from = [0, 0.015] }} }}
         {extra}
         "
     )
@@ -527,4 +527,208 @@ fn a_full_disc_leaves_the_checkpoint_before() {
             .unwrap()
             .success()
     );
+}
+
+/// Runs the plate until 1e-5 s into a folder, and continues it with another deck until 1.5e-5 s; returns
+/// what that prints.
+fn continued_with(folder: &Folder, name: &str, other: &str) -> String {
+    let out = folder.join(name);
+    let deck = folder.write("deck.toml", &plate("1e-5", ""));
+    succeed(&mut run(2, &deck, &out, &[]));
+    let deck = folder.write("other.toml", other);
+    let output = finish(&mut run(
+        2,
+        &deck,
+        &out,
+        &["--restart", "--set", "end=1.5e-5"],
+    ));
+    assert!(output.status.success(), "{}", text(&output));
+    text(&output)
+}
+
+#[test]
+fn columns_of_the_history_keep_their_meaning() {
+    let folder = Folder::new("columns");
+    for (name, from, to, told) in [
+        (
+            "probe",
+            "probe.tip.at = [0.02",
+            "probe.tip.at = [0.03",
+            "history.probe.tip.at[0]: was 0.02, is 0.03",
+        ),
+        (
+            "threshold",
+            "every_steps = 50,",
+            "every_steps = 50, damage_threshold = 0.5,",
+            "history.damage_threshold: was 0.35, is 0.5",
+        ),
+        (
+            "tip",
+            "direction = [1, 0] }",
+            "direction = [1, 0], threshold = 0.2 }",
+            "history.tip.notch.threshold: was 0.35, is 0.2",
+        ),
+    ] {
+        let deck = plate("1e-5", "");
+        assert!(deck.contains(from));
+        let printed = continued_with(&folder, name, &deck.replace(from, to));
+        let expected = format!("columns of the history mean something else: {told}");
+        assert!(printed.contains(&expected), "{printed}");
+        let rows = |file: &str| {
+            let reader = ResultReader::open(&folder.join(name).join(file)).unwrap();
+            reader.history().unwrap()[1].values.clone()
+        };
+        // What was meant before ends where the new meaning begins.
+        assert_eq!(rows("result_until_step_1000.vtkhdf").last(), Some(&1000.0));
+        assert_eq!(rows("result.vtkhdf")[0], 1000.0);
+    }
+    // Rows at other times mean the same.
+    let deck = plate("1e-5", "").replace("every_steps = 50,", "every_steps = 25,");
+    let printed = continued_with(&folder, "often", &deck);
+    assert!(!printed.contains("a new result begins"), "{printed}");
+}
+
+#[test]
+fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
+    let folder = Folder::new("damaged-result");
+    let deck = folder.write("deck.toml", &plate("1e-5", ""));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &[]));
+    let sound = std::fs::read(result(&whole)).unwrap();
+    let mut zeroed = sound.clone();
+    zeroed[2000..20_000].fill(0);
+    let damages: [(&str, Option<&[u8]>, &str); 4] = [
+        (
+            "cut",
+            Some(&sound[..sound.len() / 3]),
+            "the result so far is damaged",
+        ),
+        ("zeroed", Some(&zeroed), "the result so far is damaged"),
+        ("empty", Some(&[]), "the result so far is damaged"),
+        ("gone", None, "the result so far is gone"),
+    ];
+    for (name, bytes, told) in damages {
+        let out = folder.join(name);
+        succeed(&mut run(1, &deck, &out, &[]));
+        match bytes {
+            Some(bytes) => std::fs::write(result(&out), bytes).unwrap(),
+            None => std::fs::remove_file(result(&out)).unwrap(),
+        }
+        let further = ["--restart", "--set", "end=1.5e-5"];
+        let output = finish(&mut run(2, &deck, &out, &further));
+        let printed = text(&output);
+        assert!(output.status.success(), "{name}: {printed}");
+        assert_eq!(printed.matches(told).count(), 1, "{name}: {printed}");
+        // Every file that is named is there.
+        let names = printed.split("it is kept as ").nth(1).unwrap();
+        for path in names.lines().next().unwrap().split(" and ") {
+            assert!(Path::new(path).exists(), "{name}: {path}: {printed}");
+        }
+        assert_eq!(
+            bytes.is_some(),
+            names.contains("result_until_step_1000.vtkhdf")
+        );
+        let reader = ResultReader::open(&result(&out)).unwrap();
+        assert_eq!(reader.steps().unwrap(), [1000, 1200, 1400, 1500]);
+    }
+}
+
+#[test]
+fn a_result_is_continued_in_place() {
+    use std::os::unix::fs::MetadataExt;
+
+    let folder = Folder::new("in-place");
+    let deck = folder.write("deck.toml", &plate("1e-5", ""));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &["--set", "end=2e-5"]));
+    for ranks in [1, 2, 3] {
+        let out = folder.join(format!("out{ranks}"));
+        succeed(&mut run(3, &deck, &out, &[]));
+        let file = || std::fs::metadata(result(&out)).unwrap();
+        let before = file();
+        succeed(&mut run(
+            ranks,
+            &deck,
+            &out,
+            &["--restart", "--set", "end=2e-5"],
+        ));
+        assert_eq!(file().ino(), before.ino());
+        let whole = whole.join("result.vtkhdf");
+        assert_eq!(
+            difference(&datasets(&whole), &datasets(&result(&out))),
+            None
+        );
+        // Outputs after the last checkpoint are made once more, in the same place.
+        let grown = file().len() as f64 / std::fs::metadata(&whole).unwrap().len() as f64;
+        assert!(grown < 1.2, "{grown}");
+    }
+}
+
+#[test]
+fn an_extended_run_keeps_its_step_and_says_so() {
+    let folder = Folder::new("kept-step");
+    let automatic = plate("1e-5", "").replace(", step = 1e-8", "");
+    let deck = folder.write("deck.toml", &automatic);
+    let out = folder.join("out");
+    succeed(&mut run(1, &deck, &out, &[]));
+    let steps = || ResultReader::open(&result(&out)).unwrap().steps().unwrap();
+    let step = 1e-5 / *steps().last().unwrap() as f64;
+    let output = finish(&mut run(
+        2,
+        &deck,
+        &out,
+        &["--restart", "--set", "end=1.77e-5"],
+    ));
+    let printed = text(&output);
+    assert!(output.status.success(), "{printed}");
+    let told =
+        format!("the steps stay at {step:e} s, as the run began; a new run until t = 1.77e-5 s");
+    assert_eq!(printed.matches(&told).count(), 1, "{printed} {told}");
+    let times = ResultReader::open(&result(&out)).unwrap().times().unwrap();
+    for (number, time) in steps().into_iter().zip(times) {
+        assert!(
+            (time - number as f64 * step).abs() <= 1e-12 * time,
+            "{time}"
+        );
+    }
+    // At the same end nothing is said.
+    let printed = text(&finish(&mut run(
+        1,
+        &deck,
+        &out,
+        &["--restart", "--set", "end=1.77e-5"],
+    )));
+    assert!(!printed.contains("the steps stay"), "{printed}");
+}
+
+#[test]
+fn the_side_car_is_there_after_a_kill() {
+    let folder = Folder::new("side-car");
+    let deck = folder.write("deck.toml", &plate("1e-2", ""));
+    for ranks in [1, 2] {
+        let out = folder.join(format!("out{ranks}"));
+        let mut child = run(ranks, &deck, &out, &[])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        while ResultReader::open(&result(&out)).map_or(0, |it| it.times().map_or(0, |t| t.len()))
+            < 2
+        {
+            std::thread::sleep(Duration::from_millis(20));
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "the run ended by itself"
+            );
+        }
+        for process in rank_processes(&child, ranks) {
+            send("-KILL", process);
+        }
+        wait(child);
+        let text = std::fs::read_to_string(out.join("result.xdmf")).unwrap();
+        assert!(
+            text.contains("<Time Value=\"0.0\"/>") && text.ends_with("</Xdmf>\n"),
+            "{text}"
+        );
+    }
 }

@@ -19,7 +19,7 @@ fn block(dimension: &'static str, law: &str) -> System {
         _ => (3, "[0, 0]", "[7, 8]"),
     };
     let text = format!(
-        "grid = {{ spacing = 1, horizon = {horizon} }}
+        "grid = {{ volume_correction = 'none', spacing = 1, horizon = {horizon} }}
         material.rubber.{law}
         body.block = {{ material = 'rubber', shape.box = {{ lower = {lower}, upper = {upper} }} }}
         "
@@ -31,7 +31,7 @@ fn block(dimension: &'static str, law: &str) -> System {
 fn pair(laws: [&str; 2]) -> System {
     let [left, right] = laws;
     let text = format!(
-        "grid = {{ spacing = 1, horizon = 3 }}
+        "grid = {{ volume_correction = 'none', spacing = 1, horizon = 3 }}
         material.left.{left}
         material.right.{right}
         body.left = {{ material = 'left', shape.box = {{ lower = [0, 0], upper = [5, 6] }} }}

@@ -11,7 +11,7 @@ fn plate(extra: &str) -> String {
     format!(
         "dimension = 'plane-stress'
         thickness = 0.5
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3 }}
         material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
         body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [12, 8] }} }}
         {extra}
@@ -323,12 +323,13 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
         }
     }
     let expected = sum / (std::f64::consts::PI * 81.0);
-    let found = interior(&body("3d", "pmb", space, ""), 0).unwrap();
+    let none = ", volume_correction = 'none'";
+    let found = interior(&body("3d", "pmb", space, none), 0).unwrap();
     assert_eq!(found.neighbours, 122);
     assert!((found.wanted[0] / (10.0 / 3.0) - 1.0).abs() < 1e-12);
     assert!((found.bulk / found.wanted[0] / expected - 1.0).abs() < 1e-6);
     // The ordinary law has the exact bulk modulus, and shear moduli 11 % above and 16.5 % below.
-    let found = interior(&body("3d", "ordinary", space, ""), 0).unwrap();
+    let found = interior(&body("3d", "ordinary", space, none), 0).unwrap();
     assert!((found.bulk / found.wanted[0] - 1.0).abs() < 1e-6);
     let shear = found
         .shear
@@ -336,6 +337,22 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
         .map(|modulus| modulus / found.wanted[1] - 1.0);
     assert!((shear[0] - 0.11).abs() < 5e-3, "{shear:?}");
     assert!((shear[1] + 0.165).abs() < 5e-3, "{shear:?}");
+    // By default all are right within some per cent.
+    let plane = "lower = [0, 0], upper = [1, 1]";
+    for (dimension, law, corners, most) in [
+        ("plane-stress", "pmb", plane, 0.04),
+        ("plane-stress", "ordinary", plane, 0.02),
+        ("plane-strain", "ordinary", plane, 0.02),
+        ("3d", "pmb", space, 0.03),
+        ("3d", "ordinary", space, 0.0065),
+    ] {
+        let found = interior(&body(dimension, law, corners, ""), 0).unwrap();
+        let shear = found.shear.unwrap();
+        for (modulus, wanted) in [(found.bulk, 0), (shear[0], 1), (shear[1], 1)] {
+            let off = modulus / found.wanted[wanted] - 1.0;
+            assert!(off.abs() < most, "{dimension} {law} {off}");
+        }
+    }
     for (dimension, corners) in [
         ("1d", "lower = [0], upper = [1]"),
         ("plane-stress", "lower = [0, 0], upper = [1, 1]"),
@@ -393,7 +410,7 @@ fn the_size_of_a_run_without_making_it() {
     let found = size(&plan(&wide)).unwrap();
     assert_eq!(found.directed_bonds, 96.0 * 95.0);
     let large = "dimension = '3d'
-        grid = { spacing = 5e-4, horizon = 1.5e-3 }
+        grid = { volume_correction = 'none', spacing = 5e-4, horizon = 1.5e-3 }
         material.glass.pmb = { density = 2, youngs_modulus = 5 }
         body.cube = { material = 'glass', shape.box = { lower = [0, 0, 0], upper = [1, 1, 1] } }
         time.end = 1";

@@ -11,7 +11,7 @@ use fissure::solver::observers::{HistoryObserver, Snapshot};
 fn plate(law: &str, alpha: f64, family: &str) -> String {
     format!(
         "dimension = 'plane-stress'
-        grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3, family = '{family}' }}
         material.sheet.{law}
         damage.brittle.critical_stretch = {{ critical_stretch = 0.03, alpha = {alpha} }}
         body.plate = {{ material = 'sheet', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [20, 12] }} }}

@@ -76,6 +76,7 @@ fn pulse_speed(horizon: f64, bodies: impl Fn(f64) -> String) -> f64 {
     let text = format!(
         "dimension = '3d'
         [grid]
+        volume_correction = 'none'
         spacing = 1
         horizon = {horizon}
         origin = [0.5, 0.5, 0.5]

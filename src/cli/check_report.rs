@@ -184,12 +184,12 @@ pub fn size(report: &mut Report, points: u64, bonds: u64) {
     report.line("bonds", count(bonds));
 }
 
-/// Memory and files; `ghosts` as a share of a rank's own points, if that is known.
-pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: Option<f64>) {
-    let memory = cost.memory / f64::from(ranks) * (1.0 + ghosts.unwrap_or(0.0));
+/// Memory and files; `ghosts` as a share of a rank's own points.
+pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
+    let memory = bytes(cost.memory_of_a_rank(ranks, ghosts));
     report.line(
         "memory of each rank",
-        format_args!("about {} on {ranks} rank(s)", bytes(memory)),
+        format_args!("about {memory} on {ranks} rank(s)"),
     );
     report.line(
         "result",
@@ -242,16 +242,4 @@ pub fn iteration_time(report: &mut Report, seconds: f64, ranks: u32) {
             duration(seconds / f64::from(ranks))
         ),
     );
-}
-
-/// Ghosts of a rank as a share of its own points, if the ranks' parts were cubes.
-pub fn ghost_share(plan: &Plan, survey: &Survey, ranks: u32) -> Option<f64> {
-    if ranks == 1 {
-        return None;
-    }
-    let volume: f64 = survey.bodies.iter().map(|body| body.volume).sum();
-    let extent = volume / plan.dimension.section() / f64::from(ranks);
-    let dimension = plan.dimension.count() as i32;
-    let edge = extent.powf(1.0 / f64::from(dimension));
-    Some((1.0 + 2.0 * plan.horizon / edge).powi(dimension) - 1.0)
 }

@@ -3,12 +3,14 @@
 use fissure::deck;
 use fissure::error::Result;
 
-use super::{DeckArguments, print};
+use super::{DeckArguments, each, print};
 
-/// Prints the deck.
+/// Prints the decks.
 ///
 /// # Errors
-/// When the deck is wrong or the output is full.
+/// When a deck is wrong or the output is full.
 pub fn explain(arguments: &DeckArguments) -> Result<()> {
-    print(&deck::read(&arguments.deck, &arguments.set)?.explain()?)
+    each(&arguments.decks, |deck| {
+        print(&deck::read(deck, &arguments.set)?.explain()?)
+    })
 }

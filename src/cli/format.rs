@@ -1,5 +1,8 @@
 //! Numbers for people.
 
+/// Values from here on have no prefix.
+const TOO_LARGE: f64 = 1e16;
+
 /// A value with an SI prefix and its unit, such as `50.0 µs`.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 9] = [
@@ -14,6 +17,9 @@ pub fn si(value: f64, unit: &str) -> String {
         (1e-12, "p"),
     ];
     let size = value.abs();
+    if !value.is_finite() || size >= TOO_LARGE {
+        return format!("{value:.3e} {unit}");
+    }
     // Half a unit of the last digit shown, so that 999.96 is not shown as 1000.0.
     let prefix = PREFIXES.iter().find(|(factor, _)| size >= 0.99995 * factor);
     match prefix {
@@ -89,6 +95,10 @@ mod tests {
         assert_eq!(si(9.99996e-4, "s"), "1.000 ms");
         assert_eq!(si(-2.5e9, "Pa"), "-2.500 GPa");
         assert_eq!(si(0.0, "J"), "0 J");
+        assert_eq!(si(2e15, "Pa"), "2000 TPa");
+        assert_eq!(si(-3e18, "Pa"), "-3.000e18 Pa");
+        assert_eq!(si(f64::INFINITY, "kg"), "inf kg");
+        assert_eq!(si(f64::NAN, "kg"), "NaN kg");
         assert_eq!(count(1234567), "1 234 567");
         assert_eq!(count(12), "12");
         assert_eq!(duration(0.25), "250.0 ms");

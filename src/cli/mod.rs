@@ -11,6 +11,7 @@ mod launch;
 mod machine_limits;
 mod memory;
 mod plot;
+mod plot_paths;
 mod progress;
 mod report;
 mod run;
@@ -37,7 +38,7 @@ macro_rules! tell {
 pub(crate) use tell;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -89,7 +90,7 @@ enum Command {
 /// Run a deck, alone or under mpirun.
 ///
 /// Writes result.vtkhdf (opens in ParaView 5.12 and later), result.xdmf (for older ParaView) and
-/// history.csv into the output folder.
+/// history.csv into the output folder, and crack_NAME.csv for each crack whose path the deck asks for.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -156,10 +157,12 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 #[command(after_help = "\
 Examples:
   fissure check plate.toml
-  fissure check plate.toml --ranks 256          memory estimated for 256 ranks")]
+  fissure check plate.toml --ranks 256          memory estimated for 256 ranks
+  fissure check -q *.toml                       whether decks are right")]
 struct CheckArguments {
-    /// The deck.
-    deck: PathBuf,
+    /// The deck, or several, all of which are looked at.
+    #[arg(required = true, value_name = "DECK")]
+    decks: Vec<PathBuf>,
 
     /// Give a parameter of the deck another value; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -179,7 +182,8 @@ Examples:
   fissure plot out/plate/result.vtkhdf
   fissure plot out/plate/result.vtkhdf --field strain_energy_density --time 25e-6
   fissure plot out/plate/result.vtkhdf --time all -o frames.png     frames_0000.png, …
-  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0")]
+  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0
+  fissure plot out/plate/result.vtkhdf --path out/plate/crack_main.csv")]
 struct PlotArguments {
     /// The result, a .vtkhdf file.
     result: PathBuf,
@@ -204,6 +208,11 @@ struct PlotArguments {
     #[arg(long, value_name = "AXIS=POSITION")]
     slice: Option<String>,
 
+    /// Draw lines over a plane picture: a CSV file with columns x and y (m), and branch where there are
+    /// several, such as crack_NAME.csv; may be repeated.
+    #[arg(long, value_name = "FILE.csv")]
+    path: Vec<PathBuf>,
+
     /// Range of the colours, such as 0,1 [default: that of the values].
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     range: Option<String>,
@@ -219,8 +228,9 @@ struct PlotArguments {
 Example:
   fissure explain plate.toml > plate_in_full.toml")]
 struct DeckArguments {
-    /// The deck.
-    deck: PathBuf,
+    /// The deck, or several.
+    #[arg(required = true, value_name = "DECK")]
+    decks: Vec<PathBuf>,
 
     /// Give a parameter of the deck another value; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -334,6 +344,24 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => init::init(&arguments, verbosity),
     };
     finish(outcome, true)
+}
+
+/// Works on one deck after the other. An error of one does not keep the others from being looked at: it is
+/// printed, but for the last one, which is returned.
+///
+/// # Errors
+/// The last error of a deck.
+fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<()> {
+    let mut latest = Ok(());
+    for deck in decks {
+        let done = work(deck);
+        if done.is_err()
+            && let Err(error) = std::mem::replace(&mut latest, done)
+        {
+            tell!("error: {error}");
+        }
+    }
+    latest
 }
 
 /// Prints what a command was asked for. A reader that has closed the output has had enough.

@@ -8,6 +8,7 @@ use fissure::output::ResultReader;
 use fissure::picture::{Axis, Scene, View, render};
 
 use super::format::si;
+use super::plot_paths::{self, Line};
 use super::{PlotArguments, Verbosity, file_error};
 
 /// The largest drawn displacement for `--deform auto`, as a share of the body's size.
@@ -89,6 +90,8 @@ struct Look<'a> {
     sizes: Vec<f64>,
     range: Option<(f64, f64)>,
     view: View,
+    /// Lines over the picture, file by file.
+    paths: Vec<Vec<Line>>,
 }
 
 impl<'a> Look<'a> {
@@ -110,6 +113,10 @@ impl<'a> Look<'a> {
                 names.join(", ")
             )));
         };
+        if dimension != 2 && !arguments.path.is_empty() {
+            return Err(Error::input("--path is for results of plane problems"));
+        }
+        let paths = arguments.path.iter().map(|path| plot_paths::read(path));
         let power = 1.0 / dimension as f64;
         let volumes = result.field("volume", 0)?;
         Ok(Self {
@@ -124,6 +131,7 @@ impl<'a> Look<'a> {
                 .collect(),
             range: arguments.range.as_deref().map(range).transpose()?,
             view: view(arguments.slice.as_deref(), dimension)?,
+            paths: paths.collect::<Result<_>>()?,
             result,
             arguments,
             dimension,
@@ -177,6 +185,7 @@ impl<'a> Look<'a> {
             .zip(displacements.chunks_exact(3))
             .map(|(x, u)| std::array::from_fn(|d| x[d] + factor * u[d]))
             .collect();
+        let lines = self.moved_paths(&displacements, factor);
         let title = format!(
             "{}   t = {}   deformation × {factor}",
             self.title,
@@ -196,10 +205,30 @@ impl<'a> Look<'a> {
             range: self.range,
             view: self.view,
             width: self.arguments.width,
+            lines: &lines,
         });
         image
             .write_png(path)
             .map_err(|error| file_error(path, "write", &error))
+    }
+}
+
+impl Look<'_> {
+    /// The lines to draw, each with the number of its file: every vertex moves with the point that is
+    /// nearest to it.
+    fn moved_paths(&self, displacements: &[f64], factor: f64) -> Vec<(usize, Vec<[f64; 3]>)> {
+        let moved = |place: &[f64; 2]| {
+            let distance = |point: &[f64; 3]| (point[0] - place[0]).hypot(point[1] - place[1]);
+            let points = self.positions.iter().zip(displacements.chunks_exact(3));
+            let nearest = points.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+            let [x, y] = nearest.map_or([0.0; 2], |(_, u)| [u[0], u[1]]);
+            [place[0] + factor * x, place[1] + factor * y, 0.0]
+        };
+        let line = |number: usize, line: &Line| (number, line.iter().map(moved).collect());
+        let files = self.paths.iter().enumerate();
+        files
+            .flat_map(|(number, lines)| lines.iter().map(move |own| line(number, own)))
+            .collect()
     }
 }
 

@@ -129,9 +129,14 @@ impl Observer for Log {
                     say!("the run was complete already");
                 }
             }
-            Message::SetAside(path) if self.speaks => {
-                let path = path.display();
-                say!("other outputs are asked for, or the result is gone: it is kept as {path}");
+            Message::SetAside { why, kept } if self.rank == 0 => {
+                let kept: Vec<String> =
+                    kept.iter().map(|path| path.display().to_string()).collect();
+                let kept = match kept.is_empty() {
+                    true => String::new(),
+                    false => format!("; it is kept as {}", kept.join(" and ")),
+                };
+                tell!("warning: {why}: a new result begins here{kept}");
             }
             Message::Decided(decided) if self.speaks && self.verbose => {
                 say!("decided");

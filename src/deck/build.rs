@@ -29,7 +29,7 @@ impl Plan {
             title: String::new(),
             dimension,
             horizon,
-            volume_correction: VolumeCorrection::None,
+            volume_correction: VolumeCorrection::Exact,
             quadrature: Quadrature::Midpoint,
             family: FamilyRule::Auto,
             interface: Interface {
@@ -56,13 +56,17 @@ impl Plan {
             output: Output {
                 every: Interval::Seconds(end / OUTPUTS),
                 fields: DEFAULT_FIELDS.to_vec(),
+                single: false,
+                set: None,
             },
             history: History {
                 every: Interval::Seconds(end / ROWS),
                 reactions: Vec::new(),
+                support_forces: Vec::new(),
                 damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
                 probes: Vec::new(),
                 fronts: Vec::new(),
+                cracks: Vec::new(),
                 tips: Vec::new(),
             },
             checkpoint: CheckpointRule::default(),

@@ -16,6 +16,9 @@ const FREE: [&str; 5] = ["title", "parameters", "output", "history", "checkpoint
 /// Keys within sections that a restart may change.
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
+/// Keys of the history that say how often there is a row.
+const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
+
 /// Sections in which the order counts: later entries take precedence over earlier ones.
 const ORDERED: [&str; 3] = ["body", "initial", "condition"];
 
@@ -25,6 +28,37 @@ const ORDERED: [&str; 3] = ["body", "initial", "condition"];
 /// # Errors
 /// When a deck cannot be parsed.
 pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
+    compared(old, new, |comparison, old, new| {
+        comparison.compare("", Some(old), Some(new))
+    })
+}
+
+/// What differs in the meaning of the history's columns, as [`differences`]; how often there is a row
+/// means nothing.
+///
+/// # Errors
+/// When a deck cannot be parsed.
+pub fn history_differences(old: &Source, new: &Source) -> Result<Vec<String>> {
+    compared(old, new, |comparison, old, new| {
+        let keys = |deck: &Value| {
+            let table = deck.get("history").and_then(Value::as_table);
+            table.cloned().unwrap_or_default()
+        };
+        let (old, new) = (keys(old), keys(new));
+        let added = new.keys().filter(|key| !old.contains_key(*key));
+        for key in old.keys().chain(added) {
+            if !HOW_OFTEN.contains(&key.as_str()) {
+                comparison.compare(&format!("history.{key}"), old.get(key), new.get(key));
+            }
+        }
+    })
+}
+
+fn compared(
+    old: &Source,
+    new: &Source,
+    compare: impl FnOnce(&mut Comparison<'_>, &Value, &Value),
+) -> Result<Vec<String>> {
     let decks = (Deck::new(old.clone())?, Deck::new(new.clone())?);
     let old_scope = Scope::of(old, &decks.0.grammar)?;
     let new_scope = Scope::of(new, &decks.1.grammar)?;
@@ -38,7 +72,7 @@ pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
         scopes: [&old_scope, &new_scope],
         lines: Vec::new(),
     };
-    comparison.compare("", Some(&table(old)?), Some(&table(new)?));
+    compare(&mut comparison, &table(old)?, &table(new)?);
     Ok(comparison.lines)
 }
 
@@ -164,6 +198,19 @@ mod tests {
             )
             .is_empty()
         );
+    }
+
+    #[test]
+    fn what_the_columns_of_a_history_mean() {
+        let deck = |history: &str| source(&format!("{DECK}\n history = {{ {history} }}"));
+        let old = deck("every = 1, damage_threshold = 0.3, probe.end.at = ['2*dx']");
+        let against = |history: &str| history_differences(&old, &deck(history)).unwrap();
+        let same = "every_steps = 2, damage_threshold = 0.3, probe.end.at = [1.0]";
+        assert!(against(same).is_empty());
+        let lines = against("every = 1, damage_threshold = 0.3, probe.end.at = [2]");
+        assert_eq!(lines, ["history.probe.end.at[0]: was `2*dx` = 1, is 2"]);
+        let lines = against("every = 1, damage_threshold = 0.4, probe.end.at = ['2*dx']");
+        assert_eq!(lines, ["history.damage_threshold: was 0.3, is 0.4"]);
     }
 
     #[test]

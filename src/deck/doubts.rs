@@ -60,6 +60,8 @@ fn used_sets(deck: &Deck) -> IndexSet<&str> {
     let conditions = deck.condition.values().map(|table| &table.get_ref().set);
     let initials = deck.initial.values().map(|table| &table.get_ref().set);
     let tips = history.tip.values().map(|table| &table.get_ref().set);
+    let cracks = history.crack.values().map(|table| &table.get_ref().set);
+    let forces = history.force.values().map(|table| &table.get_ref().set);
     let zones = deck
         .damage
         .values()
@@ -70,6 +72,8 @@ fn used_sets(deck: &Deck) -> IndexSet<&str> {
     conditions
         .chain(initials)
         .chain(tips)
+        .chain(cracks)
+        .chain(forces)
         .chain(zones)
         .chain(&history.reactions)
         .map(|name| &name.get_ref()[..])

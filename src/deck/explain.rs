@@ -1,8 +1,10 @@
 //! A deck with every default filled in.
 
-use super::grammar::{DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, common_keys};
+use super::grammar::{
+    DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, VolumeCorrection, common_keys,
+};
 use super::number::{Edges, Number, Written, default_number};
-use super::plan::{CheckpointRule, Interval, Plan};
+use super::plan::{self, CheckpointRule, Interval, Plan};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
@@ -31,6 +33,13 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         Dimension::Space => {}
     }
     let grid = deck.grid.get_mut();
+    let correction = match plan.volume_correction {
+        plan::VolumeCorrection::None => VolumeCorrection::None,
+        plan::VolumeCorrection::Linear => VolumeCorrection::Linear,
+        plan::VolumeCorrection::Exact => VolumeCorrection::Exact,
+    };
+    grid.volume_correction
+        .get_or_insert(Spanned::new(0..0, correction));
     let zeros = vec![default_number(0.0); plan.dimension.count()];
     grid.origin = grid.origin.take().or(Some(Spanned::new(0..0, zeros)));
     for body in deck.body.values_mut().map(|body| body.get_mut()) {
@@ -81,6 +90,10 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         .or(number(plan.history.damage_threshold));
     for front in history.front.values_mut().map(|table| table.get_mut()) {
         front.radius = front.radius.take().or(Some(grid.horizon.clone()));
+    }
+    for crack in history.crack.values_mut().map(|table| table.get_mut()) {
+        let threshold = history.damage_threshold.clone();
+        crack.threshold = crack.threshold.take().or(threshold);
     }
     for tip in history.tip.values_mut().map(|table| table.get_mut()) {
         let threshold = history.damage_threshold.clone();

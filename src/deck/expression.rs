@@ -41,6 +41,7 @@
 //! only on the exponent's value, not on whether it was written as a number.
 
 mod evaluate;
+mod increment;
 mod names;
 mod parse;
 mod token;
@@ -171,6 +172,13 @@ impl Expression {
     pub fn evaluate(&self, position: [f64; 3], time: f64) -> f64 {
         let [x, y, z] = position;
         evaluate::evaluate(&self.code, self.stack_size, [x, y, z, time])
+    }
+
+    /// By how much the value changes from a time on while the time goes on by a step, or back by a negative
+    /// one; with an error of rounding that is one of the change, not of the value.
+    pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
+        let [x, y, z] = position;
+        increment::increment(&self.code, [x, y, z, time], step)
     }
 
     /// Whether the value is not 0.

@@ -112,9 +112,10 @@ pub struct Grid {
     /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
-    /// What the volumes of points near the edge of a family count: `"none"`, `"linear"` or `"exact"`.
-    #[serde(default = "no_correction")]
-    pub volume_correction: Spanned<VolumeCorrection>,
+    /// What the volumes of points near the edge of a family count: `"exact"`, `"linear"` or `"none"`; if not
+    /// given, `"exact"` where all points are centres of square or cubic cells, and else `"none"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_correction: Option<Spanned<VolumeCorrection>>,
     /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
@@ -141,18 +142,14 @@ pub enum Family {
     Lattice,
 }
 
-fn no_correction() -> Spanned<VolumeCorrection> {
-    Spanned::new(0..0, VolumeCorrection::None)
-}
-
 /// How volumes near the edge of a family are corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum VolumeCorrection {
     /// Points within the horizon count whole.
     None,
-    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too; LAMMPS ends this
-    /// taper at δ.
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too (PA-HHB); LAMMPS ends
+    /// this taper at δ, Peridigm has none.
     Linear,
     /// Points count the share of their cell within the horizon.
     Exact,
@@ -306,7 +303,7 @@ pub struct CriticalStretch {
     /// The critical stretch s0 itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub critical_stretch: Option<Number>,
-    /// α in s ≥ s0 − α s_min; 0.25 if not given, 0 for a plain critical stretch.
+    /// α in s ≥ s0 − α s_min; 0 if not given, a plain critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
     /// Sets of points whose bonds never break.
@@ -352,7 +349,7 @@ fn no_alpha() -> Number {
 }
 
 fn default_alpha() -> Number {
-    default_number(0.25)
+    default_number(0.0)
 }
 
 /// A body: a shape filled with lattice points, or a file of points.
@@ -468,6 +465,9 @@ pub enum Crack {
         from: Vector,
         /// The other end.
         to: Vector,
+        /// Width in m of a cut with two faces, half on each side; 0 if not given.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
     },
     /// A parallelogram (3-D).
     Rectangle {
@@ -477,6 +477,9 @@ pub enum Crack {
         edge_a: Vector,
         /// The edge from the corner to the other neighbouring one.
         edge_b: Vector,
+        /// As of a segment.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
     },
     /// A flat disc (3-D).
     Disc {
@@ -486,6 +489,9 @@ pub enum Crack {
         normal: Vector,
         /// Radius.
         radius: Number,
+        /// As of a segment.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
     },
 }
 
@@ -721,6 +727,23 @@ pub struct Output {
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
+    /// Of the fields that change in time: `"double"`, 8 bytes a number, or `"single"`, 4 bytes.
+    #[serde(default)]
+    pub precision: Precision,
+    /// The set whose points the result holds; all points if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub set: Option<Text>,
+}
+
+/// How long the numbers of a result are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 8 bytes: every bit.
+    #[default]
+    Double,
+    /// 4 bytes: seven digits.
+    Single,
 }
 
 /// The history: sums and probes over time.
@@ -733,9 +756,12 @@ pub struct History {
     /// Steps between rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<NonZeroU64>>,
-    /// Sets whose reaction force is recorded.
+    /// Sets whose reaction force is recorded, by component.
     #[serde(default)]
     pub reactions: Vec<Text>,
+    /// Forces of supports along a direction, by name.
+    #[serde(default)]
+    pub force: Tables<SupportForce>,
     /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage_threshold: Option<Number>,
@@ -745,6 +771,9 @@ pub struct History {
     /// Fronts that are followed along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
+    /// Cracks whose path and length are found, by name; plane problems.
+    #[serde(default)]
+    pub crack: Tables<CrackPath>,
     /// Crack tips that are followed, by name.
     #[serde(default)]
     pub tip: Tables<Tip>,
@@ -764,6 +793,31 @@ pub struct Checkpoint {
     /// Simulated time between checkpoints in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_time: Option<Number>,
+}
+
+/// The force of the supports on a set along a direction.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportForce {
+    /// The set.
+    pub set: Text,
+    /// The direction in which the force counts, of any length.
+    pub direction: Vector,
+}
+
+/// A crack: the lines through the middle of the damage that hangs together from a place on, each
+/// branch by itself.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrackPath {
+    /// Where the crack starts, m; damage within one horizon of it belongs to the crack.
+    pub from: Vector,
+    /// The points that are looked at; all if not given.
+    #[serde(default = "all_points")]
+    pub set: Text,
+    /// What the damage must exceed; `damage_threshold` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<Number>,
 }
 
 /// A place to watch.

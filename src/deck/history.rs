@@ -41,6 +41,9 @@ pub fn history(
         }
         suits_a_column(scope, "[history] reactions", set.get_ref(), set)?;
     }
+    let forces = resolve_each(&history.force, |name, table| {
+        support_force(scope, name, table, sets)
+    })?;
     let probes = resolve_each(&history.probe, |name, probe| {
         let key = column_name(scope, "probe", name, probe)?;
         Ok(plan::Probe {
@@ -58,6 +61,9 @@ pub fn history(
     let fronts = resolve_each(&history.front, |name, table| {
         front(scope, name, table, horizon)
     })?;
+    let cracks = resolve_each(&history.crack, |name, table| {
+        crack(scope, name, table, sets, damage_threshold)
+    })?;
     let tips = resolve_each(&history.tip, |name, table| {
         tip(scope, name, table, sets, damage_threshold)
     })?;
@@ -74,9 +80,11 @@ pub fn history(
             .iter()
             .map(reaction)
             .collect::<Result<_>>()?,
+        support_forces: forces.into_values().collect(),
         damage_threshold,
         probes: probes.into_values().collect(),
         fronts: fronts.into_values().collect(),
+        cracks: cracks.into_values().collect(),
         tips: tips.into_values().collect(),
     })
 }
@@ -143,6 +151,19 @@ const ENTRIES: [(&str, usize); 6] = [
     ("xz", 3),
 ];
 
+/// Names of the entries of a tensor, row by row.
+const TENSOR: [(&str, usize); 9] = [
+    ("xx", 1),
+    ("xy", 2),
+    ("xz", 3),
+    ("yx", 2),
+    ("yy", 2),
+    ("yz", 3),
+    ("zx", 3),
+    ("zy", 3),
+    ("zz", 3),
+];
+
 /// Names of the entries of a vector.
 const AXES: [(&str, usize); 3] = [("x", 1), ("y", 2), ("z", 3)];
 
@@ -157,7 +178,8 @@ fn component(
     let names: &[(&str, usize)] = match field.components() {
         1 => &[],
         3 => &AXES,
-        _ => &ENTRIES,
+        6 => &ENTRIES,
+        _ => &TENSOR,
     };
     let there = names.iter().filter(|(_, least)| *least <= scope.dimension);
     match component {
@@ -186,6 +208,51 @@ fn component(
             Ok(names.iter().position(|(name, _)| *name == wanted))
         }
     }
+}
+
+fn support_force(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::SupportForce>,
+    sets: &[plan::Set],
+) -> Result<plan::SupportForce> {
+    let key = column_name(scope, "force", name, table)?;
+    let force = table.get_ref();
+    Ok(plan::SupportForce {
+        name: name.to_owned(),
+        span: table.span(),
+        set: find_set(scope, &force.set, sets, &format!("{key} set"))?,
+        direction: scope.direction(&force.direction, &format!("{key} direction"))?,
+    })
+}
+
+fn crack(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::CrackPath>,
+    sets: &[plan::Set],
+    damage_threshold: f64,
+) -> Result<plan::CrackPath> {
+    let key = column_name(scope, "crack", name, table)?;
+    if scope.dimension != 2 {
+        let message = format!(
+            "{key}: paths are found in plane problems only, this one is {}-D; `[history.tip.{name}]` \
+             follows the tip of a crack in any",
+            scope.dimension
+        );
+        return Err(scope.error(table.span(), message));
+    }
+    let crack = table.get_ref();
+    Ok(plan::CrackPath {
+        name: name.to_owned(),
+        span: table.span(),
+        from: scope.vector(&crack.from, &format!("{key} from"))?,
+        set: find_set(scope, &crack.set, sets, &format!("{key} set"))?,
+        threshold: match &crack.threshold {
+            None => damage_threshold,
+            Some(number) => damage(scope, number, &format!("{key} threshold"))?,
+        },
+    })
 }
 
 fn tip(

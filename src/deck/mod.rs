@@ -28,7 +28,7 @@ mod validate;
 
 use std::path::Path;
 
-pub use difference::differences;
+pub use difference::{differences, history_differences};
 pub use number::shown;
 pub use plan::Plan;
 pub use source::Source;

@@ -27,8 +27,10 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
     all(scope, "initial", &deck.initial)?;
     all(scope, "condition", &deck.condition)?;
     all(scope, "interface.pair", &deck.interface.pair)?;
+    all(scope, "history.force", &history.force)?;
     all(scope, "history.probe", &history.probe)?;
     all(scope, "history.front", &history.front)?;
+    all(scope, "history.crack", &history.crack)?;
     all(scope, "history.tip", &history.tip)
 }
 

@@ -4,10 +4,11 @@ use std::num::NonZeroU64;
 
 use serde_spanned::Spanned;
 
-use super::grammar::Deck;
+use super::grammar::{self, Deck};
 use super::number::Number;
 use super::plan;
 use super::resolve::{Scope, find};
+use super::sets::find_set;
 use crate::error::Result;
 
 /// How often something is written: one of two keys, or every `default` seconds.
@@ -37,8 +38,8 @@ pub fn interval(
 /// Validates what is written to the result; `end` (s) is the end of the run.
 ///
 /// # Errors
-/// On an unknown field and on a wrong interval.
-pub fn output(scope: &Scope, deck: &Deck, end: f64) -> Result<plan::Output> {
+/// On an unknown field or set and on a wrong interval.
+pub fn output(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Result<plan::Output> {
     let output = deck.output.get_ref();
     let names = plan::Field::ALL.map(plan::Field::name);
     let fields = match &output.fields {
@@ -68,6 +69,11 @@ pub fn output(scope: &Scope, deck: &Deck, end: f64) -> Result<plan::Output> {
             end / OUTPUTS,
         )?,
         fields,
+        single: output.precision == grammar::Precision::Single,
+        set: match &output.set {
+            None => None,
+            Some(name) => Some((find_set(scope, name, sets, "[output] set")?, name.span())),
+        },
     })
 }
 

@@ -326,6 +326,8 @@ pub enum Crack {
         from: [f64; 3],
         /// The other.
         to: [f64; 3],
+        /// From face to face, half on each side; 0 for a cut without width.
+        width: f64,
     },
     /// A parallelogram.
     Rectangle {
@@ -335,6 +337,8 @@ pub enum Crack {
         edge_a: [f64; 3],
         /// The other edge from it.
         edge_b: [f64; 3],
+        /// As of a segment.
+        width: f64,
     },
     /// A flat disc.
     Disc {
@@ -344,6 +348,8 @@ pub enum Crack {
         normal: [f64; 3],
         /// Radius.
         radius: f64,
+        /// As of a segment.
+        width: f64,
     },
 }
 
@@ -492,6 +498,10 @@ pub struct Output {
     pub every: Interval,
     /// Which fields.
     pub fields: Vec<Field>,
+    /// Whether the fields are rounded to 4-byte numbers.
+    pub single: bool,
+    /// Index of the set whose points the result holds, and where it is named; `None` for all points.
+    pub set: Option<(usize, Range<usize>)>,
 }
 
 /// The history.
@@ -499,14 +509,18 @@ pub struct Output {
 pub struct History {
     /// How often.
     pub every: Interval,
-    /// Sets whose reaction force is recorded.
+    /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
+    /// Forces of supports along a direction.
+    pub support_forces: Vec<SupportForce>,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
     /// Places that are watched.
     pub probes: Vec<Probe>,
     /// Fronts that are followed.
     pub fronts: Vec<Front>,
+    /// Cracks whose path is found.
+    pub cracks: Vec<CrackPath>,
     /// Crack tips that are followed.
     pub tips: Vec<Tip>,
 }
@@ -518,6 +532,34 @@ pub struct Reaction {
     pub set: usize,
     /// Where it is named.
     pub span: Range<usize>,
+}
+
+/// A set on which the force of the supports along a direction is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SupportForce {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Index of the set.
+    pub set: usize,
+    /// Unit vector.
+    pub direction: [f64; 3],
+}
+
+/// A crack whose path is found.
+#[derive(Debug, Clone)]
+pub struct CrackPath {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Where it starts, m.
+    pub from: [f64; 3],
+    /// Index of the set that is looked at.
+    pub set: usize,
+    /// What the damage must exceed.
+    pub threshold: f64,
 }
 
 /// A place whose nearest point is followed.
@@ -591,21 +633,33 @@ pub enum Field {
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
-    /// θ.
+    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane.
     Dilatation,
     /// m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
-    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz.
+    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz = ν (xx + yy), in 1-D
+    /// yy = zz = ν/(1 − ν) xx.
     Stress,
-    /// Number of intact bonds.
+    /// Σ T⊗Y Ṽ over the volume that the deformed body has for one of the undeformed: Cauchy's stress,
+    /// Pa, in the same order.
+    CauchyStress,
+    /// von Mises' equivalent of Cauchy's stress, Pa.
+    VonMisesStress,
+    /// F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row; I where too few are left.
+    DeformationGradient,
+    /// Number of intact bonds, with points in the own family or that have the point in theirs.
     Neighbours,
+    /// Number of the point's bonds that have broken since the start.
+    BrokenBonds,
+    /// 1 where a point has too few bonds left for its law and carries no force, else 0.
+    Singular,
     /// The rank that owns the point.
     Rank,
 }
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 16] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -615,7 +669,12 @@ impl Field {
         Self::Dilatation,
         Self::WeightedVolume,
         Self::Stress,
+        Self::CauchyStress,
+        Self::VonMisesStress,
+        Self::DeformationGradient,
         Self::Neighbours,
+        Self::BrokenBonds,
+        Self::Singular,
         Self::Rank,
     ];
 
@@ -631,7 +690,12 @@ impl Field {
             Self::Dilatation => "dilatation",
             Self::WeightedVolume => "weighted_volume",
             Self::Stress => "stress",
+            Self::CauchyStress => "cauchy_stress",
+            Self::VonMisesStress => "von_mises_stress",
+            Self::DeformationGradient => "deformation_gradient",
             Self::Neighbours => "neighbours",
+            Self::BrokenBonds => "broken_bonds",
+            Self::Singular => "singular",
             Self::Rank => "rank",
         }
     }
@@ -643,18 +707,25 @@ impl Field {
             Self::Velocity => "m/s",
             Self::Acceleration => "m/s^2",
             Self::ForceDensity => "N/m^3",
-            Self::Damage | Self::Dilatation | Self::Neighbours | Self::Rank => "1",
+            Self::Damage
+            | Self::Dilatation
+            | Self::DeformationGradient
+            | Self::Neighbours
+            | Self::BrokenBonds
+            | Self::Singular
+            | Self::Rank => "1",
             Self::WeightedVolume => "m^5",
-            Self::Stress => "Pa",
+            Self::Stress | Self::CauchyStress | Self::VonMisesStress => "Pa",
             Self::StrainEnergyDensity => "J/m^3",
         }
     }
 
-    /// 3 for vectors and 6 for symmetric tensors (padded with 0 in 1-D and 2-D), 1 for scalars.
+    /// 3 for vectors, 6 for symmetric tensors and 9 for others (padded in 1-D and 2-D), 1 for scalars.
     pub fn components(self) -> usize {
         match self {
             Self::Displacement | Self::Velocity | Self::Acceleration | Self::ForceDensity => 3,
-            Self::Stress => 6,
+            Self::Stress | Self::CauchyStress => 6,
+            Self::DeformationGradient => 9,
             _ => 1,
         }
     }

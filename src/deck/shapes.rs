@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use serde_spanned::Spanned;
 
 use super::grammar;
-use super::number::{Vector, shown};
+use super::number::{Number, Vector, shown};
 use super::plan;
 use super::resolve::Scope;
 use crate::error::Result;
@@ -179,8 +179,17 @@ fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result
         );
         return Err(scope.error(crack.span(), message));
     }
+    let width_of = |width: &Option<Number>| match width {
+        None => Ok(0.0),
+        Some(number) => scope.within(
+            number,
+            &format!("{key} width"),
+            0.0..f64::INFINITY,
+            "at least 0",
+        ),
+    };
     match crack.get_ref() {
-        Crack::Segment { from, to } => {
+        Crack::Segment { from, to, width } => {
             let start = scope.vector(from, &format!("{key} from"))?;
             let end = scope.vector(to, &format!("{key} to"))?;
             if start == end {
@@ -190,12 +199,14 @@ fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result
             Ok(plan::Crack::Segment {
                 from: start,
                 to: end,
+                width: width_of(width)?,
             })
         }
         Crack::Rectangle {
             corner,
             edge_a,
             edge_b,
+            width,
         } => {
             let corner = scope.vector(corner, &format!("{key} corner"))?;
             let a = scope.vector(edge_a, &format!("{key} edge_a"))?;
@@ -208,16 +219,19 @@ fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result
                 corner,
                 edge_a: a,
                 edge_b: b,
+                width: width_of(width)?,
             })
         }
         Crack::Disc {
             centre,
             normal,
             radius,
+            width,
         } => Ok(plan::Crack::Disc {
             centre: scope.vector(centre, &format!("{key} centre"))?,
             normal: scope.direction(normal, &format!("{key} normal"))?,
             radius: scope.positive(radius, &format!("{key} radius"))?,
+            width: width_of(width)?,
         }),
     }
 }

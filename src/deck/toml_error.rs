@@ -195,7 +195,7 @@ fn label(path: &[String]) -> String {
     let count = match section {
         "material" | "damage" | "crack" => 3,
         "history" => match path.get(1).map_or("", String::as_str) {
-            "probe" | "front" | "tip" => 3,
+            "force" | "probe" | "front" | "crack" | "tip" => 3,
             _ => 1,
         },
         "interface" if path.get(1).is_some_and(|key| key == "pair") => 3,

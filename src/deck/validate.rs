@@ -60,7 +60,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         initials: conditions::initials(&scope, deck, &sets)?,
         conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
         stages: time::stages(&scope, deck, &time)?,
-        output: outputs::output(&scope, deck, time.end)?,
+        output: outputs::output(&scope, deck, &sets, time.end)?,
         history: history::history(&scope, deck, &sets, time.end, horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
         sets,
@@ -143,10 +143,11 @@ fn volume_correction(
     bodies: &[plan::Body],
 ) -> Result<plan::VolumeCorrection> {
     let grid = deck.grid.get_ref();
-    let correction = match grid.volume_correction.get_ref() {
-        VolumeCorrection::None => return Ok(plan::VolumeCorrection::None),
-        VolumeCorrection::Linear => plan::VolumeCorrection::Linear,
-        VolumeCorrection::Exact => plan::VolumeCorrection::Exact,
+    let given = grid.volume_correction.as_ref();
+    let correction = match given.map(|given| given.get_ref()) {
+        Some(VolumeCorrection::None) => return Ok(plan::VolumeCorrection::None),
+        Some(VolumeCorrection::Linear) => plan::VolumeCorrection::Linear,
+        Some(VolumeCorrection::Exact) | None => plan::VolumeCorrection::Exact,
     };
     let gauss = grid.quadrature == Quadrature::Gauss;
     let without_cells = |body: &plan::Body| match &body.points {
@@ -164,11 +165,14 @@ fn volume_correction(
     let Some((name, reason)) = reason else {
         return Ok(correction);
     };
+    let Some(given) = given else {
+        return Ok(plan::VolumeCorrection::None);
+    };
     let message = format!(
         "[grid] volume_correction: only points at the centres of square or cubic lattice cells have \
          cells to correct, and [body.{name}] {reason}"
     );
-    Err(scope.error(grid.volume_correction.span(), message))
+    Err(scope.error(given.span(), message))
 }
 
 fn family(scope: &Scope, deck: &Deck) -> Result<plan::FamilyRule> {

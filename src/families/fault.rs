@@ -1,5 +1,6 @@
 //! What can be wrong with points so that they cannot be bonded.
 
+use crate::deck::plan::PointSource;
 use crate::deck::{Plan, shown};
 use crate::error::Error;
 use crate::points::Point;
@@ -80,6 +81,11 @@ fn too_many_neighbours(
         "[grid] horizon".to_owned()
     } else {
         format!("[body.{}] horizon", body.name)
+    };
+    // The horizon itself, where the longest bond may be longer: cells are shared.
+    let spacings = match &other.points {
+        PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),
+        PointSource::File { .. } => spacings,
     };
     let is = match spacings {
         Some(spacings) => format!(" is {spacings:.0} spacings of [body.{}]", other.name),

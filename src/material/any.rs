@@ -158,6 +158,10 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::point_energy(law, numbers))
     }
 
+    fn needs_shape(&self) -> bool {
+        with_law!(self, law => Law::<D>::needs_shape(law))
+    }
+
     fn is_singular(&self, numbers: &[f64]) -> bool {
         with_law!(self, law => Law::<D>::is_singular(law, numbers))
     }

@@ -16,11 +16,14 @@ mod influence;
 mod linear_microelastic;
 mod normalised;
 mod ordinary;
+mod ordinary_plastic;
+mod ordinary_viscoelastic;
 mod pmb;
 mod registration;
 
 pub use any::{Counts, MOST};
 pub use bond::Bond;
+pub use correspondence::{FamilyShare, ShapeTensor, determinant, family_share};
 pub use declaration::{
     Built, Declaration, Declared, Given, Invariants, Key, Kind, LawFault, OfLength, Value, Values,
     Word,
@@ -36,6 +39,8 @@ registration::register! {
     normalised::Normalised,
     linear_microelastic::LinearMicroelastic,
     ordinary::Ordinary,
+    ordinary_plastic::OrdinaryPlastic,
+    ordinary_viscoelastic::OrdinaryViscoelastic,
     correspondence::Correspondence,
 }
 
@@ -170,6 +175,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// The part of a point's strain energy density (J/m³) that belongs to no single bond.
     fn point_energy(&self, _numbers: &[f64]) -> f64 {
         0.0
+    }
+
+    /// Whether points need enough bonds in all directions.
+    fn needs_shape(&self) -> bool {
+        false
     }
 
     /// Whether a point has too few bonds left for the law, and carries no force.

@@ -18,7 +18,8 @@
 
 use super::bond::Weights;
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law, Word,
+    Along, AnyLaw, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law,
+    Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -52,8 +53,21 @@ impl Ordinary {
     }
 
     /// From what a body has, in the plane or in space.
-    fn of(given: &Given) -> Self {
+    pub(super) fn of(given: &Given) -> Self {
         Self::new(given.dimension, given.elastic).expect("the law declares that it has no 1-D form")
+    }
+
+    /// d κ θ/m (N/m⁷) and θ from A/m and Σ ω|ξ|εṼ.
+    #[inline(always)]
+    pub(super) fn dilated(&self, pull: f64, sum: f64) -> [f64; 2] {
+        let share = self.dimension * pull / self.extensional;
+        let dilatation = share * sum;
+        [share * self.volumetric * dilatation, dilatation]
+    }
+
+    /// ½ κθ², J/m³.
+    pub(super) fn dilatation_energy(&self, dilatation: f64) -> f64 {
+        0.5 * self.volumetric * dilatation.powi(2)
     }
 
     /// d.
@@ -86,7 +100,7 @@ fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
     }
 }
 
-const INFLUENCE: Key = Key {
+pub(super) const INFLUENCE: Key = Key {
     name: "influence",
     meaning: "ω of bonds of length r and a horizon δ: 1, 1 − r/δ, exp(−4r²/δ²) or δ/r",
     kind: Kind::Word(&[
@@ -115,7 +129,12 @@ impl Declared for Ordinary {
 }
 
 fn build(given: &Given) -> Built {
-    let (law, horizon) = (Ordinary::of(given), given.horizon);
+    with_influence(Ordinary::of(given), given)
+}
+
+/// A law with the influence that is asked for.
+pub(super) fn with_influence(law: impl Into<AnyLaw>, given: &Given) -> Built {
+    let horizon = given.horizon;
     match influence(given) {
         Influence::Constant => Built::plain(law),
         influence => Built::with_influence(law, move |length| influence.at(length, horizon)),
@@ -131,7 +150,7 @@ fn influence(given: &Given) -> Influence {
     }
 }
 
-fn critical_stretch(given: &Given, energy: f64) -> f64 {
+pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let law = Ordinary::of(given);
     CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
@@ -177,9 +196,8 @@ impl<const D: usize> Law<D> for Ordinary {
 
     #[inline(always)]
     fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
-        let share = self.dimension * numbers[0] / self.extensional;
-        let dilatation = share * sums[0];
-        numbers[1] = share * self.volumetric * dilatation;
+        let [push, dilatation] = self.dilated(numbers[0], sums[0]);
+        numbers[1] = push;
         numbers[2] = dilatation;
     }
 
@@ -210,7 +228,7 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
-        0.5 * self.volumetric * numbers[2].powi(2)
+        self.dilatation_energy(numbers[2])
     }
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.

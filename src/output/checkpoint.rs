@@ -39,7 +39,7 @@ pub struct Header {
     pub outputs: u64,
     /// Rows in the history.
     pub rows: u64,
-    /// Energy (J) and intact bonds at the start, which the history refers to.
+    /// Energy (J) at the start and intact bonds before it, which the history refers to.
     pub start: (f64, u64),
     /// The deck with every default filled in.
     pub deck: String,

@@ -3,6 +3,7 @@
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
+use super::read::Number;
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
@@ -26,6 +27,8 @@ pub struct FieldDescription {
 pub enum FieldData<'a> {
     /// Real numbers.
     F64(&'a [f64]),
+    /// Real numbers of half the length.
+    F32(&'a [f32]),
     /// Large whole numbers, such as point ids.
     U64(&'a [u64]),
     /// Whole numbers.
@@ -35,9 +38,21 @@ pub enum FieldData<'a> {
 }
 
 impl FieldData<'_> {
+    /// The type of its numbers.
+    pub(super) fn number(&self) -> Number {
+        match self {
+            FieldData::F64(_) => Number::F64,
+            FieldData::F32(_) => Number::F32,
+            FieldData::U64(_) => Number::U64,
+            FieldData::U32(_) => Number::U32,
+            FieldData::U8(_) => Number::U8,
+        }
+    }
+
     fn len(&self) -> usize {
         match self {
             FieldData::F64(values) => values.len(),
+            FieldData::F32(values) => values.len(),
             FieldData::U64(values) => values.len(),
             FieldData::U32(values) => values.len(),
             FieldData::U8(values) => values.len(),
@@ -75,6 +90,7 @@ pub(super) fn create_field(
     };
     let dataset = match data {
         FieldData::F64(_) => file.create_dataset::<f64>(&path, rows, columns),
+        FieldData::F32(_) => file.create_dataset::<f32>(&path, rows, columns),
         FieldData::U64(_) => file.create_dataset::<u64>(&path, rows, columns),
         FieldData::U32(_) => file.create_dataset::<u32>(&path, rows, columns),
         FieldData::U8(_) => file.create_dataset::<u8>(&path, rows, columns),
@@ -93,6 +109,7 @@ pub(super) fn write_field(
     let plane = field.components == 2;
     match data {
         FieldData::F64(values) => file.write_rows(dataset, row, &in_space(values, plane)),
+        FieldData::F32(values) => file.write_rows(dataset, row, &in_space(values, plane)),
         FieldData::U64(values) => file.write_rows(dataset, row, &in_space(values, plane)),
         FieldData::U32(values) => file.write_rows(dataset, row, &in_space(values, plane)),
         FieldData::U8(values) => file.write_rows(dataset, row, &in_space(values, plane)),

@@ -24,6 +24,7 @@ pub use read::{Number, ResultReader, StoredColumn, StoredField};
 pub use seal::mix;
 pub use transfer::initialise;
 pub use vtkhdf::{Contents, Piece, ResultFile};
+pub use xdmf::SideCar;
 
 /// Version of the HDF5 library.
 pub fn library() -> String {

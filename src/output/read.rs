@@ -5,7 +5,7 @@ use super::history::HISTORY;
 use super::vtkhdf::STEPS;
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
-use hdf5_metno::types::{IntSize, TypeDescriptor, VarLenUnicode};
+use hdf5_metno::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 use std::path::{Path, PathBuf};
 
 /// The type of a field's numbers.
@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 pub enum Number {
     /// 8-byte real numbers.
     F64,
+    /// 4-byte real numbers.
+    F32,
     /// 8-byte whole numbers.
     U64,
     /// 4-byte whole numbers.
@@ -252,6 +254,7 @@ impl ResultReader {
         let read = || -> hdf5::Result<StoredField> {
             let dataset = self.file.dataset(&path)?;
             let number = match dataset.dtype()?.to_descriptor()? {
+                TypeDescriptor::Float(FloatSize::U4) => Number::F32,
                 TypeDescriptor::Float(_) => Number::F64,
                 TypeDescriptor::Unsigned(IntSize::U1) => Number::U8,
                 TypeDescriptor::Unsigned(IntSize::U4) => Number::U32,

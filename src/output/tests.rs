@@ -33,6 +33,7 @@ fn what_is_written_reads_back() -> Result<()> {
         fixed: &fixed,
         moving: &moving,
         metadata: &metadata,
+        single: false,
         steps: 2,
     };
     let create = || ResultFile::create(&path, &comm, Creation::Exclusive, &contents);

@@ -56,7 +56,10 @@ pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
     points: usize,
+    single: bool,
     steps: u64,
+    /// Times of the steps that were there when the file was opened, s.
+    past_times: Vec<f64>,
     /// Steps that there is room for.
     capacity: u64,
     tables: Vec<Table>,
@@ -86,6 +89,8 @@ pub struct Contents<'a> {
     pub moving: &'a [FieldDescription],
     /// Attributes of the file: name and text.
     pub metadata: &'a [(&'a str, String)],
+    /// Whether moving fields are stored as 4-byte numbers.
+    pub single: bool,
     /// Number of steps that are expected; there may be more.
     pub steps: u64,
 }
@@ -108,6 +113,7 @@ impl<'a> ResultFile<'a> {
             fixed,
             moving,
             metadata,
+            single,
             steps,
         } = *contents;
         let points = positions.len();
@@ -145,6 +151,8 @@ impl<'a> ResultFile<'a> {
             file,
             piece,
             points,
+            single,
+            past_times: Vec::new(),
             steps: 0,
             capacity: 0,
             tables: Vec::new(),
@@ -160,7 +168,11 @@ impl<'a> ResultFile<'a> {
         for field in moving {
             let per_append = piece.total;
             let rows = Rows::Extensible { per_append };
-            let dataset = create_field(&mut result.file, field, &FieldData::F64(&[]), rows)?;
+            let empty = match single {
+                true => FieldData::F32(&[]),
+                false => FieldData::F64(&[]),
+            };
+            let dataset = create_field(&mut result.file, field, &empty, rows)?;
             result.fields.push((*field, dataset));
             let offsets = (0, piece.total as i64);
             result.create_table(&offsets_path(field), None, steps, offsets)?;
@@ -175,12 +187,11 @@ impl<'a> ResultFile<'a> {
         Ok(result)
     }
 
-    /// Goes on with a result after its first `kept` steps and so many rows of its history; later ones
-    /// are dropped. What is kept is copied to a new file, which then takes the place of the old one:
-    /// whenever the process is killed, one of them is there. Also gives the rows that are kept.
+    /// Goes on with a result after its first `kept` steps and so many rows of its history, in place; later
+    /// ones are dropped, those kept are not touched. Also gives the rows that are kept.
     ///
     /// # Errors
-    /// The old file cannot be read, holds less, or other points or fields; the disc is full.
+    /// The file cannot be read or written, holds less, or other points or fields.
     pub fn resume(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -188,11 +199,11 @@ impl<'a> ResultFile<'a> {
         history: &HistoryContents,
         (kept, kept_rows): (u64, u64),
     ) -> Result<(Self, Vec<Vec<f64>>)> {
-        let piece = contents.piece;
-        let mut old = CollectiveFile::open(path, comm)?;
-        let times = old.open_dataset(&format!("{STEPS}/Values"))?;
-        let numbers = old.open_dataset(&format!("{STEPS}/Step"))?;
-        let points = old.open_dataset("/VTKHDF/Points")?;
+        let (piece, steps) = (contents.piece, contents.steps);
+        let mut file = CollectiveFile::open_to_append(path, comm)?;
+        let mut times = file.open_dataset(&format!("{STEPS}/Values"))?;
+        let mut numbers = file.open_dataset(&format!("{STEPS}/Step"))?;
+        let points = file.open_dataset("/VTKHDF/Points")?;
         let found = times.rows().min(numbers.rows());
         let fits = if points.rows() != piece.total {
             Err(Error::run(format!("{}: has other points", path.display())))
@@ -203,55 +214,70 @@ impl<'a> ResultFile<'a> {
             Ok(())
         };
         agree(comm, fits)?;
-        let times: Vec<f64> = old.read_rows(&times, 0, kept as usize)?;
-        let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept as usize)?;
-
-        let part = path.with_extension("vtkhdf.part");
-        let copied = Self::copy(&mut old, &part, comm, contents, (kept, times, numbers));
-        let finished = copied.and_then(|mut result| {
-            let rows = History::read(&mut old, history.columns, kept_rows)?;
-            old.close()?;
-            result.create_history(history)?;
-            result.append_history(&rows)?;
-            result.file.flush()?;
-            result.file.rename(path)?;
-            Ok((result, rows))
-        });
-        if finished.is_err() && comm.rank() == 0 {
-            // It only takes up space; that it cannot be removed either changes nothing.
-            let _ = std::fs::remove_file(&part);
+        let past_times = file.read_rows(&times, 0, kept as usize)?;
+        let past = History::read(&mut file, history.columns, kept_rows)?;
+        let mut tables = Vec::new();
+        let mut open_table = |file: &mut CollectiveFile<'a>, path: &str, start, stride| {
+            let dataset = file.open_dataset(path)?;
+            tables.push(Table {
+                dataset,
+                start,
+                stride,
+            });
+            Ok::<(), Error>(())
+        };
+        for (field, _) in contents.fixed {
+            open_table(&mut file, &offsets_path(field), 0, 0)?;
         }
-        finished
-    }
-
-    /// A new file with the first steps of an old one.
-    fn copy(
-        old: &mut CollectiveFile<'a>,
-        part: &Path,
-        comm: &'a dyn Communicator,
-        contents: &Contents,
-        (kept, times, numbers): (u64, Vec<f64>, Vec<u64>),
-    ) -> Result<Self> {
-        let piece = contents.piece;
-        let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
-        result.make_room(kept)?;
-        for (field, values) in &result.fields {
-            let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
-            for step in 0..kept {
-                let first = step * piece.total + piece.first;
-                let rows: Vec<f64> = old.read_rows(&stored, first, result.points)?;
-                result.file.write_rows(values, first, &rows)?;
-            }
+        let mut fields = Vec::new();
+        for field in contents.moving {
+            let dataset = file.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
+            fields.push((*field, dataset));
+            open_table(&mut file, &offsets_path(field), 0, piece.total as i64)?;
         }
-        for (time, number) in times.into_iter().zip(numbers) {
-            append_one(&mut result.file, &mut result.numbers, number)?;
-            append_one(&mut result.file, &mut result.times, time)?;
+        for (name, _, value) in STEP_TABLES {
+            open_table(&mut file, &format!("{STEPS}/{name}"), value, 0)?;
         }
-        result.steps = kept;
-        result
-            .file
-            .set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
-        Ok(result)
+        let rows = fields
+            .iter()
+            .map(|(_, dataset)| dataset.rows() / piece.total);
+        let capacity = tables
+            .iter()
+            .map(|table| table.dataset.rows())
+            .chain(rows)
+            .min();
+        let capacity = capacity.unwrap_or(0);
+        if capacity < kept {
+            let text = format!("has room for {capacity} of the first {kept} outputs");
+            return Err(Error::run(format!("{}: {text}", path.display())));
+        }
+        // The number of steps first: whenever the process is killed, what it counts is there.
+        file.set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
+        file.flush()?;
+        file.resize(&mut times, kept)?;
+        file.resize(&mut numbers, kept)?;
+        let resumed = History::resume(&mut file, history, &past)?;
+        file.flush()?;
+        let mut result = Self {
+            file,
+            piece,
+            points: contents.positions.len(),
+            single: contents.single,
+            steps: kept,
+            capacity,
+            tables,
+            numbers,
+            times,
+            past_times,
+            fields,
+            history: Some(resumed),
+        };
+        result.make_room(steps.max(1))?;
+        for (name, value) in contents.metadata {
+            result.file.update_text("/", name, value)?;
+        }
+        result.file.flush()?;
+        Ok((result, past))
     }
 
     /// Adds one step: its time in s, its number and this rank's values of the moving fields, in the
@@ -275,13 +301,14 @@ impl<'a> ResultFile<'a> {
         }
         let first = self.steps * self.piece.total + self.piece.first;
         for ((description, dataset), data) in self.fields.iter().zip(fields) {
-            write_field(
-                &mut self.file,
-                dataset,
-                first,
-                description,
-                &FieldData::F64(data),
-            )?;
+            let halves: Vec<f32>;
+            let data = if self.single {
+                halves = data.iter().map(|value| *value as f32).collect();
+                FieldData::F32(&halves)
+            } else {
+                FieldData::F64(data)
+            };
+            write_field(&mut self.file, dataset, first, description, &data)?;
         }
         // Only when the data are safe may the file say that it has them.
         self.file.flush()?;
@@ -291,6 +318,16 @@ impl<'a> ResultFile<'a> {
         let steps = Attribute::Integer(self.steps as i64);
         self.file.set_attribute(STEPS, "NSteps", steps)?;
         self.file.flush()
+    }
+
+    /// Times of the steps that were there when the file was opened, s.
+    pub fn past_times(&self) -> &[f64] {
+        &self.past_times
+    }
+
+    /// The ranks that write the file.
+    pub fn communicator(&self) -> &'a dyn Communicator {
+        self.file.communicator()
     }
 
     /// Number of steps written.

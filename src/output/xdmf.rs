@@ -1,9 +1,15 @@
 //! The side-car that lets ParaView before 5.12 open a result file: XDMF 3, pointing into it.
 
-use super::read::{Number, ResultReader, StoredField};
+use super::field::FieldDescription;
+use super::read::{Number, StoredField};
+use super::vtkhdf::Contents;
 use crate::error::{Error, Result};
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A side-car is written again when so many times the time that it took has gone by.
+const LEISURE: u32 = 100;
 
 /// The components of a symmetric tensor in the order they are stored.
 const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
@@ -19,26 +25,84 @@ pub fn render(file_name: &str, points: usize, fields: &[StoredField], times: &[f
     text
 }
 
-/// Writes the side-car of a result file beside it, `name.xdmf` for `name.h5`, in one piece: a
-/// reader sees the old one or the new one. Returns its path. One process calls this, when the
-/// result is closed.
-///
-/// # Errors
-/// The result cannot be read, or the side-car cannot be written.
-pub fn write_beside(result: &Path) -> Result<PathBuf> {
-    let reader = ResultReader::open(result)?;
-    let name = result.file_name().unwrap_or_default().to_string_lossy();
-    let text = render(&name, reader.points(), &reader.fields()?, &reader.times()?);
-    let path = result.with_extension("xdmf");
-    write(&path, &text)?;
-    Ok(path)
+/// The side-car of a result that grows: written with the first step, and again as the result grows, so
+/// that it is there however the process ends. For one process.
+pub struct SideCar {
+    path: PathBuf,
+    file_name: String,
+    points: usize,
+    fields: Vec<StoredField>,
+    times: Vec<f64>,
+    /// When it was written last, and how long that took.
+    written: Option<(Instant, Duration)>,
+}
+
+impl SideCar {
+    /// The side-car of a result, `name.xdmf` for `name.vtkhdf`, that has steps at these times (s) so far.
+    pub fn new(result: &Path, contents: &Contents, times: Vec<f64>) -> Self {
+        let stored = |field: &FieldDescription, number, dynamic| StoredField {
+            name: field.name.to_owned(),
+            unit: field.unit.to_owned(),
+            components: match field.components {
+                2 => 3,
+                others => others,
+            },
+            number,
+            dynamic,
+        };
+        let real = match contents.single {
+            true => Number::F32,
+            false => Number::F64,
+        };
+        let fixed = contents.fixed.iter();
+        let fixed = fixed.map(|(field, data)| stored(field, data.number(), false));
+        let moving = contents.moving.iter();
+        let moving = moving.map(|field| stored(field, real, true));
+        let mut fields: Vec<StoredField> = fixed.chain(moving).collect();
+        fields.sort_by(|a, b| a.name.cmp(&b.name));
+        let name = result.file_name().unwrap_or_default();
+        Self {
+            path: result.with_extension("xdmf"),
+            file_name: name.to_string_lossy().into_owned(),
+            points: contents.piece.total as usize,
+            fields,
+            times,
+            written: None,
+        }
+    }
+
+    /// Takes note of one step more, at a time (s), and writes the side-car if that is cheap.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn add(&mut self, time: f64) -> Result<()> {
+        self.times.push(time);
+        let is_cheap = |(when, cost): &(Instant, Duration)| when.elapsed() >= *cost * LEISURE;
+        if self.written.as_ref().is_none_or(is_cheap) {
+            self.write()?;
+        }
+        Ok(())
+    }
+
+    /// Writes the side-car for the last time.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(mut self) -> Result<()> {
+        self.write()
+    }
+
+    fn write(&mut self) -> Result<()> {
+        let start = Instant::now();
+        let text = render(&self.file_name, self.points, &self.fields, &self.times);
+        write(&self.path, &text)?;
+        self.written = Some((Instant::now(), start.elapsed()));
+        Ok(())
+    }
 }
 
 /// Writes a text file in one piece: first beside its place, then moved there.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write(path: &Path, text: &str) -> Result<()> {
+fn write(path: &Path, text: &str) -> Result<()> {
     let temporary = path.with_extension("xdmf.part");
     std::fs::write(&temporary, text)
         .and_then(|()| std::fs::rename(&temporary, path))
@@ -144,6 +208,7 @@ fn write_item(text: &mut String, number: Number, dimensions: &str, place: &str) 
     // XDMF has no 8-byte unsigned numbers.
     let (kind, precision) = match number {
         Number::F64 => ("Float", 8),
+        Number::F32 => ("Float", 4),
         Number::U64 => ("Int", 8),
         Number::U32 => ("UInt", 4),
         Number::U8 => ("UChar", 1),

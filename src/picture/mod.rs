@@ -14,6 +14,7 @@
 //!     range: Some((0.0, 1.0)),
 //!     view: View::Plane,
 //!     width: 600,
+//!     lines: &[],
 //! };
 //! let image = render(&scene);
 //! assert_eq!(image.width, 600);
@@ -33,7 +34,7 @@ pub use canvas::Image;
 pub use scene::{Axis, Scene, View};
 
 use axes::{Pen, Ruler};
-use canvas::PALE_INK;
+use canvas::{Colour, PALE_INK};
 use layout::Layout;
 use lettering::{Lettering, Running};
 use points::Colouring;
@@ -68,6 +69,9 @@ pub fn render(scene: &Scene) -> Image {
             hidden_edges(&mut pen, &layout, &bounds);
         }
         points::paint(pen.image, &marks, colouring, &layout, projection);
+        if let Projection::Flat(_) = projection {
+            lines(&mut pen, &layout, projection, scene);
+        }
         match projection {
             Projection::Strip => flat_frame(&mut pen, &layout, &[Axis::X]),
             Projection::Flat(axes) => flat_frame(&mut pen, &layout, &axes),
@@ -77,6 +81,22 @@ pub fn render(scene: &Scene) -> Image {
     pen.colour_bar(&layout.bar, colouring, scene.field, scene.unit);
     title(&mut pen, &layout, scene.title);
     image
+}
+
+/// Colours of lines, told apart by colour-blind readers too (Okabe & Ito 2008).
+const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
+
+/// Draws the lines of a scene.
+fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
+    let thickness = 2.0 * pen.thickness();
+    for (number, line) in scene.lines {
+        let colour = LINE_COLOURS[number % LINE_COLOURS.len()];
+        for ends in line.windows(2) {
+            let pixel = |place: [f64; 3]| layout.pixel(projection.project(place));
+            pen.image
+                .line(pixel(ends[0]), pixel(ends[1]), thickness, colour);
+        }
+    }
 }
 
 /// Writes the title above the frame, smaller if it is too long.

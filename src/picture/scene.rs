@@ -81,6 +81,8 @@ pub struct Scene<'a> {
     pub view: View,
     /// Width of the picture in pixels, from 200 to 16384.
     pub width: u32,
+    /// Lines over the points of a flat view (m), each with the number of its colour.
+    pub lines: &'a [(usize, Vec<[f64; 3]>)],
 }
 
 /// One point that is drawn.
@@ -224,6 +226,7 @@ mod tests {
             range: None,
             view,
             width: 400,
+            lines: &[],
         }
     }
 

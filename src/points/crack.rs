@@ -10,50 +10,113 @@ type Vector = Vector3<f64>;
 /// depend on rounding: it counts as cut.
 const RIM: f64 = 1e-9;
 
-/// Whether the bond between two positions (m) crosses the crack. A point that lies in the crack's
-/// plane counts to its positive side. Both ends must ask in the same order (lower id first), so that
-/// they come to the same answer to the bit.
+/// Whether the bond between two positions (m) crosses the crack. A point that lies in the plane of a
+/// crack without width counts to its positive side; one with width cuts all bonds that touch what lies
+/// between its faces, those of points there as well. Both ends must ask in the same order (lower id
+/// first), so that they come to the same answer to the bit.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     let bond = [from, to].map(Vector::from);
-    let inside = -RIM..=1.0 + RIM;
     match crack {
-        Crack::Segment { from, to } => {
+        Crack::Segment { from, to, width } => {
             let start = Vector::from(*from);
             let edge = Vector::from(*to) - start;
             let normal = Vector::new(-edge.y, edge.x, 0.0);
-            piercing(start, normal, bond).is_some_and(|hit| {
-                let along = (hit - start).dot(&edge) / edge.dot(&edge);
-                inside.contains(&along)
-            })
+            let along = |place: Vector| (place - start).dot(&edge) / edge.dot(&edge);
+            let part = between_faces(start, normal, *width, bond);
+            part.and_then(|part| within(part, along, [0.0, 1.0]))
+                .is_some()
         }
         Crack::Rectangle {
             corner,
             edge_a,
             edge_b,
+            width,
         } => {
             let [corner, a, b] = [*corner, *edge_a, *edge_b].map(Vector::from);
-            piercing(corner, a.cross(&b), bond).is_some_and(|hit| {
-                let offset = hit - corner;
-                let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
-                let (oa, ob) = (offset.dot(&a), offset.dot(&b));
-                let determinant = aa * bb - ab * ab;
-                let along_a = (oa * bb - ob * ab) / determinant;
-                let along_b = (ob * aa - oa * ab) / determinant;
-                inside.contains(&along_a) && inside.contains(&along_b)
-            })
+            let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
+            let determinant = aa * bb - ab * ab;
+            let products = |place: Vector| ((place - corner).dot(&a), (place - corner).dot(&b));
+            let along_a = |place: Vector| {
+                let (oa, ob) = products(place);
+                (oa * bb - ob * ab) / determinant
+            };
+            let along_b = |place: Vector| {
+                let (oa, ob) = products(place);
+                (ob * aa - oa * ab) / determinant
+            };
+            let part = between_faces(corner, a.cross(&b), *width, bond);
+            part.and_then(|part| within(part, along_a, [0.0, 1.0]))
+                .and_then(|part| within(part, along_b, [0.0, 1.0]))
+                .is_some()
         }
         Crack::Disc {
             centre,
             normal,
             radius,
+            width,
         } => {
-            let centre = Vector::from(*centre);
-            piercing(centre, Vector::from(*normal), bond).is_some_and(|hit| {
-                let offset = hit - centre;
-                offset.dot(&offset) <= (radius * (1.0 + RIM)).powi(2)
+            let (centre, normal) = (Vector::from(*centre), Vector::from(*normal));
+            between_faces(centre, normal, *width, bond).is_some_and(|part| {
+                let [from, to] = part.map(|place| {
+                    let offset = place - centre;
+                    offset - offset.dot(&normal) * normal
+                });
+                let nearest = nearest_to_origin(from, to);
+                nearest.dot(&nearest) <= (radius * (1.0 + RIM)).powi(2)
             })
         }
     }
+}
+
+/// The part of a bond between the faces of a crack, in the plane through `origin`, with a width (m); of
+/// one without width the place where the bond goes through it.
+fn between_faces(
+    origin: Vector,
+    normal: Vector,
+    width: f64,
+    bond: [Vector; 2],
+) -> Option<[Vector; 2]> {
+    if width == 0.0 {
+        return piercing(origin, normal, bond).map(|hit| [hit, hit]);
+    }
+    let scale = 1.0 / (width * normal.norm());
+    let height = |place: Vector| scale * (place - origin).dot(&normal);
+    within(bond, height, [-0.5, 0.5])
+}
+
+/// The part of a segment on which a coordinate, linear in the place, is within limits; the limits are
+/// 1 apart.
+fn within(
+    [from, to]: [Vector; 2],
+    coordinate: impl Fn(Vector) -> f64,
+    [low, high]: [f64; 2],
+) -> Option<[Vector; 2]> {
+    let [first, last] = [coordinate(from), coordinate(to)];
+    let (mut start, mut end) = (0.0_f64, 1.0_f64);
+    let above_low = [first - (low - RIM), last - (low - RIM)];
+    let below_high = [high + RIM - first, high + RIM - last];
+    for [first, last] in [above_low, below_high] {
+        if first < 0.0 && last < 0.0 {
+            return None;
+        }
+        if first < 0.0 {
+            start = start.max(first / (first - last));
+        } else if last < 0.0 {
+            end = end.min(first / (first - last));
+        }
+    }
+    let at = |share: f64| from + share * (to - from);
+    (start <= end).then(|| [at(start), at(end)])
+}
+
+/// The place of a segment that is nearest to the origin.
+fn nearest_to_origin(from: Vector, to: Vector) -> Vector {
+    let way = to - from;
+    let square = way.dot(&way);
+    if square == 0.0 {
+        return from;
+    }
+    from + (-from.dot(&way) / square).clamp(0.0, 1.0) * way
 }
 
 /// Where the segment between two positions goes through a plane, if its ends lie on different sides.
@@ -76,6 +139,7 @@ mod tests {
         let notch = Crack::Segment {
             from: [0.0; 3],
             to: [1.0, 0.0, 0.0],
+            width: 0.0,
         };
         assert!(crosses(&notch, [0.5, -1.0, 0.0], [0.5, 1.0, 0.0]));
         assert!(
@@ -97,6 +161,7 @@ mod tests {
             corner: [0.0; 3],
             edge_a: [2.0, 0.0, 0.0],
             edge_b: [1.0, 1.0, 0.0],
+            width: 0.0,
         };
         let up = |x: f64, y: f64| ([x, y, -0.5], [x, y, 0.5]);
         let cut = |crack: &Crack, x, y| crosses(crack, up(x, y).0, up(x, y).1);
@@ -106,8 +171,66 @@ mod tests {
             centre: [0.0; 3],
             normal: [0.0, 0.0, 1.0],
             radius: 1.0,
+            width: 0.0,
         };
         assert!(cut(&disc, 0.6, 0.7));
         assert!(!cut(&disc, 0.8, 0.7));
+    }
+
+    #[test]
+    fn a_band_cuts_all_that_touches_it() {
+        // From (1, 1) towards (4, 5), 5 long and 0.8 wide.
+        let band = Crack::Segment {
+            from: [1.0, 1.0, 0.0],
+            to: [4.0, 5.0, 0.0],
+            width: 0.8,
+        };
+        let place = |along: f64, beside: f64| {
+            let [x, y] = [0.6 * along - 0.8 * beside, 0.8 * along + 0.6 * beside];
+            [1.0 + x, 1.0 + y, 0.0]
+        };
+        let cut = |from: (f64, f64), to: (f64, f64)| {
+            let [a, b] = [place(from.0, from.1), place(to.0, to.1)];
+            assert_eq!(crosses(&band, a, b), crosses(&band, b, a));
+            crosses(&band, a, b)
+        };
+        assert!(cut((2.0, -1.0), (2.5, 1.0)), "through both faces");
+        assert!(cut((2.0, 0.1), (2.5, 0.2)), "within");
+        assert!(cut((2.0, 0.1), (2.0, 2.0)), "out of it");
+        assert!(cut((-1.0, 0.0), (6.0, 0.1)), "along it");
+        assert!(cut((1.0, 1.0), (2.0, 0.4)), "on its face");
+        assert!(!cut((1.0, 1.0), (2.0, 0.41)), "beside it");
+        assert!(!cut((5.1, -1.0), (5.1, 1.0)), "before its end");
+        assert!(cut((5.5, 0.0), (4.5, 0.5)), "through its end and a face");
+        assert!(!cut((5.5, 0.0), (4.5, 1.0)), "past its corner");
+        assert!(!cut((5.05, 0.0), (6.0, 0.0)), "ahead of its end");
+    }
+
+    #[test]
+    fn slabs_end_at_their_rims() {
+        let rectangle = Crack::Rectangle {
+            corner: [0.0; 3],
+            edge_a: [2.0, 0.0, 0.0],
+            edge_b: [1.0, 1.0, 0.0],
+            width: 0.6,
+        };
+        assert!(crosses(&rectangle, [1.5, 0.5, 0.2], [1.6, 0.5, 0.25]));
+        assert!(crosses(&rectangle, [1.5, 0.5, 0.2], [1.6, 0.5, 2.0]));
+        assert!(!crosses(&rectangle, [1.5, 0.5, 0.31], [1.6, 0.5, 2.0]));
+        // Past the slanted edge x = y, into it or not.
+        assert!(crosses(&rectangle, [0.2, 0.5, 0.1], [0.9, 0.5, 0.1]));
+        assert!(!crosses(&rectangle, [0.2, 0.5, 0.1], [0.45, 0.5, 0.1]));
+        let disc = Crack::Disc {
+            centre: [0.0; 3],
+            normal: [0.0, 0.0, 1.0],
+            radius: 1.0,
+            width: 0.6,
+        };
+        assert!(crosses(&disc, [0.6, 0.7, 0.2], [0.6, 0.7, 0.25]));
+        assert!(!crosses(&disc, [0.8, 0.7, 0.2], [0.8, 0.7, 0.25]));
+        // Ends outside, the middle within; and a bond that passes over the rim.
+        assert!(crosses(&disc, [-1.2, 0.3, 0.1], [1.2, 0.3, 0.1]));
+        assert!(!crosses(&disc, [-1.2, 0.3, 0.31], [1.2, 0.3, 0.31]));
+        assert!(!crosses(&disc, [1.5, 0.0, 0.3], [0.9, 0.0, 0.9]));
     }
 }

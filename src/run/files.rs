@@ -82,11 +82,12 @@ impl Files {
         }
     }
 
-    /// Renames result and history, so that others can take their names. For rank 0.
+    /// Renames what there is of result and history, so that others can take their names; returns the new
+    /// names. For rank 0.
     ///
     /// # Errors
     /// When one cannot be renamed.
-    pub fn set_aside(&self, number: u64) -> Result<PathBuf> {
+    pub fn set_aside(&self, number: u64) -> Result<Vec<PathBuf>> {
         let named = |file: &Path, count: u32| {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy();
             let extension = file.extension().unwrap_or_default().to_string_lossy();
@@ -102,13 +103,15 @@ impl Files {
         };
         let count = (0..).find(is_free).unwrap_or(u32::MAX);
         let aside = |file: &Path| named(file, count);
+        let mut kept = Vec::new();
         for file in [&self.result, &self.history] {
             if file.exists() {
                 fs::rename(file, aside(file))
                     .map_err(|error| file_error(file, "rename", &error))?;
+                kept.push(aside(file));
             }
         }
-        Ok(aside(&self.result))
+        Ok(kept)
     }
 }
 

@@ -20,7 +20,9 @@
 //! its plan.
 
 mod checkpoints;
+mod crack_files;
 mod decisions;
+mod energy_watch;
 mod files;
 mod observer;
 mod options;
@@ -42,16 +44,18 @@ use std::path::PathBuf;
 
 use crate::comm::mpi::{self, World};
 use crate::comm::{self, Communicator, agree};
-use crate::deck::Plan;
+use crate::deck::{Plan, shown};
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
 use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
+use crate::solver::simulation::choose_steps;
 use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
-use recorder::{Recorder, Start, can_continue};
+use energy_watch::EnergyWatch;
+use recorder::{Recorder, Start, damaged, why_not_continued};
 use restart::{Restart, restart};
 use watch::Watch;
 
@@ -135,7 +139,7 @@ pub fn run(
 enum Left {
     Complete,
     Stopped(Reason),
-    /// The motion of a point is not finite.
+    /// The motion of a point is not finite, or the energy grows without bound.
     Failed(Error),
 }
 
@@ -178,22 +182,23 @@ impl<'a> Job<'a> {
         let left = self.make_steps(&mut simulation, &mut checkpoints, &mut recorder)?;
         self.observer.end(matches!(left, Left::Complete));
         let no_collective_cause = recorder.file.no_collective_cause();
-        recorder.file.close()?;
-        self.write_side_car()?;
+        let last_row = recorder.last_row.take();
+        let spent = recorder.spent;
+        recorder.close()?;
         let stopped = match left {
             Left::Complete => None,
             Left::Stopped(reason) => Some(reason),
             Left::Failed(error) => return Err(error),
         };
         let whole = self.options.started.elapsed();
-        let spent = (recorder.spent, checkpoints.spent, whole);
+        let spent = (spent, checkpoints.spent, whole);
         let steps = simulation.clock.number() - first;
         Ok(Outcome {
             stopped,
             number: simulation.clock.number(),
             last: simulation.last_step(),
             time: simulation.clock.time(),
-            last_row: recorder.last_row,
+            last_row,
             files: self.files.clone(),
             summary: Summary::new(&simulation, steps, checkpoints.written, spent),
             no_collective_cause,
@@ -231,6 +236,7 @@ impl<'a> Job<'a> {
         let mut watch = Watch::new(signals.as_ref(), self.plan.checkpoint, limit);
         let mut contact = Some(ContactWatch::new(simulation));
         let mut slow = true;
+        let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
             simulation.advance();
             let clock = simulation.clock;
@@ -253,6 +259,16 @@ impl<'a> Job<'a> {
                 if due {
                     recorder.record(simulation, self.observer)?;
                     slow = slow && !self.warn_of_inertia(simulation, recorder);
+                }
+                if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
+                    match energy.look(row, &clock) {
+                        Ok(None) => {}
+                        Ok(Some(text)) => self.observer.message(&Message::Warning(text)),
+                        Err(error) => {
+                            recorder.write_failure(simulation)?;
+                            return Ok(Left::Failed(error));
+                        }
+                    }
                 }
                 let decision = watch.look(self.comm, step);
                 if complete || decision.checkpoint || decision.stop.is_some() {
@@ -334,19 +350,34 @@ impl<'a> Job<'a> {
             time: simulation.clock.time(),
             complete: simulation.is_over(),
         });
+        self.tell_kept_step(simulation)?;
         let metadata = self.metadata(simulation);
-        if can_continue(simulation, &self.files, &header)? {
-            let start = Start::After(header.outputs, header.rows);
-            let mut recorder = Recorder::new(simulation, &self.files, start, &metadata)?;
-            recorder.observer.continue_from(header.start);
-            return Ok((checkpoints, recorder));
-        }
-        let aside = match self.comm.rank() {
-            0 => self.files.set_aside(simulation.clock.number()),
-            _ => Ok(PathBuf::new()),
+        let why = why_not_continued(simulation, &self.files, &header, &self.physics)?;
+        let why = match why {
+            Some(why) => why,
+            None => {
+                let start = Start::After(header.outputs, header.rows);
+                match Recorder::new(simulation, &self.files, start, &metadata) {
+                    Ok(mut recorder) => {
+                        recorder.observer.continue_from(header.start);
+                        return Ok((checkpoints, recorder));
+                    }
+                    // The checkpoint is good: that of the result must not keep it from going on.
+                    Err(error) => damaged(&error),
+                }
+            }
         };
-        let aside = self.text_of_rank_0(&agree(self.comm, aside)?.to_string_lossy());
-        self.observer.message(&Message::SetAside(aside.into()));
+        let kept = match self.comm.rank() {
+            0 => self.files.set_aside(simulation.clock.number()),
+            _ => Ok(Vec::new()),
+        };
+        let kept: Vec<String> = agree(self.comm, kept)?
+            .iter()
+            .map(|path| path.to_string_lossy().into_owned())
+            .collect();
+        let kept = self.text_of_rank_0(&kept.join("\n"));
+        let kept = kept.lines().map(PathBuf::from).collect();
+        self.observer.message(&Message::SetAside { why, kept });
         let start = Start::New(Creation::Exclusive);
         let mut recorder = Recorder::new(simulation, &self.files, start, &metadata)?;
         recorder.observer.continue_from(header.start);
@@ -356,13 +387,24 @@ impl<'a> Job<'a> {
         Ok((checkpoints, recorder))
     }
 
-    /// The description of the result for older versions of ParaView.
-    fn write_side_car(&self) -> Result<()> {
-        let written = match self.comm.rank() {
-            0 => output::xdmf::write_beside(&self.files.result).map(|_| ()),
-            _ => Ok(()),
+    /// Says so if the steps keep the size of the first ones, where a new run to the same end would have
+    /// others.
+    fn tell_kept_step<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
+        let (clock, plan) = (&simulation.clock, self.plan);
+        let steps = choose_steps(plan, simulation.stable_step)?;
+        let &[(fresh, _)] = &steps[..] else {
+            return Ok(());
         };
-        agree(self.comm, written)
+        if clock.step() != fresh && !clock.is_over() {
+            let text = format!(
+                "the steps stay at {:e} s, as the run began; a new run until t = {} s would take {fresh:e} s \
+                 and end with other last digits",
+                clock.step(),
+                shown(plan.time.end),
+            );
+            self.observer.message(&Message::Warning(text));
+        }
+        Ok(())
     }
 
     /// Rank 0's text on all ranks.

@@ -55,9 +55,13 @@ pub enum Message {
         /// Whether that was the last step, so that nothing is left to do.
         complete: bool,
     },
-    /// The result so far does not fit what is to be written now; it is kept under this name, and a new
-    /// one begins.
-    SetAside(PathBuf),
+    /// The result so far does not fit what is to be written now, and a new one begins.
+    SetAside {
+        /// What does not fit.
+        why: String,
+        /// What there is of the result so far, under its new names.
+        kept: Vec<PathBuf>,
+    },
     /// Something that may not be as the user thinks.
     Warning(String),
 }

@@ -7,8 +7,14 @@ use crate::error::Result;
 /// The first line of the physics of a plan without a deck.
 const WITHOUT_DECK: &str = "# a plan without a deck\n";
 
+/// What parts the physics of such a plan from the definitions of its history.
+const HISTORY: &str = "# its history\n";
+
 /// The longest part of a line that a message shows.
 const SHOWN: usize = 100;
+
+/// How many of the differences a message shows.
+const MOST_SHOWN: usize = 5;
 
 /// The physics of a run as text: its deck with every default filled in, or else a listing of the plan.
 pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
@@ -27,15 +33,43 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
     plan.output = Output {
         every: Interval::Steps(1),
         fields: Vec::new(),
+        single: false,
+        set: None,
     };
     plan.history.every = Interval::Steps(1);
+    let history = plan.history.clone();
     plan.history.reactions.clear();
+    plan.history.support_forces.clear();
     plan.history.damage_threshold = 0.0;
     plan.history.probes.clear();
     plan.history.fronts.clear();
+    plan.history.cracks.clear();
     plan.history.tips.clear();
     plan.checkpoint = Default::default();
-    format!("{WITHOUT_DECK}{plan:#?}\n")
+    format!("{WITHOUT_DECK}{plan:#?}\n{HISTORY}{history:#?}\n")
+}
+
+/// What differs in the meaning of the history's columns, in one line; nothing if it is the same.
+///
+/// # Errors
+/// When a deck cannot be parsed.
+pub fn history_differences(old: &str, new: &str) -> Result<Option<String>> {
+    let lines = if old.starts_with(WITHOUT_DECK) {
+        let [old, new] = [old, new].map(|text| text.split_once(HISTORY).unwrap_or_default().1);
+        listed_differences(old, new)
+    } else {
+        deck::history_differences(&source("the checkpoint", old), &source("the deck", new))?
+    };
+    let short = |line: &String| line.chars().take(SHOWN).collect::<String>();
+    let shown: Vec<String> = lines.iter().take(MOST_SHOWN).map(short).collect();
+    Ok((!shown.is_empty()).then(|| shown.join("; ")))
+}
+
+fn source(name: &str, text: &str) -> Source {
+    Source {
+        path: name.into(),
+        text: text.to_owned(),
+    }
 }
 
 /// What differs, a line each.
@@ -49,12 +83,9 @@ pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
         return Ok(vec![line.to_owned()]);
     }
     if old_listed {
-        return Ok(listed_differences(old, new));
+        let physics = |text: &'_ str| text.split(HISTORY).next().unwrap_or_default().to_owned();
+        return Ok(listed_differences(&physics(old), &physics(new)));
     }
-    let source = |name: &str, text: &str| Source {
-        path: name.into(),
-        text: text.to_owned(),
-    };
     deck::differences(&source("the checkpoint", old), &source("the deck", new))
 }
 

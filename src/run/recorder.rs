@@ -1,23 +1,27 @@
 //! Writing result and history when they are due.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use crate::comm::{Communicator, IdOrder, agree};
+use crate::comm::{self, Communicator, IdOrder, agree};
 use crate::deck::Plan;
 use crate::deck::plan::Field;
-use crate::error::{ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::output::checkpoint::Header;
 use crate::output::{
-    Contents, Creation, FieldData, FieldDescription, HistoryContents, Piece, ResultFile,
-    ResultReader,
+    Contents, Creation, FieldData, FieldDescription, HistoryContents, Number, Piece, ResultFile,
+    ResultReader, SideCar, StoredField, mix,
 };
 use crate::solver::Simulation;
+use crate::solver::conditions::{members, not_empty};
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
+use super::crack_files;
 use super::files::Files;
 use super::observer::{Observer, Row};
+use super::physics::history_differences;
 
 /// History rows that are held back before they are written.
 const ROWS_HELD: usize = 256;
@@ -28,16 +32,23 @@ pub struct Recorder<'a> {
     pub file: ResultFile<'a>,
     /// What the history is made of.
     pub observer: HistoryObserver,
-    /// The way from points to the rows of files.
+    /// The way from points to the rows of checkpoints, and, but for those that `kept` leaves out, of the
+    /// result.
     pub order: IdOrder,
+    /// Which of this rank's block of ids the result holds; `None` for all.
+    kept: Option<Vec<usize>>,
     /// The last row of the history.
     pub last_row: Option<HistoryRow>,
     /// Time spent here.
     pub spent: Duration,
+    /// Where the paths of cracks go.
+    folder: PathBuf,
     fields: Vec<Field>,
     outputs: Schedule,
     rows: Schedule,
     held: Vec<Vec<f64>>,
+    /// On rank 0.
+    side_car: Option<SideCar>,
 }
 
 /// How a recorder starts.
@@ -57,6 +68,7 @@ struct Layout<'a> {
     volumes: Vec<f64>,
     moving: Vec<FieldDescription>,
     metadata: &'a [(&'a str, String)],
+    single: bool,
     piece: Piece,
     steps: u64,
 }
@@ -75,9 +87,10 @@ impl<'a> Recorder<'a> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
         let order = id_order(simulation);
+        let kept = kept(simulation, &order)?;
         let clock = &simulation.expected_clock();
         let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.history.every));
-        let layout = Layout::new(simulation, &order, outputs.count(clock), metadata);
+        let layout = Layout::new(simulation, (&order, &kept), outputs.count(clock), metadata);
         let fixed = layout.fixed();
         let contents = layout.contents(&fixed);
         let history = HistoryContents {
@@ -112,16 +125,21 @@ impl<'a> Recorder<'a> {
                 file
             }
         };
+        let side_car = (comm.rank() == 0)
+            .then(|| SideCar::new(&files.result, &contents, file.past_times().to_vec()));
         Ok(Self {
             file,
             observer,
             order,
+            kept,
             last_row: None,
             spent: Duration::ZERO,
+            folder: files.folder.clone(),
             fields: plan.output.fields.clone(),
             outputs,
             rows,
             held: Vec::new(),
+            side_car,
         })
     }
 
@@ -183,16 +201,54 @@ impl<'a> Recorder<'a> {
                 .iter()
                 .map(|field| {
                     let values = snapshot.field(simulation, *field);
-                    self.order
-                        .collect(simulation.comm, &values, field.components())
+                    let width = field.components();
+                    let values = self.order.collect(simulation.comm, &values, width);
+                    pick(&self.kept, values, width)
                 })
                 .collect();
             let data: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
             self.file
                 .write_step(simulation.clock.time(), simulation.clock.number(), &data)?;
+            let cracks = self.observer.crack_paths(simulation, &snapshot);
+            crack_files::write(simulation.comm, &self.folder, &cracks)?;
+            let told = match &mut self.side_car {
+                Some(side_car) => side_car.add(simulation.clock.time()),
+                None => Ok(()),
+            };
+            agree(simulation.comm, told)?;
         }
         self.spent += start.elapsed();
         Ok(())
+    }
+
+    /// The row of the history that is of the present step, if there is one.
+    pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
+        let is_now = |row: &&HistoryRow| row.number == clock.number();
+        self.last_row.as_ref().filter(is_now)
+    }
+
+    /// Writes the present step for those who want to see where a run has failed. Collective.
+    ///
+    /// # Errors
+    /// When the disc is full.
+    pub fn write_failure<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+    ) -> Result<()> {
+        match self.outputs.is_due(&simulation.clock) {
+            true => self.flush(),
+            false => self.write(simulation, true, false),
+        }
+    }
+
+    /// Closes the result. Collective.
+    ///
+    /// # Errors
+    /// When the disc is full, or writing has failed before.
+    pub fn close(self) -> Result<()> {
+        let comm = self.file.communicator();
+        self.file.close()?;
+        agree(comm, self.side_car.map_or(Ok(()), SideCar::finish))
     }
 
     /// Makes all that has been recorded safe on the disc. Collective.
@@ -219,51 +275,107 @@ pub fn id_order<const D: usize>(simulation: &Simulation<'_, D>) -> IdOrder {
     IdOrder::new(simulation.comm, &model.ids[..model.owned()], model.total)
 }
 
-/// Whether the result that a checkpoint belongs to is there, with the fields and columns that the plan
-/// asks for, so that it can be continued. Collective.
+/// Which of this rank's block of ids the result holds; `None` for all. Collective.
 ///
 /// # Errors
-/// When a set of the history is empty, or the result is there but cannot be read.
-pub fn can_continue<const D: usize>(
+/// When it would hold none.
+fn kept<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    order: &IdOrder,
+) -> Result<Option<Vec<usize>>> {
+    let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
+    let Some((set, span)) = &plan.output.set else {
+        return Ok(None);
+    };
+    let points = members(plan, model, *set);
+    not_empty(plan, comm, *set, &points, ("[output] set", span.clone()))?;
+    let mut flags = vec![0_u32; model.owned()];
+    points.iter().for_each(|point| flags[*point as usize] = 1);
+    let flags = order.collect(comm, &flags, 1);
+    Ok(Some(
+        (0..flags.len()).filter(|row| flags[*row] == 1).collect(),
+    ))
+}
+
+/// The rows that are kept of values with `width` numbers a row.
+fn pick<T: Copy>(kept: &Option<Vec<usize>>, values: Vec<T>, width: usize) -> Vec<T> {
+    let Some(kept) = kept else {
+        return values;
+    };
+    let row = |row: &usize| &values[row * width..(row + 1) * width];
+    kept.iter().flat_map(row).copied().collect()
+}
+
+/// Why the result that a checkpoint belongs to cannot be continued, if it cannot: it is not there, damaged or
+/// another one, or the plan asks for other fields or columns. Collective.
+///
+/// # Errors
+/// When a set of the history is empty, or a deck cannot be parsed.
+pub fn why_not_continued<const D: usize>(
     simulation: &Simulation<'_, D>,
     files: &Files,
     header: &Header,
-) -> Result<bool> {
+    physics: &str,
+) -> Result<Option<String>> {
     let comm: &dyn Communicator = simulation.comm;
     let observer = HistoryObserver::new(simulation)?;
-    let same = || -> Result<bool> {
+    let changed = agree(comm, history_differences(&header.deck, physics))?;
+    let order = id_order(simulation);
+    let all: Vec<usize> = (0..order.count()).collect();
+    let rows = kept(simulation, &order)?.unwrap_or(all);
+    let own = rows.iter().map(|row| mix(order.first() + *row as u64));
+    let points = comm::total(comm, own.fold(0, u64::wrapping_add));
+    let look = || -> Result<Option<String>> {
         if !files.result.exists() {
-            return Ok(false);
+            return Ok(Some("the result so far is gone".to_owned()));
         }
         let reader = ResultReader::open(&files.result)?;
-        let rows = reader
-            .history()?
+        let columns = reader.history()?;
+        let rows = columns
             .first()
             .map_or(0, |column| column.values.len() as u64);
-        // Fewer than the checkpoint counts: it is not the file that the checkpoint belongs to.
-        if (reader.steps()?.len() as u64) < header.outputs || rows < header.rows {
-            return Ok(false);
+        let outputs = reader.steps()?.len() as u64;
+        reader.times()?;
+        if outputs < header.outputs || rows < header.rows {
+            let text = "the result so far has fewer outputs or rows than the checkpoint counts";
+            return Ok(Some(text.to_owned()));
         }
         let fields = reader.fields()?;
-        let found: Vec<&str> = fields
-            .iter()
-            .filter(|f| f.dynamic)
-            .map(|f| &f.name[..])
-            .collect();
+        let moving = fields.iter().filter(|field| field.dynamic);
+        let found: Vec<&str> = moving.map(|field| &field.name[..]).collect();
         let mut wanted: Vec<&str> = wanted_fields(simulation.plan);
         wanted.sort_unstable();
-        let columns = reader.history()?;
-        let columns = columns.iter().map(|column| &column.name);
+        let names = columns.iter().map(|column| &column.name);
         let expected = observer.columns().iter().map(|(name, _)| name);
-        Ok(found == wanted && columns.eq(expected))
+        let single = |field: &StoredField| field.number == Number::F32;
+        let found_points = reader.ids()?.into_iter().map(mix);
+        if found_points.fold(0, u64::wrapping_add) != points {
+            return Ok(Some("other points are asked for".to_owned()));
+        } else if fields.iter().any(single) != (simulation.plan.output.single && !wanted.is_empty())
+        {
+            return Ok(Some("numbers of another length are asked for".to_owned()));
+        } else if found != wanted {
+            return Ok(Some("other fields are asked for".to_owned()));
+        } else if !names.eq(expected) {
+            return Ok(Some(
+                "other columns of the history are asked for".to_owned(),
+            ));
+        }
+        Ok(changed.map(|lines| format!("columns of the history mean something else: {lines}")))
     };
-    let same = match comm.rank() {
-        0 => same(),
-        _ => Ok(true),
+    let why = match comm.rank() {
+        0 => look().unwrap_or_else(|error| Some(damaged(&error))),
+        _ => None,
     };
-    let mut answer = vec![u8::from(agree(comm, same)?)];
-    comm.broadcast(0, &mut answer);
-    Ok(answer == [1])
+    let mut why = why.unwrap_or_default().into_bytes();
+    comm.broadcast(0, &mut why);
+    let why = String::from_utf8_lossy(&why).into_owned();
+    Ok((!why.is_empty()).then_some(why))
+}
+
+/// Why a result that cannot be read, or not be written to, is not continued.
+pub fn damaged(error: &Error) -> String {
+    format!("the result so far is damaged ({})", error.message)
 }
 
 fn wanted_fields(plan: &Plan) -> Vec<&'static str> {
@@ -277,7 +389,7 @@ fn wanted_fields(plan: &Plan) -> Vec<&'static str> {
 impl<'a> Layout<'a> {
     fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
-        order: &IdOrder,
+        (order, kept): (&IdOrder, &Option<Vec<usize>>),
         steps: u64,
         metadata: &'a [(&'a str, String)],
     ) -> Self {
@@ -286,27 +398,23 @@ impl<'a> Layout<'a> {
         let first = order.first();
         let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
         let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
+        let output = &simulation.plan.output;
+        let describe = |field: &Field| FieldDescription {
+            name: field.name(),
+            unit: field.unit(),
+            components: field.components(),
+        };
+        let ids = pick(kept, (first..first + order.count() as u64).collect(), 1);
+        let (first, total) = comm::scan(comm, ids.len() as u64);
         Self {
-            places: order.collect(comm, &places, 3),
-            ids: (first..first + order.count() as u64).collect(),
-            blocks: order.collect(comm, &blocks, 1),
-            volumes: order.collect(comm, &model.volume[..owned], 1),
-            moving: simulation
-                .plan
-                .output
-                .fields
-                .iter()
-                .map(|field| FieldDescription {
-                    name: field.name(),
-                    unit: field.unit(),
-                    components: field.components(),
-                })
-                .collect(),
+            places: pick(kept, order.collect(comm, &places, 3), 3),
+            blocks: pick(kept, order.collect(comm, &blocks, 1), 1),
+            volumes: pick(kept, order.collect(comm, &model.volume[..owned], 1), 1),
+            ids,
+            moving: output.fields.iter().map(describe).collect(),
             metadata,
-            piece: Piece {
-                first,
-                total: model.total,
-            },
+            single: output.single,
+            piece: Piece { first, total },
             steps,
         }
     }
@@ -331,6 +439,7 @@ impl<'a> Layout<'a> {
             fixed,
             moving: &self.moving,
             metadata: self.metadata,
+            single: self.single,
             steps: self.steps,
         }
     }

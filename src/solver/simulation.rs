@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::plan::{Method, Plan, Stage, StepRule, Time};
+use crate::deck::plan::{Action, Condition, Initial, Method, Plan, Stage, StepRule, Time};
 use crate::deck::shown;
 use crate::error::{Error, Result};
 use crate::partition::distribute;
@@ -53,6 +53,9 @@ pub struct Simulation<'a, const D: usize> {
     pub family_volume: Vec<f64>,
     /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
     pub cut: Vec<u64>,
+    /// Bonds of the owned points that were intact before any could break, counted from their ends here;
+    /// `None` where none breaks at the start.
+    pub intact_at_start: Option<u64>,
     /// The stable step with the density of the materials, s.
     pub stable_step: f64,
     /// Time and step of the present stage.
@@ -164,6 +167,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         apply_initials(plan, comm, &model, &mut fields)?;
         are_finite(plan, comm, &model, 0.0)?;
+        let intact_at_start = starts_deformed(plan).then(|| {
+            let mut intact = 0;
+            forces.for_each_intact(|_, _| intact += 1);
+            intact
+        });
         let mut simulation = Self {
             plan,
             comm,
@@ -177,6 +185,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             steps,
             family_volume,
             cut,
+            intact_at_start,
             stable_step: stable,
             clock,
             load_step: LoadStep::default(),
@@ -415,6 +424,14 @@ fn choose_step(plan: &Plan, time: &Time, length: f64, stable: f64) -> Result<(f6
         return Err(plan.source.error(plan.places.step.clone(), message));
     }
     Ok((step, steps))
+}
+
+/// Whether bonds may break in the place where the points begin.
+fn starts_deformed(plan: &Plan) -> bool {
+    let displaced = |initial: &Initial| initial.displacement.is_some();
+    let placed = |condition: &Condition| matches!(condition.action, Action::Displacement(_));
+    plan.bodies.iter().any(|body| body.damage.is_some())
+        && (plan.initials.iter().any(displaced) || plan.conditions.iter().any(placed))
 }
 
 /// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id

@@ -2,6 +2,7 @@
 
 use crate::deck::plan::{Action, FamilyRule, Plan, PointSource, Quadrature};
 use crate::solver::Simulation;
+use crate::solver::conditions::members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 
@@ -17,11 +18,32 @@ const LISTED: f64 = 4.0 + 1.0 / 8.0;
 /// Bytes of a bond of a lattice: a bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
+/// What a rank takes before it has points, alone and under a launcher (MPI's own buffers), bytes.
+const BASE: [f64; 2] = [14.0 * MEBI, 34.0 * MEBI];
+const MEBI: f64 = 1048576.0;
+
+/// Bytes a point, and a bond of a list, at the fullest moment of the set-up, where it is not measured.
+const SET_UP: [f64; 2] = [400.0, 12.0];
+
+/// Copies of a column on its way to the files: packed, received and put in order.
+const COPIES: f64 = 3.0;
+
+/// Memory of a process with points beside what it had without, bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The most during the set-up.
+    pub peak: f64,
+    /// After it.
+    pub kept: f64,
+}
+
 /// What a run takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
-    /// Memory of all ranks together in the time loop, without ghosts, bytes.
-    pub memory: f64,
+    /// Memory of all ranks together at the fullest moment of the set-up, without ghosts, bytes.
+    pub set_up: f64,
+    /// Memory of all ranks together in the time loop while something is written, without ghosts, bytes.
+    pub time_loop: f64,
     /// Number of outputs.
     pub outputs: u64,
     /// Size of the result at the end, bytes.
@@ -34,8 +56,11 @@ pub struct Cost {
 #[derive(Debug, Clone, Copy)]
 struct Counts {
     points: f64,
-    /// Bytes of the bonds in memory, and of what a checkpoint holds of them.
-    bonds: [f64; 2],
+    /// The share of the points that the result holds.
+    share: f64,
+    memory: Measured,
+    /// Bytes of a checkpoint that the bonds take.
+    bonds: f64,
     /// Columns of the history.
     columns: f64,
     /// Numbers that a checkpoint holds a point.
@@ -43,17 +68,30 @@ struct Counts {
 }
 
 impl Cost {
-    /// Of a run that stands ready on one rank, with so many columns in its history.
-    pub fn of<const D: usize>(simulation: &Simulation<'_, D>, columns: usize) -> Self {
-        let kept = simulation.forces.saved_lengths(simulation.model.owned());
+    /// Of a run that stands ready on one rank, with so many columns in its history. The memory of its
+    /// set-up is estimated where it is not measured.
+    pub fn of<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        columns: usize,
+        measured: Option<Measured>,
+    ) -> Self {
+        let (plan, model) = (simulation.plan, &simulation.model);
+        let points = model.total as f64;
+        let kept = simulation.forces.saved_lengths(model.owned());
         let kept = kept.iter().map(|length| f64::from(*length)).sum();
+        let bonds = simulation.forces.bytes() as f64;
+        let listed = simulation.forces.directed_bonds() - simulation.forces.lattice_bonds();
+        let count = |set: usize| members(plan, model, set).len() as f64;
+        let held = plan.output.set.as_ref().map(|(set, _)| count(*set));
         let counts = Counts {
-            points: simulation.model.total as f64,
-            bonds: [simulation.forces.bytes() as f64, kept],
+            points,
+            share: held.map_or(1.0, |held| held / points),
+            memory: measured.unwrap_or_else(|| estimated(plan, points, bonds, listed as f64)),
+            bonds: kept,
             columns: columns as f64,
             saved: simulation.saved_width(),
         };
-        cost(simulation.plan, counts, &simulation.expected_clock())
+        cost(plan, counts, &simulation.expected_clock())
     }
 
     /// Of a run of so many points and bonds, counted from both ends, and such steps, by estimate.
@@ -62,15 +100,59 @@ impl Cost {
         let on_lattice = plan.family != FamilyRule::List
             && plan.quadrature == Quadrature::Midpoint
             && plan.bodies.iter().all(|body| is_lattice(&body.points));
-        let bytes = if on_lattice { ON_LATTICE } else { LISTED };
+        let (bytes, listed) = match on_lattice {
+            true => (ON_LATTICE, 0.0),
+            false => (LISTED, directed_bonds),
+        };
         let counts = Counts {
             points,
-            bonds: [bytes * directed_bonds, ON_LATTICE * directed_bonds],
+            share: 1.0,
+            memory: estimated(plan, points, bytes * directed_bonds, listed),
+            bonds: ON_LATTICE * directed_bonds,
             columns: 16.0,
             saved: saved_width(plan),
         };
         cost(plan, counts, clock)
     }
+
+    /// The most memory that one of so many ranks takes, bytes; `ghosts` as a share of its own points.
+    pub fn memory_of_a_rank(&self, ranks: u32, ghosts: f64) -> f64 {
+        let points = self.set_up.max(self.time_loop) / f64::from(ranks);
+        BASE[usize::from(ranks > 1)] + points * (1.0 + ghosts)
+    }
+}
+
+/// Memory of the set-up and after it, by formula.
+fn estimated(plan: &Plan, points: f64, bonds: f64, listed: f64) -> Measured {
+    let dimension = plan.dimension.count();
+    let state = 8 * (2 * dimension + 1) + 8 * dimension + 8 * (dimension + 1) + 8 + 2;
+    let kept = bonds + state as f64 * points;
+    Measured {
+        peak: kept.max(SET_UP[0] * points + SET_UP[1] * listed),
+        kept,
+    }
+}
+
+/// Ghosts of a rank as a share of its own points, if the bodies fill a box with these edges (m) that is cut
+/// across its longest edges.
+pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
+    let mut parts = vec![1_u32; edges.len()];
+    let (mut left, mut factor) = (ranks, 2);
+    while left > 1 {
+        if !left.is_multiple_of(factor) {
+            factor += 1;
+            continue;
+        }
+        left /= factor;
+        let edge = |k: usize| edges[k] / f64::from(parts[k]);
+        let longest = (0..edges.len()).max_by(|a, b| edge(*a).total_cmp(&edge(*b)));
+        parts[longest.unwrap_or(0)] *= factor;
+    }
+    let grown = edges.iter().zip(parts).map(|(edge, parts)| {
+        let (sides, edge) = (f64::from((parts - 1).min(2)), edge.max(horizon));
+        1.0 + sides * horizon * f64::from(parts) / edge
+    });
+    grown.product::<f64>() - 1.0
 }
 
 /// Numbers that a checkpoint holds a point: displacement, velocity, energy set free; reactions, work; what
@@ -96,7 +178,6 @@ fn saved_width(plan: &Plan) -> usize {
 }
 
 fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
-    let dimension = plan.dimension.count();
     let count = |every| Schedule(every).count(clock);
     let (outputs, rows) = (count(plan.output.every), count(plan.history.every) as f64);
     let components: usize = plan
@@ -105,14 +186,37 @@ fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
         .iter()
         .map(|field| field.components())
         .sum();
-    let history = 8.0 * rows * counts.columns;
-    let state = 8 * (2 * dimension + 1) + 8 * dimension + 8 * (dimension + 1) + 8 + 2;
+    let number = if plan.output.single { 4.0 } else { 8.0 };
+    let written = counts.share * (FIXED + number * outputs as f64 * components as f64);
+    let saved = 8.0 * counts.saved as f64 + 4.0;
+    // While a column is on its way: what is known of the bonds, all columns of the output, and its copies.
+    let widest = plan.output.fields.iter().map(|field| field.components());
+    let widest = widest.max().unwrap_or(0).max(3) as f64;
+    let output = counts.points * 8.0 * (5.0 + components as f64 + COPIES * widest);
+    let bonds = counts.bonds;
+    let values = counts.points * 8.0 * counts.saved as f64;
+    let offsets = counts.points * 24.0;
+    let checkpoint = ((1.0 + COPIES) * values + bonds).max(2.0 * values + (1.0 + COPIES) * bonds);
     Cost {
-        memory: counts.bonds[0] + state as f64 * counts.points,
+        set_up: counts.memory.peak,
+        time_loop: counts.memory.kept + output.max(checkpoint + offsets),
         outputs,
-        result: OVERHEAD
-            + counts.points * (FIXED + 8.0 * outputs as f64 * components as f64)
-            + history,
-        checkpoint: OVERHEAD + counts.points * (8.0 * counts.saved as f64 + 4.0) + counts.bonds[1],
+        result: OVERHEAD + counts.points * written + 8.0 * rows * counts.columns,
+        checkpoint: OVERHEAD + counts.points * saved + bonds,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ghosts_lie_beyond_cuts_only() {
+        let share = |ranks| ghost_share(&[4.0, 1.0], 0.1, ranks);
+        assert_eq!(share(1), 0.0);
+        assert!((share(2) - 0.05).abs() < 1e-12);
+        // Three cuts across the long edge: those in the middle have ghosts on both sides.
+        assert!((share(4) - 0.2).abs() < 1e-12);
+        assert!((ghost_share(&[3.0], 0.1, 3) - 0.2).abs() < 1e-12);
     }
 }

@@ -68,8 +68,10 @@ fn block(plan: &Plan, body: usize) -> Option<Plan> {
         conditions: Vec::new(),
         history: History {
             reactions: Vec::new(),
+            support_forces: Vec::new(),
             probes: Vec::new(),
             fronts: Vec::new(),
+            cracks: Vec::new(),
             tips: Vec::new(),
             ..plan.history.clone()
         },

@@ -9,7 +9,7 @@ mod loads;
 mod size;
 
 pub use bodies::BodyFigures;
-pub use cost::Cost;
+pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
 pub use size::{Size, size};
 

@@ -127,7 +127,7 @@ pub(super) enum Ternary {
 
 impl Unary {
     /// The operation's value.
-    fn apply(self, value: f64) -> f64 {
+    pub(super) fn apply(self, value: f64) -> f64 {
         match self {
             Self::Negate => -value,
             Self::Not => truth(value == 0.0),
@@ -160,7 +160,7 @@ impl Unary {
 
 impl Binary {
     /// The operation's value.
-    fn apply(self, left: f64, right: f64) -> f64 {
+    pub(super) fn apply(self, left: f64, right: f64) -> f64 {
         match self {
             Self::Add => left + right,
             Self::Subtract => left - right,
@@ -188,7 +188,7 @@ impl Binary {
 
 impl Ternary {
     /// The operation's value.
-    fn apply(self, first: f64, second: f64, third: f64) -> f64 {
+    pub(super) fn apply(self, first: f64, second: f64, third: f64) -> f64 {
         match self {
             Self::Choose if first != 0.0 => second,
             Self::Choose => third,

@@ -691,3 +691,47 @@ proptest! {
         prop_assert!(is_handled(&text), "{}", text);
     }
 }
+
+#[test]
+fn increments_have_the_rounding_of_a_change() {
+    // Exact to the digits shown, from a far value in a small step.
+    let (time, step) = (7.0, 1e-9);
+    let sech = 1.0 - 1_f64.tanh().powi(2);
+    let change = |text: &str| parse(text).unwrap().increment([2.0, 3.0, 5.0], time, step);
+    for (text, slope, curvature) in [
+        ("1e6 + 3*t", 3.0, 0.0),
+        ("-(t - 1e6)/4", -0.25, 0.0),
+        ("t^3", 147.0, 42.0),
+        ("t^-2", -2.0 / 343.0, 6.0 / 2401.0),
+        (
+            "100*sin(3*t)",
+            300.0 * 21.0_f64.cos(),
+            -900.0 * 21.0_f64.sin(),
+        ),
+        ("cos(t)", -(7.0_f64.sin()), -(7.0_f64.cos())),
+        ("exp(t/7)", 1_f64.exp() / 7.0, 1_f64.exp() / 49.0),
+        ("log(t)", 1.0 / 7.0, -1.0 / 49.0),
+        ("sqrt(t)", 0.5 / 7_f64.sqrt(), -0.25 * 7_f64.powf(-1.5)),
+        ("t^0.5", 0.5 / 7_f64.sqrt(), -0.25 * 7_f64.powf(-1.5)),
+        ("2^t", 128.0 * 2_f64.ln(), 128.0 * 2_f64.ln().powi(2)),
+        ("x*t/(x + t)", 4.0 / 81.0, -8.0 / 729.0),
+        ("if(t > 3, 5*t, 0)", 5.0, 0.0),
+        ("ramp(t, 6, 10)", 0.25, 0.0),
+        ("ramp(t, 8, 10)", 0.0, 0.0),
+        ("min(t, 8) + max(2*t, 1) + clamp(t, 0, 9)", 4.0, 0.0),
+        ("abs(y - t)", 1.0, 0.0),
+        ("hypot(t, 0*x)", 1.0, 0.0),
+        ("tanh(t/7)", sech / 7.0, -2.0 * 1_f64.tanh() * sech / 49.0),
+    ] {
+        let expected = slope * step + 0.5 * curvature * step * step;
+        let error = (change(text) - expected).abs();
+        assert!(
+            error <= 1e-13 * expected.abs(),
+            "{text}: {} {expected}",
+            change(text)
+        );
+    }
+    // What jumps, jumps.
+    assert_eq!(change("step(t - 7 - 1e-12)"), 1.0);
+    assert_eq!(change("3 + x"), 0.0);
+}

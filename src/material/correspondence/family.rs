@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
+use super::super::Bond;
 use crate::lanes::Lanes;
 
 /// A shape tensor is singular where its determinant is below this share of that of a family of the same
@@ -33,6 +34,27 @@ pub fn symmetric<const D: usize>(
     }
     // In space the mixed entry of two directions has the place of the third.
     if D == 3 { others[3 - a - b] } else { others[0] }
+}
+
+/// What a bond adds to the shape tensor, by diagonal and mixed entries, and to Σ ω η⊗ξ Ṽ, row by row.
+pub type FamilyShare<const D: usize> = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D]);
+
+/// See [`FamilyShare`]; m², by weight and volume.
+#[inline(always)]
+pub fn family_share<const D: usize>(bond: &Bond<D>) -> FamilyShare<D> {
+    let xi = &bond.reference;
+    let motion = bond.moved.map(|eta| xi.map(|xi| eta * xi));
+    (shape_share(xi), motion)
+}
+
+/// ξ⊗ξ by diagonal and mixed entries.
+#[inline(always)]
+pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) {
+    let mut others = [Lanes::splat(0.0); D];
+    for (k, (a, b)) in mixed::<D>().enumerate() {
+        others[k] = xi[a] * xi[b];
+    }
+    (xi.map(|xi| xi * xi), others)
 }
 
 /// K = Σ ω ξ⊗ξ Ṽ of a point.

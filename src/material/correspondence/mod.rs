@@ -24,7 +24,8 @@ use super::{
 };
 use crate::lanes::{Lanes, Simd};
 use control::Control;
-use family::{ShapeTensor, extremes, symmetric};
+pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
+use family::{extremes, shape_share, symmetric};
 use hooke::Hooke;
 use stress::Stress;
 
@@ -112,7 +113,7 @@ impl<const D: usize> Law<D> for Correspondence {
     /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
     type WholeSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
     /// K as in the whole sum, and Σ ω η⊗ξ Ṽ (m⁵).
-    type Sum = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D]);
+    type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;
     const STAGES: usize = 1;
@@ -142,9 +143,7 @@ impl<const D: usize> Law<D> for Correspondence {
 
     #[inline(always)]
     fn share<const S: usize>(&self, bond: &Bond<D>, _: &Self::Point, _: &[Lanes; 0]) -> Self::Sum {
-        let xi = &bond.reference;
-        let motion = bond.moved.map(|eta| xi.map(|xi| eta * xi));
-        (shape_share(xi), motion)
+        family_share(bond)
     }
 
     fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
@@ -234,17 +233,11 @@ impl<const D: usize> Law<D> for Correspondence {
         end.0[0]
     }
 
+    fn needs_shape(&self) -> bool {
+        true
+    }
+
     fn resists_across(&self) -> bool {
         true
     }
-}
-
-/// ξ⊗ξ by diagonal and mixed entries.
-#[inline(always)]
-fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) {
-    let mut mixed = [Lanes::splat(0.0); D];
-    for (k, (a, b)) in family::mixed::<D>().enumerate() {
-        mixed[k] = xi[a] * xi[b];
-    }
-    (xi.map(|xi| xi * xi), mixed)
 }

@@ -100,7 +100,7 @@ impl<const D: usize> Forces<D> {
         let halo_before = times.halo;
         let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
         for points in self.ranges(own.iter().copied()) {
-            self.find_numbers(points, model, force);
+            self.find_numbers(points, model, displacement, force);
         }
         let changed = self.send_numbers(comm, model, displacement, own, times);
         for points in self.ranges(changed.into_iter()) {
@@ -110,13 +110,24 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Finds the numbers of some points anew, and books the energy that they lose by it.
-    fn find_numbers(&mut self, points: Range<usize>, model: &Model<D>, force: &mut [Vec<f64>; D]) {
+    fn find_numbers(
+        &mut self,
+        points: Range<usize>,
+        model: &Model<D>,
+        displacement: &[Vec<f64>; D],
+        force: &mut [Vec<f64>; D],
+    ) {
         let before = self.stored_at(model, points.clone()).energy;
         for stage in (0..self.numbers.stages).map(Stage::PointSum) {
+            if stage != Stage::PointSum(0) {
+                self.update(News::OwnNumbers, Which::Owned, model, displacement);
+            }
             self.clear(stage, points.clone());
             self.run(stage, points.clone(), force, Evolution::None);
             self.finish(stage, points.clone(), model, Evolution::None);
         }
+        // Bonds read what lattices show of the points.
+        self.update(News::OwnNumbers, Which::Owned, model, displacement);
         let after = self.stored_at(model, points.clone()).energy;
         for broken in &mut self.broken {
             if points.contains(&broken.point) {

@@ -33,6 +33,8 @@ pub(super) enum News {
     Displacement,
     Thresholds,
     Numbers,
+    /// Numbers again, but only those of the own ends.
+    OwnNumbers,
     Nothing,
 }
 
@@ -99,7 +101,7 @@ impl<const D: usize> Forces<D> {
                     let columns = &self.numbers.columns[changing.clone()];
                     halo.pack(columns.iter().map(Vec::as_slice));
                 }
-                News::Nothing => {}
+                News::OwnNumbers | News::Nothing => {}
             }
             self.clear(stage, 0..owned);
             let mut timed = |work: &mut dyn FnMut()| {
@@ -119,7 +121,7 @@ impl<const D: usize> Forces<D> {
                 }
                 timed(&mut || self.run(stage, rest.clone(), force, evolution));
             };
-            if news == News::Nothing {
+            if matches!(news, News::OwnNumbers | News::Nothing) {
                 interior(&mut || false);
             } else {
                 halo.exchange(comm, &mut interior);
@@ -133,7 +135,7 @@ impl<const D: usize> Forces<D> {
                     let columns = &mut self.numbers.columns[changing];
                     halo.unpack(columns.iter_mut().map(Vec::as_mut_slice));
                 }
-                News::Nothing => {}
+                News::OwnNumbers | News::Nothing => {}
             }
             self.halo = halo;
             let start = Instant::now();
@@ -159,6 +161,7 @@ impl<const D: usize> Forces<D> {
             (None, _) => News::Displacement,
             (Some(Stage::SmallestStretch), _) => News::Thresholds,
             (Some(Stage::PointSum(_)), Stage::Force) => News::Numbers,
+            (Some(Stage::PointSum(_)), _) => News::OwnNumbers,
             _ => News::Nothing,
         }
     }
@@ -175,7 +178,8 @@ impl<const D: usize> Forces<D> {
             match news {
                 News::Displacement => grid.update_displacement(which, displacement),
                 News::Thresholds => grid.update_thresholds(which, &self.thresholds),
-                News::Numbers => {
+                News::OwnNumbers if which == Which::Ghosts => {}
+                News::Numbers | News::OwnNumbers => {
                     let first = self.numbers.first_changing;
                     grid.update_numbers(which, first, &self.numbers.columns);
                 }

@@ -2,7 +2,7 @@
 
 use crate::lanes::{Lanes, Numbers, Simd};
 use crate::material::bond::Wanted;
-use crate::material::{ForceState, Law};
+use crate::material::{FamilyShare, ForceState, Law, family_share};
 
 use super::kernel::{Group, Kernel};
 
@@ -170,6 +170,35 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
         add_tensor::<S, D>(simd, sums, group.intact, |a, b| {
             force.dyad(&group.bond, a, b)
         });
+    }
+}
+
+/// Sums the tensors of the intact bonds of a point: the shape tensor Σ ω ξ⊗ξ Ṽ by diagonal and mixed
+/// entries, and Σ ω η⊗ξ Ṽ row by row, m⁵.
+#[derive(Clone, Copy)]
+pub struct FamilyTensors;
+
+impl<const D: usize> Kernel<D> for FamilyTensors {
+    type Sums = FamilyShare<D>;
+    type Broken = [Lanes; 0];
+    type Point = [Lanes; 0];
+    type Memory = [Lanes; 0];
+    const WANTED: Wanted = wanted(true);
+
+    #[inline(always)]
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<Self, D>,
+        sums: &mut Self::Sums,
+        _: &mut [Lanes; 0],
+    ) {
+        let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
+        let share = family_share(&group.bond);
+        for k in 0..FamilyShare::<D>::COUNT {
+            let sum = sums.get_mut(k);
+            *sum = simd.multiply_add(share.get(k), weight, *sum);
+        }
     }
 }
 

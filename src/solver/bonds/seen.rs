@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use nalgebra::SMatrix;
+
 use crate::families::BlockBonds;
 use crate::lanes::{Lanes, Numbers};
-use crate::material::{Law, with_pair};
+use crate::material::{Law, ShapeTensor, with_pair};
 use crate::solver::model::Model;
 
 use super::Forces;
@@ -109,6 +111,45 @@ impl<const D: usize> Forces<D> {
             });
         });
         columns.try_into().expect("six columns")
+    }
+
+    /// The deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
+    /// displacements of the last [evaluation](Self::evaluate); I where too few are left.
+    pub fn deformation_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
+        let columns = self.measure(model.owned(), 2 * D + D * D, |interaction, sums, source| {
+            sweep_all(
+                &mut interaction.bonds,
+                sums,
+                &measures::FamilyTensors,
+                source,
+            );
+        });
+        let gradient = |point: usize| {
+            let entry = |k: usize| columns[k][point];
+            let shape: Vec<f64> = (0..2 * D).map(entry).collect();
+            let moved = SMatrix::from_fn(|a, b| entry(2 * D + D * a + b));
+            let inverse = ShapeTensor::new(&shape).inverse();
+            let change = inverse.map(|inverse| moved * inverse);
+            SMatrix::identity() + change.unwrap_or_else(SMatrix::zeros)
+        };
+        (0..model.owned()).map(gradient).collect()
+    }
+
+    /// 1 for each owned point that has too few bonds left for its law, else 0.
+    pub fn singular(&self, model: &Model<D>) -> Vec<f64> {
+        let is_singular = |point: usize| {
+            let law = &self.blocks[usize::from(model.block[point])].law;
+            let singular = Law::<D>::is_singular(law, &self.numbers.of(point));
+            f64::from(u8::from(singular))
+        };
+        (0..model.owned()).map(is_singular).collect()
+    }
+
+    /// Whether points of any law can be [singular](Self::singular); the same on all ranks.
+    pub fn can_be_singular(&self) -> bool {
+        self.blocks
+            .iter()
+            .any(|block| Law::<D>::needs_shape(&block.law))
     }
 
     /// Weighted volume m (m⁵) and dilatation θ of each owned point, at the displacements of the last

@@ -125,33 +125,34 @@ impl Support {
     ) -> bool {
         let component = self.component;
         let mut finite = true;
-        // Value now, and a step before and after; before the start the motion is extrapolated.
+        // Value now, and its changes in the step before and the one to come; before the start the motion is
+        // extrapolated.
         let mut now = 0.0;
-        let mut around = [0.0; 2];
+        let mut changes = [0.0; 2];
         for (k, point) in self.points.iter().enumerate() {
             let position = self.positions[k];
-            let value = |time: f64| self.values.expression.evaluate(position, time);
+            let change = |step: f64| self.values.expression.increment(position, time, step);
             if self.values.varies || k == 0 {
-                now = value(time);
+                now = self.values.expression.evaluate(position, time);
                 // The motion may end here, as √(1 − t) does: then it is extrapolated.
-                let after = match value(time + step) {
-                    after if after.is_finite() || time < step => after,
-                    _ => 2.0 * now - value(time - step),
+                let to_come = match change(step) {
+                    to_come if to_come.is_finite() || time < step => to_come,
+                    _ => -change(-step),
                 };
                 let before = match self.motion {
-                    _ if time >= step => value(time - step),
-                    Motion::Displacement => 2.0 * now - after,
-                    Motion::Velocity => now,
+                    _ if time >= step => -change(-step),
+                    Motion::Displacement => to_come,
+                    Motion::Velocity => 0.0,
                 };
-                around = [before, after];
+                changes = [before, to_come];
             }
-            let [before, after] = around;
+            let [before, to_come] = changes;
             let (velocity, acceleration) = match self.motion {
                 Motion::Displacement => (
-                    (after - before) / (2.0 * step),
-                    ((after - now) - (now - before)) / (step * step),
+                    (before + to_come) / (2.0 * step),
+                    (to_come - before) / (step * step),
                 ),
-                Motion::Velocity => (now, (after - before) / (2.0 * step)),
+                Motion::Velocity => (now, (before + to_come) / (2.0 * step)),
             };
             let point = *point as usize;
             fields.velocity[component][point] = velocity;

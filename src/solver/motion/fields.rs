@@ -158,6 +158,14 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
+    /// Number of a point's bonds that have broken since the start; none without damage.
+    broken_bonds: Option<Vec<f64>> = Description {
+        name: "broken_bonds",
+        unit: "1",
+        birth: Birth::FoundAnew,
+        output: Some(Field::BrokenBonds),
+        ..STATE
+    };
     /// Energy that a point's share of bonds has set free by breaking, J; none without damage.
     freed_energy: Option<Vec<f64>> = Description {
         name: "freed_energy",
@@ -244,6 +252,7 @@ impl<const D: usize> Fields<D> {
             internal_force: vector(owned),
             external_force: needs.loads.then(|| vector(owned)),
             reaction: needs.supports.then(|| vector(owned)),
+            broken_bonds: needs.damage.then(scalar),
             freed_energy: needs.damage.then(scalar),
             overshoot_energy: needs.damage.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
@@ -306,13 +315,17 @@ impl<const D: usize> Fields<D> {
     /// nor energy depends on the step to first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
         let velocity = &self.velocity;
-        let (Some(freed), Some(overshoot)) = (&mut self.freed_energy, &mut self.overshoot_energy)
-        else {
+        let (Some(count), Some(freed), Some(overshoot)) = (
+            &mut self.broken_bonds,
+            &mut self.freed_energy,
+            &mut self.overshoot_energy,
+        ) else {
             return;
         };
         for broken in all {
             let point = broken.point;
             let power: f64 = (0..D).map(|d| broken.force[d] * velocity[d][point]).sum();
+            count[point] += broken.count as f64;
             freed[point] += broken.energy + 0.5 * step * model.volume[point] * power;
             overshoot[point] += broken.overshoot;
         }
@@ -321,7 +334,8 @@ impl<const D: usize> Fields<D> {
     /// The columns of a field, if decks may ask for it and it is one of the points'.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
-            (description.output == Some(field)).then_some(columns)
+            let there = !columns.is_empty() && description.output == Some(field);
+            there.then_some(columns)
         })
     }
 }
@@ -341,6 +355,6 @@ mod tests {
                 offered += 1;
             }
         }
-        assert_eq!(offered, 3);
+        assert_eq!(offered, 4);
     }
 }

@@ -1,4 +1,4 @@
-//! The history of a run: energies and other sums, probes, fronts and crack tips.
+//! The history of a run: energies and other sums, probes, fronts, crack paths and crack tips.
 
 use rayon::prelude::*;
 
@@ -9,6 +9,8 @@ use crate::error::Result;
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
+use super::centre_line::{self, Branch};
+use super::crack_path::CrackPath;
 use super::front::Front;
 use super::nearest::nearest;
 use super::snapshot::Snapshot;
@@ -30,10 +32,13 @@ struct Probe {
 pub struct HistoryObserver {
     columns: Vec<(String, &'static str)>,
     reactions: Vec<Vec<u32>>,
+    /// Points, and the direction in which the force on them counts.
+    support_forces: Vec<(Vec<u32>, [f64; 3])>,
     probes: Vec<Probe>,
     fronts: Vec<Front>,
+    cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
-    /// Energy (J) and intact bonds in the first row.
+    /// Energy (J) in the first row, and intact bonds before.
     start: Option<(f64, u64)>,
 }
 
@@ -61,8 +66,12 @@ pub struct Energies {
 pub struct HistoryRow {
     /// Values in the order of the columns; the same on all ranks.
     pub values: Vec<f64>,
+    /// Number of the step that it is of.
+    pub number: u64,
     /// The energies among them.
     pub energies: Energies,
+    /// Energy at the start, which the error of the balance refers to, J.
+    pub first_energy: f64,
     /// Bonds broken since the start.
     pub broken: u64,
 }
@@ -108,6 +117,9 @@ impl HistoryObserver {
         vector(&mut columns, "cracked_lower".to_owned(), "m");
         vector(&mut columns, "cracked_upper".to_owned(), "m");
         columns.push(("overshoot_energy".to_owned(), "J"));
+        if simulation.forces.can_be_singular() {
+            columns.push(("singular_points".to_owned(), "1"));
+        }
         let mut reactions = Vec::new();
         for Reaction { set, span } in &plan.history.reactions {
             let points = members(plan, &simulation.model, *set);
@@ -119,6 +131,14 @@ impl HistoryObserver {
                 format!("reaction_{}", plan.sets[*set].name),
                 "N",
             );
+        }
+        let mut support_forces = Vec::new();
+        for rule in &plan.history.support_forces {
+            let points = members(plan, &simulation.model, rule.set);
+            let key = format!("[history.force.{}] set", rule.name);
+            not_empty(plan, comm, rule.set, &points, (&key, rule.span.clone()))?;
+            support_forces.push((points, rule.direction));
+            columns.push((format!("force_{}", rule.name), "N"));
         }
         let mut probes = Vec::new();
         for plan::Probe { name, at, .. } in &plan.history.probes {
@@ -132,6 +152,12 @@ impl HistoryObserver {
             fronts.push(Front::new(simulation, front)?);
             columns.push((format!("front_{}", front.name), "m"));
         }
+        let mut cracks = Vec::new();
+        for rule in &plan.history.cracks {
+            cracks.push(CrackPath::new(simulation, rule)?);
+            columns.push((format!("crack_{}_length", rule.name), "m"));
+            columns.push((format!("crack_{}_branches", rule.name), "1"));
+        }
         let mut tips = Vec::new();
         for tip in &plan.history.tips {
             tips.push(Tip::new(simulation, tip)?);
@@ -143,8 +169,10 @@ impl HistoryObserver {
         Ok(Self {
             columns,
             reactions,
+            support_forces,
             probes,
             fronts,
+            cracks,
             tips,
             start: None,
         })
@@ -155,12 +183,13 @@ impl HistoryObserver {
         &self.columns
     }
 
-    /// Energy (J) and intact bonds in the first row, which later ones refer to.
+    /// Energy (J) in the first row and bonds that were intact before any could break, which later rows
+    /// refer to.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
 
-    /// Goes on with a history whose first row had this energy (J) and so many intact bonds.
+    /// Goes on with a history that [started](Self::start) so.
     pub fn continue_from(&mut self, start: (f64, u64)) {
         self.start = Some(start);
     }
@@ -174,6 +203,20 @@ impl HistoryObserver {
                 tip.recall(row[0], values[D]);
             }
         }
+    }
+
+    /// The name of each crack whose path is found, and its branches now; the same on all ranks.
+    /// Collective.
+    pub fn crack_paths<const D: usize>(
+        &self,
+        simulation: &Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) -> Vec<(&str, Vec<Branch>)> {
+        let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        self.cracks
+            .iter()
+            .map(|crack| (crack.name(), crack.branches(simulation, damage)))
+            .collect()
     }
 
     /// The present row; collective.
@@ -192,7 +235,8 @@ impl HistoryObserver {
         }
         sums.push(dissipated);
         sums.push(sum(fields.overshoot_energy.as_deref().unwrap_or_default()));
-        for members in &self.reactions {
+        let directed = self.support_forces.iter().map(|(members, _)| members);
+        for members in self.reactions.iter().chain(directed) {
             sums.extend(simulation.conditions.reaction(model, fields, members));
         }
         let sums = reduce(comm, &mut sums);
@@ -204,13 +248,18 @@ impl HistoryObserver {
         let cracked = Cracked::new(simulation, snapshot);
         let neighbours = snapshot.stored.neighbours.iter();
         let intact: u64 = neighbours.map(|count| *count as u64).sum();
-        let mut counts = [intact, cracked.points];
+        let singular = simulation.forces.can_be_singular().then(|| {
+            let all = simulation.forces.singular(model);
+            all.iter().filter(|value| **value > 0.0).count() as u64
+        });
+        let at_start = simulation.intact_at_start.unwrap_or(intact);
+        let mut counts = [intact, cracked.points, at_start, singular.unwrap_or(0)];
         comm.sum(&mut counts);
-        let [intact, cracked_points] = counts;
+        let [intact, cracked_points, at_start, singular_points] = counts;
         let (lower, upper) = cracked.extent(comm);
 
         let energy = own[0] + own[1] + own[2] + dissipated - work;
-        let (first_energy, first_intact) = *self.start.get_or_insert((energy, intact));
+        let (first_energy, first_intact) = *self.start.get_or_insert((energy, at_start));
         let energies = Energies {
             kinetic: own[0],
             strain: own[1],
@@ -251,18 +300,31 @@ impl HistoryObserver {
         values.extend(&lower[..D]);
         values.extend(&upper[..D]);
         values.push(energies.overshoot);
+        values.extend(singular.map(|_| singular_points as f64));
+        let (reactions, directed) = reactions.split_at(D * self.reactions.len());
         values.extend(reactions);
+        for (force, (_, direction)) in directed.chunks_exact(D).zip(&self.support_forces) {
+            let products = force.iter().zip(direction).map(|(f, d)| f * d);
+            values.push(products.sum());
+        }
         values.extend(self.probe_values(simulation));
         for front in &self.fronts {
             values.push(front.position(simulation, snapshot));
         }
         let damage = |point| snapshot.damage(&simulation.family_volume, point);
+        for crack in &self.cracks {
+            let branches = crack.branches(simulation, damage);
+            values.push(centre_line::length(&branches));
+            values.push(branches.len() as f64);
+        }
         for tip in &mut self.tips {
             values.extend(tip.row(simulation, damage));
         }
         HistoryRow {
             values,
+            number: simulation.clock.number(),
             energies,
+            first_energy,
             broken,
         }
     }

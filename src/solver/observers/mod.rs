@@ -1,6 +1,9 @@
-//! What is seen of a run: fields for the result; sums, probes, fronts and crack tips for the history.
+//! What is seen of a run: fields for the result; sums, probes, fronts, crack paths and
+//! crack tips for the history.
 
+mod centre_line;
 mod contact;
+mod crack_path;
 mod front;
 pub mod history;
 pub mod nearest;
@@ -9,6 +12,7 @@ pub mod schedule;
 pub mod snapshot;
 mod tip;
 
+pub use centre_line::{Branch, Vertex};
 pub use contact::{Contact, ContactWatch};
 pub use history::{Energies, HistoryObserver, HistoryRow};
 pub use nearest::{Nearest, nearest};

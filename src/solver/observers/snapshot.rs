@@ -1,6 +1,10 @@
 //! A run at one moment: fields for the result, found when they are asked for.
 
+use nalgebra::{Matrix3, SMatrix};
+
 use crate::deck::plan::Field;
+use crate::dimension::Dimension;
+use crate::material::determinant;
 use crate::solver::Simulation;
 use crate::solver::bonds::Stored;
 
@@ -58,18 +62,116 @@ impl Snapshot {
             Field::StrainEnergyDensity => self.stored.energy.clone(),
             Field::Neighbours => self.stored.neighbours.clone(),
             Field::Dilatation => {
-                let [_, dilatation] = simulation.forces.dilatation(model);
+                let [_, mut dilatation] = simulation.forces.dilatation(model);
+                for (point, value) in dilatation.iter_mut().enumerate() {
+                    *value *= trace_share(simulation, point);
+                }
                 dilatation
             }
             Field::WeightedVolume => {
                 let [volume, _] = simulation.forces.dilatation(model);
                 volume
             }
-            Field::Stress => rows(&simulation.forces.stress(model), count, 6),
+            Field::Stress => {
+                let mut stress = simulation.forces.stress(model);
+                across(simulation, &mut stress);
+                rows(&stress, count, 6)
+            }
+            Field::CauchyStress => {
+                let stress = self.field(simulation, Field::Stress);
+                cauchy_stress(simulation, stress)
+            }
+            Field::VonMisesStress => {
+                let stress = self.field(simulation, Field::CauchyStress);
+                stress.chunks_exact(6).map(von_mises).collect()
+            }
+            Field::DeformationGradient => {
+                let all = simulation.forces.deformation_gradient(model);
+                let whole = |tensor: &SMatrix<f64, D, D>| {
+                    let mut whole = Matrix3::identity();
+                    whole.view_mut((0, 0), (D, D)).copy_from(tensor);
+                    whole.transpose()
+                };
+                all.iter()
+                    .flat_map(|tensor| whole(tensor).data.0)
+                    .flatten()
+                    .collect()
+            }
+            Field::Singular => simulation.forces.singular(model),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
+            // Where no bonds can break.
+            Field::BrokenBonds => vec![0.0; count],
             Field::Displacement | Field::Velocity | Field::ForceDensity => {
                 unreachable!("one of the points' own fields")
             }
+        }
+    }
+}
+
+/// Cauchy's stress from Kirchhoff's, row by row: over the volume that the deformed body has for one of
+/// the undeformed. In plane stress the plate thins as Hooke's law has it, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy)
+/// with logarithmic strains.
+fn cauchy_stress<const D: usize>(
+    simulation: &mut Simulation<'_, D>,
+    mut kirchhoff: Vec<f64>,
+) -> Vec<f64> {
+    let gradients = simulation.forces.deformation_gradient(&simulation.model);
+    for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
+        let block = usize::from(simulation.model.block[point]);
+        let ratio = simulation.plan.bodies[block].material.elastic.poisson_ratio;
+        let in_plane = determinant(gradient);
+        let growth = match simulation.plan.dimension {
+            Dimension::PlaneStress { .. } => in_plane.powf((1.0 - 2.0 * ratio) / (1.0 - ratio)),
+            _ => in_plane,
+        };
+        // A body turned inside out has no volume to speak of.
+        let growth = if growth > 0.0 { growth } else { 1.0 };
+        stress.iter_mut().for_each(|entry| *entry /= growth);
+    }
+    kirchhoff
+}
+
+/// Of xx, yy, zz, xy, yz, xz.
+fn von_mises(stress: &[f64]) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = *stress else {
+        unreachable!("six entries")
+    };
+    let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
+    (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+}
+
+/// ν of an owned point's body.
+fn poisson_ratio<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    let block = usize::from(simulation.model.block[point]);
+    let elastic = simulation.plan.bodies[block].material.elastic;
+    elastic.poisson_ratio
+}
+
+/// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
+/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy).
+fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    match simulation.plan.dimension {
+        Dimension::PlaneStress { .. } => {
+            let ratio = poisson_ratio(simulation, point);
+            (1.0 - 2.0 * ratio) / (1.0 - ratio)
+        }
+        Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => 1.0,
+    }
+}
+
+/// The stress across the directions of the setting where there is no strain, by Hooke's law: zz = ν (xx +
+/// yy) in plane strain, yy = zz = ν/(1 − ν) xx in 1-D.
+fn across<const D: usize>(simulation: &Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
+    let [xx, yy, zz, ..] = stress;
+    for point in 0..zz.len() {
+        let ratio = poisson_ratio(simulation, point);
+        match simulation.plan.dimension {
+            Dimension::PlaneStrain { .. } => zz[point] = ratio * (xx[point] + yy[point]),
+            Dimension::Line { .. } => {
+                zz[point] = ratio / (1.0 - ratio) * xx[point];
+                yy[point] = zz[point];
+            }
+            Dimension::PlaneStress { .. } | Dimension::Space => {}
         }
     }
 }

@@ -1,0 +1,134 @@
+//! How an expression changes in time, without the rounding of its values.
+//!
+//! The difference of two values of a motion has an error of ε|u|, that of their second difference by the
+//! square of a small step is large. Here each operation gives the change of its value from the changes of
+//! its operands, by identities such as sin b − sin a = 2 cos((a + b)/2) sin((b − a)/2); so the error is one of
+//! the change.
+
+use super::Variable;
+use super::evaluate::{Binary, Instruction, Ternary, Unary};
+
+/// A value, and how it changes.
+#[derive(Debug, Clone, Copy)]
+struct Moving {
+    value: f64,
+    change: f64,
+}
+
+impl Moving {
+    fn end(self) -> f64 {
+        self.value + self.change
+    }
+}
+
+/// By how much the code's value changes while the time does so by `step`, from the variables x, y, z, t on.
+pub(super) fn increment(code: &[Instruction], variables: [f64; 4], step: f64) -> f64 {
+    let mut stack: Vec<Moving> = Vec::with_capacity(code.len());
+    let take = |stack: &mut Vec<Moving>| stack.pop().expect("postfix code has its operands");
+    for instruction in code {
+        let result = match *instruction {
+            Instruction::Constant(value) => Moving { value, change: 0.0 },
+            Instruction::Variable(variable) => Moving {
+                value: variables[variable.slot()],
+                change: if variable == Variable::T { step } else { 0.0 },
+            },
+            Instruction::Unary(operation) => unary(operation, take(&mut stack)),
+            Instruction::Binary(operation) => {
+                let right = take(&mut stack);
+                binary(operation, take(&mut stack), right)
+            }
+            Instruction::Ternary(operation) => {
+                let (third, second) = (take(&mut stack), take(&mut stack));
+                ternary(operation, [take(&mut stack), second, third])
+            }
+        };
+        stack.push(result);
+    }
+    take(&mut stack).change
+}
+
+fn unary(operation: Unary, a: Moving) -> Moving {
+    let (from, change, to) = (a.value, a.change, a.end());
+    let (half, middle) = (0.5 * change, from + 0.5 * change);
+    let value = operation.apply(from);
+    let change = match operation {
+        _ if change == 0.0 => 0.0,
+        Unary::Negate => -change,
+        Unary::IntegerPower(power) => power_change(from, to, change, power),
+        Unary::Sine => 2.0 * middle.cos() * half.sin(),
+        Unary::Cosine => -2.0 * middle.sin() * half.sin(),
+        Unary::HyperbolicSine => 2.0 * middle.cosh() * half.sinh(),
+        Unary::HyperbolicCosine => 2.0 * middle.sinh() * half.sinh(),
+        Unary::HyperbolicTangent => change.tanh() * (1.0 - value * to.tanh()),
+        Unary::Exponential => value * change.exp_m1(),
+        Unary::Logarithm if from > 0.0 => (change / from).ln_1p(),
+        Unary::DecimalLogarithm if from > 0.0 => (change / from).ln_1p() / std::f64::consts::LN_10,
+        Unary::SquareRoot if from > 0.0 => change / (value + to.sqrt()),
+        Unary::Absolute if from > 0.0 && to > 0.0 => change,
+        Unary::Absolute if from < 0.0 && to < 0.0 => -change,
+        _ => operation.apply(to) - value,
+    };
+    Moving { value, change }
+}
+
+/// to^n − from^n.
+fn power_change(from: f64, to: f64, change: f64, power: i32) -> f64 {
+    let count = power.unsigned_abs() as i32;
+    let sum: f64 = (0..count)
+        .map(|k| to.powi(k) * from.powi(count - 1 - k))
+        .sum();
+    if power >= 0 {
+        change * sum
+    } else {
+        -change * sum / (from.powi(count) * to.powi(count))
+    }
+}
+
+fn binary(operation: Binary, a: Moving, b: Moving) -> Moving {
+    let value = operation.apply(a.value, b.value);
+    let end = operation.apply(a.end(), b.end());
+    let change = match operation {
+        _ if a.change == 0.0 && b.change == 0.0 => 0.0,
+        Binary::Add => a.change + b.change,
+        Binary::Subtract => a.change - b.change,
+        Binary::Multiply => a.value * b.change + a.change * b.end(),
+        Binary::Divide => (a.change - value * b.change) / b.end(),
+        Binary::Power if b.change == 0.0 && a.value > 0.0 => {
+            value * (b.value * (a.change / a.value).ln_1p()).exp_m1()
+        }
+        Binary::Power if a.change == 0.0 && a.value > 0.0 => {
+            value * (b.change * a.value.ln()).exp_m1()
+        }
+        Binary::Hypotenuse if value > 0.0 => {
+            let squares = a.change * (a.value + a.end()) + b.change * (b.value + b.end());
+            squares / (value + end)
+        }
+        Binary::Minimum if a.value < b.value && a.end() < b.end() => a.change,
+        Binary::Minimum if a.value > b.value && a.end() > b.end() => b.change,
+        Binary::Maximum if a.value > b.value && a.end() > b.end() => a.change,
+        Binary::Maximum if a.value < b.value && a.end() < b.end() => b.change,
+        _ => end - value,
+    };
+    Moving { value, change }
+}
+
+fn ternary(operation: Ternary, [a, b, c]: [Moving; 3]) -> Moving {
+    let value = operation.apply(a.value, b.value, c.value);
+    let end = operation.apply(a.end(), b.end(), c.end());
+    let is_between = |x: f64| b.value < x && x < c.value;
+    let change = match operation {
+        Ternary::Choose if a.value != 0.0 && a.end() != 0.0 => b.change,
+        Ternary::Choose if a.value == 0.0 && a.end() == 0.0 => c.change,
+        Ternary::Ramp
+            if b.change == 0.0 && c.change == 0.0 && is_between(a.value) && is_between(a.end()) =>
+        {
+            a.change / (c.value - b.value)
+        }
+        Ternary::Clamp => {
+            let raised = binary(Binary::Maximum, a, b);
+            return binary(Binary::Minimum, raised, c);
+        }
+        _ => end - value,
+    };
+    Moving { value, change }
+}

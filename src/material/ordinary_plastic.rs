@@ -1,0 +1,208 @@
+//! Ordinary state-based elastic–perfectly plastic solid: the norm of the deviatoric force state cannot
+//! exceed a yield value.
+//!
+//! Mitchell 2011, SAND2011-3166. Each bond keeps a plastic extension e_p with t_d = (A/m) ω (ε_d − e_p);
+//! the yield function of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ, and the return is radial:
+//! t_d shrinks by r = √(2ψ₀)/‖t_d‖ and e_p grows by (1 − r)(ε_d − e_p).
+//!
+//! ψ₀ follows from the yield stress σ_y in pure shear: a deviatoric strain e has
+//! ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane, and yields at e:e = σ_y²/(6G²), so that
+//! ψ₀ = (5/2) σ_y²/m and (4/3) σ_y²/m. With the m of a whole ball the first is Mitchell's
+//! 25σ_y²/(8πδ⁵); his plane value 75σ_y²/(8πhδ⁴) belongs to A = 15G, which the plane law does not have.
+
+use std::f64::consts::PI;
+
+use super::ordinary::Ordinary;
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Word,
+};
+use crate::dimension::Dimension;
+use crate::lanes::Lanes;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrdinaryPlastic {
+    elastic: Ordinary,
+    /// ψ₀ m, J²/m⁶·m⁵: that of a point over its weighted volume is its yield value.
+    strength: f64,
+    /// m of a whole ball (m⁵), where yielding is not that of each point's own family.
+    whole: Option<f64>,
+}
+
+const YIELD_STRESS: Key = Key {
+    name: "yield_stress",
+    meaning: "σ_y, Pa, at which the body yields when it is pulled along an axis (von Mises)",
+    kind: Kind::POSITIVE,
+};
+
+const CALIBRATION: Key = Key {
+    name: "calibration",
+    meaning: "whether points yield by their own families or as if these were whole",
+    kind: Kind::Word(&[Word::new("family"), Word::new("continuum")]),
+};
+
+impl Declared for OrdinaryPlastic {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[YIELD_STRESS, CALIBRATION],
+        any_poisson_ratio: true,
+        no_line: Some("`ordinary_plastic` has no 1-D form; `elastic_plastic_pmb` has"),
+        invariants: |_| Invariants {
+            conservative: false,
+            ..Invariants::ALL
+        },
+        breaks_by_energy: true,
+        examples: &[
+            "poisson_ratio = 0.3, yield_stress = 0.3",
+            "poisson_ratio = 0.2, yield_stress = 0.4, calibration = 'continuum'",
+        ],
+        ..Declaration::new(
+            "ordinary_plastic",
+            "as `ordinary`, perfectly plastic in its deviatoric part",
+            build,
+        )
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    let stress = given.values.number(YIELD_STRESS.name);
+    let horizon = given.horizon;
+    let (factor, whole) = match given.dimension {
+        Dimension::Space => (2.5, 0.8 * PI * horizon.powi(5)),
+        Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
+            (4.0 / 3.0, 0.5 * PI * thickness * horizon.powi(4))
+        }
+        Dimension::Line { .. } => unreachable!("the law declares that it has no 1-D form"),
+    };
+    let of_family = given.values.word(CALIBRATION.name) == "family";
+    Built::plain(OrdinaryPlastic {
+        elastic: Ordinary::of(given),
+        strength: factor * stress * stress,
+        whole: (!of_family).then_some(whole),
+    })
+}
+
+impl Described for OrdinaryPlastic {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        let mut facts = self.elastic.described();
+        let yields = match self.whole {
+            None => "by each point's own family",
+            Some(_) => "as if families were whole",
+        };
+        facts.push(("yields", yields.to_owned()));
+        facts
+    }
+}
+
+impl<const D: usize> Law<D> for OrdinaryPlastic {
+    /// A/m and d κ θ/m (N/m⁷), θ/d, and 1 − r.
+    type Point = [Lanes; 4];
+    /// e_p/|ξ|, and the energy that is dissipated, J/m⁶.
+    type Memory = [Lanes; 2];
+    type WholeSum = [Lanes; 1];
+    type Sum = [Lanes; 1];
+    type Force = Along;
+    const CONSTANTS: usize = 1;
+    const STAGES: usize = 2;
+    /// θ.
+    const OWN_NUMBERS: usize = 1;
+    const LEAST_DIMENSION: usize = 2;
+    const FORCE_READS_STRETCH: bool = true;
+
+    #[inline(always)]
+    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        self.elastic.whole_share(bond)
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        Law::<D>::constants(&self.elastic, sums, numbers);
+    }
+
+    /// Σ ω|ξ|εṼ (m⁵), then Σ (ε_d − e_p)² Ṽ (m⁵).
+    #[inline(always)]
+    fn share<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        [_, _, even, _]: &[Lanes; 4],
+        [plastic, _]: &[Lanes; 2],
+    ) -> [Lanes; 1] {
+        let square = bond.length * bond.length;
+        if S == 0 {
+            return [square * bond.stretch];
+        }
+        let elastic = bond.stretch - *even - *plastic;
+        [square * elastic * elastic]
+    }
+
+    #[inline(always)]
+    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+        let pull = numbers[0];
+        if stage == 0 {
+            let [push, dilatation] = self.elastic.dilated(pull, sums[0]);
+            numbers[1] = push;
+            numbers[2] = dilatation / D as f64;
+            numbers[4] = dilatation;
+            return;
+        }
+        let mass = self.whole.unwrap_or(self.elastic.extensional() / pull);
+        let limit = 2.0 * self.strength / mass;
+        let square = pull * pull * sums[0];
+        // A point without bonds has no m, and nothing that could yield.
+        numbers[3] = if square > limit {
+            1.0 - (limit / square).sqrt()
+        } else {
+            0.0
+        };
+    }
+
+    #[inline(always)]
+    fn memory(
+        &self,
+        bond: &Bond<D>,
+        [pull, _, even, shrunk]: &[Lanes; 4],
+        [plastic, loss]: &[Lanes; 2],
+        _: f64,
+    ) -> [Lanes; 2] {
+        let trial = bond.stretch - *even - *plastic;
+        let change = trial * *shrunk;
+        let taken = *pull * (bond.length * bond.length) * (trial - change) * change;
+        [*plastic + change, *loss + taken]
+    }
+
+    #[inline(always)]
+    fn force(
+        &self,
+        bond: &Bond<D>,
+        [pull, push, ..]: &[Lanes; 4],
+        [plastic, _]: &[Lanes; 2],
+    ) -> Along {
+        let yielded = *plastic * (Lanes::splat(1.0) - bond.shortening);
+        Along(*push + bond.shortening * (*pull - *push) - *pull * yielded)
+    }
+
+    #[inline(always)]
+    fn bond_energy(
+        &self,
+        bond: &Bond<D>,
+        [pull, _, even, _]: &[Lanes; 4],
+        [plastic, _]: &[Lanes; 2],
+    ) -> Lanes {
+        let deviatoric = bond.stretch - *even;
+        let yielded = (*plastic - deviatoric * 2.0) * *plastic;
+        let square = bond.stretch * bond.stretch + yielded;
+        square * (bond.length * bond.length) * *pull * 0.5
+    }
+
+    fn point_energy(&self, numbers: &[f64]) -> f64 {
+        self.elastic.dilatation_energy(numbers[4])
+    }
+
+    #[inline(always)]
+    fn dissipated(&self, _: Lanes, [_, loss]: &[Lanes; 2]) -> Lanes {
+        *loss
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, length: Lanes, [pull, push, ..]: &[Lanes; 4]) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, length, &[*pull, *push])
+    }
+}

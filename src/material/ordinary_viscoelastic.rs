@@ -1,0 +1,196 @@
+//! Ordinary state-based standard linear solid: the deviatoric part of the force relaxes.
+//!
+//! Mitchell 2011, SAND2011-8064. Of the deviatoric extension ε_d each bond keeps a back extension e_b that
+//! follows it with a relaxation time τ; a share λ of the deviatoric force acts on ε_d − e_b:
+//!
+//! t = (d k′θ/m) ω|ξ| + (A/m) ω (ε_d − λ e_b),  ė_b = (ε_d − e_b)/τ.
+//!
+//! In a step in which ε_d changes evenly, e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a = exp(−Δt/τ) and
+//! β = 1 − (τ/Δt)(1 − a). The constants are those of the instantaneous response; in the end the shear
+//! modulus is (1 − λ) of it.
+
+use super::ordinary::{INFLUENCE, Ordinary};
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
+};
+use crate::lanes::Lanes;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrdinaryViscoelastic {
+    elastic: Ordinary,
+    /// τ, s.
+    relaxation_time: f64,
+    /// λ.
+    relaxing_share: f64,
+}
+
+const RELAXATION_TIME: Key = Key {
+    name: "relaxation_time",
+    meaning: "τ, s, in which the deviatoric force relaxes",
+    kind: Kind::POSITIVE,
+};
+
+const RELAXING_SHARE: Key = Key {
+    name: "relaxing_share",
+    meaning: "the share λ of the deviatoric force that relaxes",
+    kind: Kind::Number {
+        range: 0.0..1.0,
+        words: "at least 0 and below 1",
+        default: None,
+    },
+};
+
+impl Declared for OrdinaryViscoelastic {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[RELAXATION_TIME, RELAXING_SHARE, INFLUENCE],
+        any_poisson_ratio: true,
+        no_line: Some("`ordinary_viscoelastic` has no 1-D form"),
+        invariants: |_| Invariants {
+            conservative: false,
+            ..Invariants::ALL
+        },
+        breaks_by_energy: true,
+        critical_stretch: Some(super::ordinary::critical_stretch),
+        examples: &["poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.4"],
+        ..Declaration::new(
+            "ordinary_viscoelastic",
+            "as `ordinary`, of which a share of the deviatoric force relaxes",
+            build,
+        )
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    let law = OrdinaryViscoelastic {
+        elastic: Ordinary::of(given),
+        relaxation_time: given.values.number(RELAXATION_TIME.name),
+        relaxing_share: given.values.number(RELAXING_SHARE.name),
+    };
+    super::ordinary::with_influence(law, given)
+}
+
+impl Described for OrdinaryViscoelastic {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        let mut facts = self.elastic.described();
+        let share = 100.0 * self.relaxing_share;
+        facts.push((
+            "relaxation",
+            format!(
+                "{share} % of the deviatoric force in {:.4e} s",
+                self.relaxation_time
+            ),
+        ));
+        facts
+    }
+}
+
+impl OrdinaryViscoelastic {
+    /// 1 − a and β of a step (s).
+    fn relaxed(&self, step: f64) -> [f64; 2] {
+        let x = step / self.relaxation_time;
+        let gone = -(-x).exp_m1();
+        let beta = if x < 1e-3 {
+            // 1 − (1 − e^−x)/x without the difference.
+            x * (0.5 - x * (1.0 / 6.0 - x / 24.0))
+        } else {
+            1.0 - gone / x
+        };
+        [gone, beta]
+    }
+}
+
+impl<const D: usize> Law<D> for OrdinaryViscoelastic {
+    /// A/m and d κ θ/m (N/m⁷), and θ/d.
+    type Point = [Lanes; 3];
+    /// e_b/|ξ|, ε_d/|ξ|, and the energy that is dissipated, J/m⁶.
+    type Memory = [Lanes; 3];
+    type WholeSum = [Lanes; 1];
+    type Sum = [Lanes; 1];
+    type Force = Along;
+    const CONSTANTS: usize = 1;
+    const STAGES: usize = 1;
+    /// θ.
+    const OWN_NUMBERS: usize = 1;
+    const LEAST_DIMENSION: usize = 2;
+    const FORCE_READS_STRETCH: bool = true;
+
+    #[inline(always)]
+    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        self.elastic.whole_share(bond)
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        Law::<D>::constants(&self.elastic, sums, numbers);
+    }
+
+    #[inline(always)]
+    fn share<const S: usize>(&self, bond: &Bond<D>, _: &[Lanes; 3], _: &[Lanes; 3]) -> [Lanes; 1] {
+        [bond.length * bond.length * bond.stretch]
+    }
+
+    #[inline(always)]
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+        let [push, dilatation] = self.elastic.dilated(numbers[0], sums[0]);
+        numbers[1] = push;
+        numbers[2] = dilatation / D as f64;
+        numbers[3] = dilatation;
+    }
+
+    #[inline(always)]
+    fn memory(
+        &self,
+        bond: &Bond<D>,
+        [pull, _, even]: &[Lanes; 3],
+        [back, before, loss]: &[Lanes; 3],
+        step: f64,
+    ) -> [Lanes; 3] {
+        let [gone, beta] = self.relaxed(step);
+        let deviatoric = bond.stretch - *even;
+        let change = (*before - *back) * gone + (deviatoric - *before) * beta;
+        let now = *back + change;
+        // What the dashpot takes, with its force in the middle of the step.
+        let force = (*before - *back + deviatoric - now) * (0.5 * self.relaxing_share);
+        let taken = *pull * (bond.length * bond.length) * force * change;
+        [now, deviatoric, *loss + taken]
+    }
+
+    #[inline(always)]
+    fn force(
+        &self,
+        bond: &Bond<D>,
+        [pull, push, _]: &[Lanes; 3],
+        [back, ..]: &[Lanes; 3],
+    ) -> Along {
+        let relaxed = *back * self.relaxing_share * (Lanes::splat(1.0) - bond.shortening);
+        Along(*push + bond.shortening * (*pull - *push) - *pull * relaxed)
+    }
+
+    #[inline(always)]
+    fn bond_energy(
+        &self,
+        bond: &Bond<D>,
+        [pull, _, even]: &[Lanes; 3],
+        [back, ..]: &[Lanes; 3],
+    ) -> Lanes {
+        // ε² + λ (e_b² − 2 ε_d e_b) is ε² less what the spring of the dashpot has lost.
+        let deviatoric = bond.stretch - *even;
+        let relaxed = (*back - deviatoric * 2.0) * *back * self.relaxing_share;
+        let square = bond.stretch * bond.stretch + relaxed;
+        square * (bond.length * bond.length) * *pull * 0.5
+    }
+
+    fn point_energy(&self, numbers: &[f64]) -> f64 {
+        self.elastic.dilatation_energy(numbers[3])
+    }
+
+    #[inline(always)]
+    fn dissipated(&self, _: Lanes, [.., loss]: &[Lanes; 3]) -> Lanes {
+        *loss
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, length: Lanes, [pull, push, _]: &[Lanes; 3]) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, length, &[*pull, *push])
+    }
+}

@@ -1,0 +1,362 @@
+//! The lines through the middle of damaged points that hang together: where a crack runs.
+//!
+//! Damage is spread over a band some spacings wide. The way to each point of the band from the crack's
+//! start, along the band, is found; the points are sorted into sections by this way, and the parts of a
+//! section that do not hang together lie on different branches. The middles of the parts, joined from
+//! section to section, are the lines (the level-set diagram of Lazarus & Verroust 1999). Where the band is
+//! wide or ragged, nothing but these middles moves a little.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use nalgebra::Vector3;
+
+use crate::points::bins::Bins;
+use crate::points::distance_squared;
+
+type Vector = Vector3<f64>;
+
+/// Points as far as a distance count as within it, up to this share of it.
+const TOLERANCE: f64 = 1e-9;
+
+/// A point of a crack's band.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Damaged {
+    /// Where it is, m.
+    pub place: [f64; 3],
+    /// How much it counts for the middle.
+    pub weight: f64,
+}
+
+/// A place on a crack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vertex {
+    /// Where it is, m.
+    pub place: [f64; 3],
+    /// Length of the crack from its start to here, m.
+    pub along: f64,
+}
+
+/// A branch: from where it leaves the crack, or from the start, to its tip.
+pub type Branch = Vec<Vertex>;
+
+/// How far apart points of a crack are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Points up to this distance hang together, m.
+    pub link: f64,
+    /// Length of a section, m, at least a link; a branch that is shorter does not count, and the crack
+    /// starts with the points up to this distance from its start.
+    pub section: f64,
+}
+
+/// The length of all branches together, m.
+pub fn length(branches: &[Branch]) -> f64 {
+    let own = |branch: &Branch| branch[branch.len() - 1].along - branch[0].along;
+    // The sum of nothing would be -0.
+    branches.iter().map(own).fold(0.0, |sum, own| sum + own)
+}
+
+/// The branches of a crack that starts at `from` (m): first the one with the longest way to its tip.
+/// None if no point is near the start. Depends on nothing but the points and their order.
+pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch> {
+    let places: Vec<[f64; 3]> = points.iter().map(|point| point.place).collect();
+    let bins = Bins::new(&places, reach.link * (1.0 + TOLERANCE));
+    let ways = Ways::new(from, &places, &bins, reach);
+    let mut parts = parts(points, &bins, &ways, reach);
+    drop_stubs(&mut parts);
+    lines(from, points, &parts, reach)
+}
+
+/// The shortest ways from the start along the band.
+struct Ways {
+    /// Of each point that is reached, m; infinite for others.
+    length: Vec<f64>,
+    /// The point before on the way; none for the first.
+    before: Vec<Option<usize>>,
+    /// The points that are reached, by length and then by index.
+    order: Vec<usize>,
+}
+
+/// A point that may be the next to be reached; the largest has the shortest way, then the lowest index.
+#[derive(PartialEq)]
+struct Next {
+    length: f64,
+    point: usize,
+}
+
+impl Eq for Next {}
+
+impl Ord for Next {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let order = other.length.total_cmp(&self.length);
+        order.then(other.point.cmp(&self.point))
+    }
+}
+
+impl PartialOrd for Next {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ways {
+    /// By Dijkstra's method, from all points within a section of the start.
+    fn new(from: [f64; 3], places: &[[f64; 3]], bins: &Bins, reach: Reach) -> Self {
+        let mut ways = Self {
+            length: vec![f64::INFINITY; places.len()],
+            before: vec![None; places.len()],
+            order: Vec::new(),
+        };
+        let mut open = BinaryHeap::new();
+        for (point, place) in places.iter().enumerate() {
+            let length = distance_squared(from, *place).sqrt();
+            if length <= reach.section * (1.0 + TOLERANCE) {
+                ways.length[point] = length;
+                open.push(Next { length, point });
+            }
+        }
+        let mut is_done = vec![false; places.len()];
+        while let Some(Next { length, point }) = open.pop() {
+            if std::mem::replace(&mut is_done[point], true) {
+                continue;
+            }
+            ways.order.push(point);
+            bins.within(places[point], |other, squared| {
+                let other = other as usize;
+                let through = length + squared.sqrt();
+                if through < ways.length[other] {
+                    ways.length[other] = through;
+                    ways.before[other] = Some(point);
+                    open.push(Next {
+                        length: through,
+                        point: other,
+                    });
+                }
+            });
+        }
+        ways
+    }
+}
+
+/// Points of one section that hang together.
+struct Part {
+    /// The part before, towards the start.
+    parent: Option<usize>,
+    members: Vec<usize>,
+    /// Length of the longest way to a point of it or of a part behind it, m.
+    farthest: f64,
+    children: Vec<usize>,
+}
+
+/// The parts, each behind its parent.
+fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part> {
+    let section = |point: usize| (ways.length[point] / reach.section) as usize;
+    let mut part_of: Vec<Option<usize>> = vec![None; points.len()];
+    let mut parts: Vec<Part> = Vec::new();
+    for first in &ways.order {
+        if part_of[*first].is_some() {
+            continue;
+        }
+        // The nearest point of a part has its way through an earlier section, or none.
+        let parent = ways.before[*first].and_then(|before| part_of[before]);
+        let number = parts.len();
+        part_of[*first] = Some(number);
+        let mut members = vec![*first];
+        let mut next = 0;
+        while let Some(point) = members.get(next).copied() {
+            next += 1;
+            bins.within(points[point].place, |other, _| {
+                let other = other as usize;
+                let belongs = ways.length[other].is_finite() && section(other) == section(point);
+                if belongs && part_of[other].is_none() {
+                    part_of[other] = Some(number);
+                    members.push(other);
+                }
+            });
+        }
+        members.sort_unstable();
+        let lengths = members.iter().map(|member| ways.length[*member]);
+        parts.push(Part {
+            parent,
+            farthest: lengths.fold(0.0, f64::max),
+            members,
+            children: Vec::new(),
+        });
+    }
+    for number in (0..parts.len()).rev() {
+        if let Some(parent) = parts[number].parent {
+            parts[parent].farthest = parts[parent].farthest.max(parts[number].farthest);
+            parts[parent].children.push(number);
+        }
+    }
+    parts
+}
+
+/// Where a crack forks, parts with nothing behind them are no branches: of several such ones one is made,
+/// beside longer ones they are dropped.
+fn drop_stubs(parts: &mut [Part]) {
+    for number in 0..parts.len() {
+        let children = std::mem::take(&mut parts[number].children);
+        let (stubs, mut kept): (Vec<usize>, Vec<usize>) = children
+            .into_iter()
+            .partition(|child| parts[*child].children.is_empty());
+        if let (true, Some((last, others))) = (kept.is_empty(), stubs.split_last()) {
+            for other in others {
+                let members = std::mem::take(&mut parts[*other].members);
+                parts[*last].members.extend(members);
+                parts[*last].farthest = parts[*last].farthest.max(parts[*other].farthest);
+            }
+            parts[*last].members.sort_unstable();
+            kept.push(*last);
+        }
+        // The longest first; of equally long ones the first that was reached.
+        kept.sort_by(|a, b| {
+            let order = parts[*b].farthest.total_cmp(&parts[*a].farthest);
+            order.then(a.cmp(b))
+        });
+        parts[number].children = kept;
+    }
+}
+
+/// Joins the middles of the parts.
+fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
+    // The middle of a part; where nothing is behind it, as far towards the middle as its points reach.
+    let place = |part: &Part, before: Vector| {
+        let members = || part.members.iter().map(|member| &points[*member]);
+        let (mut sum, mut weight) = (Vector::zeros(), 0.0);
+        for point in members() {
+            sum += point.weight * Vector::from(point.place);
+            weight += point.weight;
+        }
+        let middle = sum / weight;
+        let way = middle - before;
+        if !part.children.is_empty() || way.norm() < 0.25 * reach.link {
+            return middle;
+        }
+        let along = |point: &Damaged| (Vector::from(point.place) - before).dot(&way);
+        let farthest = members().map(along).fold(0.0, f64::max);
+        before + farthest / way.dot(&way) * way
+    };
+    let start = Vertex {
+        place: from,
+        along: 0.0,
+    };
+    // The start has the parts without parents behind it, of which the one that reaches farthest counts.
+    let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
+    let farther = |a: &usize, b: &usize| {
+        let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);
+        order.then(b.cmp(a))
+    };
+    let Some(root) = roots.max_by(farther) else {
+        return Vec::new();
+    };
+    let mut branches: Vec<Branch> = Vec::new();
+    let mut forks = vec![(start, root)];
+    while let Some((start, first)) = forks.pop() {
+        let mut branch = vec![start];
+        let mut next = Some(first);
+        while let Some(number) = next {
+            let part = &parts[number];
+            let last = branch[branch.len() - 1];
+            let before = Vector::from(last.place);
+            let here = place(part, before);
+            let here = Vertex {
+                along: last.along + (here - before).norm(),
+                place: here.into(),
+            };
+            branch.push(here);
+            next = part.children.first().copied();
+            forks.extend(part.children.iter().skip(1).map(|child| (here, *child)));
+        }
+        branches.push(branch);
+    }
+    branches.sort_by(|a, b| {
+        let tip = |branch: &Branch| branch[branch.len() - 1].along;
+        tip(b).total_cmp(&tip(a))
+    });
+    branches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REACH: Reach = Reach {
+        link: 2.0,
+        section: 3.0,
+    };
+
+    /// Two rows of points of unit spacing along a straight line.
+    fn band(from: [f64; 2], to: [f64; 2]) -> Vec<Damaged> {
+        let way = [to[0] - from[0], to[1] - from[1]];
+        let length = way[0].hypot(way[1]);
+        let unit = way.map(|entry| entry / length);
+        let count = length.round() as usize;
+        let point = |k: usize, side: f64| Damaged {
+            place: [
+                from[0] + unit[0] * k as f64 - 0.5 * side * unit[1],
+                from[1] + unit[1] * k as f64 + 0.5 * side * unit[0],
+                0.0,
+            ],
+            weight: 0.4,
+        };
+        (0..=count)
+            .flat_map(|k| [point(k, -1.0), point(k, 1.0)])
+            .collect()
+    }
+
+    #[test]
+    fn a_straight_band_is_a_line_of_its_length() {
+        let points = band([1.0, 2.0], [31.0, 42.0]);
+        let found = branches([1.0, 2.0, 0.0], &points, REACH);
+        assert_eq!(found.len(), 1);
+        assert!((length(&found) - 50.0).abs() < 0.1, "{}", length(&found));
+        for vertex in &found[0] {
+            let [x, y, _] = vertex.place;
+            assert!(((x - 1.0) * 0.8 - (y - 2.0) * 0.6).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_fork_has_two_branches_and_a_stub_has_none() {
+        let mut points = band([0.0, 0.0], [20.0, 0.0]);
+        points.extend(band([20.0, 0.0], [40.0, 20.0]));
+        points.extend(band([20.0, 0.0], [35.0, -15.0]));
+        points.extend(band([10.0, 0.0], [10.0, 2.0]));
+        let found = branches([0.0; 3], &points, REACH);
+        assert_eq!(found.len(), 2, "{found:?}");
+        let [upper, lower] = [&found[0], &found[1]];
+        assert_eq!(upper[0].along, 0.0);
+        assert!(lower[0].place[1].abs() < 1e-9);
+        // The lower one leaves the crack near the fork.
+        assert!((18.0..24.0).contains(&lower[0].along), "{lower:?}");
+        let tip = |branch: &Branch| branch[branch.len() - 1].place;
+        assert!((tip(upper)[0] - 40.0).abs() < 0.5 && (tip(upper)[1] - 20.0).abs() < 0.5);
+        assert!((tip(lower)[0] - 35.0).abs() < 0.5 && (tip(lower)[1] + 15.0).abs() < 0.5);
+        let expected = 20.0 + 800_f64.sqrt() + 450_f64.sqrt();
+        assert!(
+            (length(&found) - expected).abs() < 1.5,
+            "{}",
+            length(&found)
+        );
+    }
+
+    #[test]
+    fn from_its_middle_a_crack_runs_both_ways() {
+        let points = band([0.0, 0.0], [40.0, 0.0]);
+        let found = branches([20.2, 0.0, 0.0], &points, REACH);
+        assert_eq!(found.len(), 2);
+        assert!((length(&found) - 40.0).abs() < 0.5, "{}", length(&found));
+    }
+
+    #[test]
+    fn what_does_not_hang_together_does_not_count() {
+        let mut points = band([0.0, 0.0], [10.0, 0.0]);
+        points.extend(band([13.0, 0.0], [30.0, 0.0]));
+        let found = branches([0.0; 3], &points, REACH);
+        assert!((length(&found) - 10.0).abs() < 0.1);
+        assert!(branches([0.0, 4.0, 0.0], &points, REACH).is_empty());
+        assert!(branches([0.0; 3], &[], REACH).is_empty());
+    }
+}

@@ -1,0 +1,107 @@
+//! Crack paths: the lines along which damage runs from a place on, and their length.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::comm;
+use crate::deck::plan;
+use crate::error::Result;
+use crate::solver::Simulation;
+use crate::solver::conditions::{members, not_empty};
+
+use super::centre_line::{Branch, Damaged, Reach, branches};
+
+/// The share of the horizon over which damaged points hang together: a gap of one point in a row is
+/// bridged, while branches come apart soon.
+const LINK: f64 = 2.0 / 3.0;
+
+/// Diagonal neighbours hang together, however small the horizon is.
+const DIAGONAL: f64 = 1.5;
+
+/// A crack whose path is found.
+pub struct CrackPath {
+    rule: plan::CrackPath,
+    points: Vec<u32>,
+    reach: Reach,
+}
+
+/// A point above the threshold on its way to all ranks.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Found {
+    id: u64,
+    place: [f64; 3],
+    damage: f64,
+}
+
+impl CrackPath {
+    /// Finds the points that are looked at. Collective.
+    ///
+    /// # Errors
+    /// When the set is empty; the same on all ranks.
+    pub fn new<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        rule: &plan::CrackPath,
+    ) -> Result<Self> {
+        let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
+        let points = members(plan, model, rule.set);
+        let key = format!("[history.crack.{}] set", rule.name);
+        not_empty(plan, comm, rule.set, &points, (&key, rule.span.clone()))?;
+        let volumes = &model.volume[..model.owned()];
+        let mut largest = [volumes.iter().copied().fold(0.0, f64::max)];
+        comm.max(&mut largest);
+        let spacing = (largest[0] / plan.dimension.section()).powf(1.0 / D as f64);
+        let link = (LINK * plan.horizon).max(DIAGONAL * spacing);
+        let reach = Reach {
+            link,
+            section: plan.horizon.max(link),
+        };
+        Ok(Self {
+            rule: rule.clone(),
+            points,
+            reach,
+        })
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.rule.name
+    }
+
+    /// Its branches at a damage of the owned points; the same on all ranks, and to the bit on any number
+    /// of them. Collective.
+    pub fn branches<const D: usize>(
+        &self,
+        simulation: &Simulation<'_, D>,
+        damage: impl Fn(usize) -> f64,
+    ) -> Vec<Branch> {
+        let (model, comm) = (&simulation.model, simulation.comm);
+        let found = |point: &u32| {
+            let point = *point as usize;
+            let damage = damage(point);
+            (damage > self.rule.threshold).then(|| Found {
+                id: model.ids[point],
+                place: model.position(point),
+                damage,
+            })
+        };
+        let own: Vec<Found> = self.points.iter().filter_map(found).collect();
+        let mut found = gather(comm, &own);
+        found.sort_unstable_by_key(|found| found.id);
+        let damaged: Vec<Damaged> = found
+            .into_iter()
+            .map(|Found { place, damage, .. }| Damaged {
+                place,
+                weight: damage,
+            })
+            .collect();
+        branches(self.rule.from, &damaged, self.reach)
+    }
+}
+
+/// What all ranks have, on each of them. Collective.
+fn gather(comm: &dyn comm::Communicator, own: &[Found]) -> Vec<Found> {
+    let bytes = bytemuck::cast_slice(own).to_vec();
+    let incoming = comm.all_to_all(vec![bytes; comm.size()]);
+    let found = |bytes: Vec<u8>| bytemuck::pod_collect_to_vec::<u8, Found>(&bytes);
+    incoming.into_iter().flat_map(found).collect()
+}

@@ -1,0 +1,313 @@
+//! Correspondence laws: strains and stresses to rounding, also where families are cut, and motions that the
+//! deformation gradient does not see.
+
+use fissure::deck::plan::Field;
+use fissure::solver::Simulation;
+use fissure::solver::bonds::Evolution;
+use fissure::solver::observers::Snapshot;
+use nalgebra::{DMatrix, Matrix3, Matrix6, Rotation3, Vector3};
+
+use crate::support::{displace, forces, simulate};
+
+fn deck(dimension: &str, law: &str, size: usize, horizon: f64) -> String {
+    let (upper, thickness) = match dimension {
+        "3d" => (format!("[{size}, {size}, {size}]"), ""),
+        _ => (format!("[{size}, {size}]"), "thickness = 0.5"),
+    };
+    let lower = if dimension == "3d" {
+        "[0, 0, 0]"
+    } else {
+        "[0, 0]"
+    };
+    format!(
+        "dimension = '{dimension}'
+        {thickness}
+        grid = {{ spacing = 1, horizon = {horizon}, volume_correction = 'linear' }}
+        material.solid.correspondence = {{ density = 2, {law} }}
+        body.block = {{ material = 'solid', shape.box = {{ lower = {lower}, upper = {upper} }} }}
+        time = {{ end = 1 }}
+        "
+    )
+}
+
+/// Hooke's matrix by Voigt's order, and the law that has it.
+fn laws(dimension: &str) -> Vec<(String, Matrix6<f64>)> {
+    let (young, ratio) = (5.0, 0.3);
+    let shear = young / (2.0 * (1.0 + ratio));
+    let lambda = match dimension {
+        "plane-stress" => young * ratio / (1.0 - ratio * ratio),
+        _ => 2.0 * shear * ratio / (1.0 - 2.0 * ratio),
+    };
+    let isotropic = Matrix6::from_fn(|a, b| match (a, b) {
+        _ if a < 3 && b < 3 => lambda + if a == b { 2.0 * shear } else { 0.0 },
+        _ if a == b => shear,
+        _ => 0.0,
+    });
+    let mut all = vec![(
+        "youngs_modulus = 5, poisson_ratio = 0.3".to_owned(),
+        isotropic,
+    )];
+    if dimension == "3d" {
+        let full = Matrix6::new(
+            9.0, 3.0, 2.0, 0.2, 0.1, 0.3, 3.0, 8.0, 2.5, 0.1, 0.4, 0.2, 2.0, 2.5, 7.0, 0.3, 0.2,
+            0.1, 0.2, 0.1, 0.3, 2.0, 0.1, 0.2, 0.1, 0.4, 0.2, 0.1, 3.0, 0.3, 0.3, 0.2, 0.1, 0.2,
+            0.3, 2.5,
+        );
+        let mut keys = Vec::new();
+        for a in 0..6 {
+            for b in a..6 {
+                keys.push(format!("c{}{} = {}", a + 1, b + 1, full[(a, b)]));
+            }
+        }
+        let keys = keys.join(", ");
+        let angles = [0.4_f64, -0.7, 1.1];
+        let degrees = angles.map(f64::to_degrees);
+        let turned_keys = format!(
+            "{keys}, angle_1 = {}, angle_2 = {}, angle_3 = {}",
+            degrees[0], degrees[1], degrees[2]
+        );
+        all.push((turned_keys, turned(&full, angles)));
+        all.push((keys, full));
+    }
+    all
+}
+
+const VOIGT: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
+
+/// S of E, Pa.
+fn stress(hooke: &Matrix6<f64>, strain: &Matrix3<f64>) -> Matrix3<f64> {
+    let mut stress = Matrix3::zeros();
+    for (a, (i, j)) in VOIGT.into_iter().enumerate() {
+        for (b, (k, l)) in VOIGT.into_iter().enumerate() {
+            let doubled = if k == l { 1.0 } else { 2.0 };
+            stress[(i, j)] += hooke[(a, b)] * doubled * strain[(k, l)];
+        }
+        stress[(j, i)] = stress[(i, j)];
+    }
+    stress
+}
+
+/// Found by turning the strain into the material's axes, and its stress back.
+fn turned(own: &Matrix6<f64>, [a, b, c]: [f64; 3]) -> Matrix6<f64> {
+    let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
+    let turn = about(Vector3::z_axis(), a) * about(Vector3::x_axis(), b);
+    let turn = (turn * about(Vector3::z_axis(), c)).into_inner();
+    Matrix6::from_fn(|m, n| {
+        let (k, l) = VOIGT[n];
+        let mut strain = Matrix3::zeros();
+        let half = if k == l { 1.0 } else { 0.5 };
+        strain[(k, l)] = half;
+        strain[(l, k)] = half;
+        let found = turn * stress(own, &(turn.transpose() * strain * turn)) * turn.transpose();
+        found[VOIGT[m]]
+    })
+}
+
+/// Every point, those at corners and surfaces too, has the deformation gradient, energy and stress of a
+/// homogeneous motion.
+fn check_affine<const D: usize>(
+    mut simulation: Simulation<D>,
+    hooke: &Matrix6<f64>,
+    gradient: &Matrix3<f64>,
+) {
+    let mut motion = Matrix3::identity();
+    for a in 0..D {
+        for b in 0..D {
+            motion[(a, b)] += gradient[(a, b)];
+        }
+    }
+    displace(&mut simulation, |x| (motion * Vector3::from(x)).into());
+    let mut strain = 0.5 * (motion.transpose() * motion - Matrix3::identity());
+    if D == 2 {
+        strain[(2, 2)] = 0.0;
+    }
+    let second = stress(hooke, &strain);
+    let mut kirchhoff = motion * second * motion.transpose();
+    let energy = 0.5 * second.dot(&strain);
+    let scale = kirchhoff.norm();
+    let snapshot = Snapshot::new(&mut simulation);
+    let energies = snapshot.field(&mut simulation, Field::StrainEnergyDensity);
+    let stresses = snapshot.field(&mut simulation, Field::Stress);
+    let gradients = snapshot.field(&mut simulation, Field::DeformationGradient);
+    if D == 2 {
+        // What is across the plane is not the law's.
+        kirchhoff[(2, 2)] = 0.0;
+    }
+    for point in 0..simulation.model.owned() {
+        let close = |found: f64, wanted: f64, scale: f64| {
+            assert!(
+                (found - wanted).abs() < 1e-11 * scale,
+                "point {point}: {found} for {wanted}"
+            );
+        };
+        close(energies[point], energy, energy);
+        let [xx, yy, _, xy, yz, xz] = std::array::from_fn(|k| stresses[6 * point + k]);
+        close(xx, kirchhoff[(0, 0)], scale);
+        close(yy, kirchhoff[(1, 1)], scale);
+        close(xy, kirchhoff[(0, 1)], scale);
+        if D == 3 {
+            close(stresses[6 * point + 2], kirchhoff[(2, 2)], scale);
+            close(yz, kirchhoff[(1, 2)], scale);
+            close(xz, kirchhoff[(0, 2)], scale);
+        }
+        for (k, found) in gradients[9 * point..9 * (point + 1)].iter().enumerate() {
+            close(*found, motion[(k / 3, k % 3)], 1.0);
+        }
+    }
+}
+
+#[test]
+fn homogeneous_strains_are_exact_at_every_point() {
+    let gradients = [
+        Matrix3::from_diagonal(&Vector3::new(0.02, 0.0, 0.0)),
+        Matrix3::new(0.0, 0.03, 0.0, 0.0, 0.0, 0.01, -0.02, 0.0, 0.0),
+        Matrix3::new(0.1, 0.2, -0.1, 0.05, -0.12, 0.3, 0.0, 0.15, 0.2),
+    ];
+    for gradient in &gradients {
+        for dimension in ["plane-stress", "plane-strain"] {
+            for (law, hooke) in laws(dimension) {
+                let text = deck(dimension, &law, 7, 2.5);
+                simulate::<2, _>(&text, |s| check_affine(s, &hooke, gradient));
+            }
+        }
+        for (law, hooke) in laws("3d") {
+            let text = deck("3d", &law, 6, 2.5);
+            simulate::<3, _>(&text, |s| check_affine(s, &hooke, gradient));
+        }
+    }
+}
+
+#[test]
+fn an_orthotropic_sheet_has_its_own_moduli() {
+    // Pulled along its own first axis, which is turned by 90 degrees: E_x of the sheet along y.
+    let law = "youngs_modulus_x = 8, youngs_modulus_y = 2, poisson_ratio_xy = 0.4, \
+               shear_modulus_xy = 1.5, angle_1 = 90";
+    simulate::<2, _>(&deck("plane-stress", law, 7, 2.5), |mut simulation| {
+        let strain = 1e-7;
+        // ν_yx = ν_xy E_y/E_x; along y by strain, along x by −ν_xy strain.
+        displace(&mut simulation, |[x, y, z]| {
+            [x * (1.0 - 0.4 * strain), y * (1.0 + strain), z]
+        });
+        let snapshot = Snapshot::new(&mut simulation);
+        let stress = snapshot.field(&mut simulation, Field::CauchyStress);
+        let mises = snapshot.field(&mut simulation, Field::VonMisesStress);
+        for (entries, mises) in stress.chunks_exact(6).zip(mises) {
+            assert!(
+                (entries[1] / (8.0 * strain) - 1.0).abs() < 1e-6,
+                "{entries:?}"
+            );
+            assert!(entries[0].abs() < 1e-6 * entries[1], "{entries:?}");
+            assert!((mises / entries[1] - 1.0).abs() < 1e-6);
+        }
+    });
+}
+
+/// The eigenvalues of the stiffness of a body at rest, by central differences of the forces, over the
+/// largest.
+fn spectrum<const D: usize>(mut simulation: Simulation<D>) -> Vec<f64> {
+    let owned = simulation.model.owned();
+    let count = D * owned;
+    let step = 1e-6;
+    let mut stiffness = DMatrix::zeros(count, count);
+    for column in 0..count {
+        for sign in [1.0, -1.0] {
+            simulation.fields.displacement[column % D][column / D] = sign * step;
+            simulation.evaluate(Evolution::None);
+            for (point, force) in forces(&simulation).into_iter().enumerate() {
+                for d in 0..D {
+                    let slope = -sign * force[d] * simulation.model.volume[point] / (2.0 * step);
+                    stiffness[(D * point + d, column)] += slope;
+                }
+            }
+        }
+        simulation.fields.displacement[column % D][column / D] = 0.0;
+    }
+    let symmetric = (&stiffness + stiffness.transpose()) * 0.5;
+    assert!((&stiffness - &symmetric).norm() < 1e-6 * stiffness.norm());
+    let all = symmetric.symmetric_eigenvalues();
+    let largest = all.max();
+    all.iter().map(|value| value / largest).collect()
+}
+
+#[test]
+fn only_rigid_motions_cost_nothing_where_zero_energy_modes_are_controlled() {
+    /// The softest motion that is not rigid.
+    fn softest(mut spectrum: Vec<f64>, rigid: usize) -> f64 {
+        spectrum.sort_by(f64::total_cmp);
+        let (zero, rest) = spectrum.split_at(rigid);
+        assert!(zero.iter().all(|value| value.abs() < 1e-7), "{zero:?}");
+        rest[0]
+    }
+    let of = |control: &str| {
+        let law = format!("youngs_modulus = 5, poisson_ratio = 0.3, zero_energy = '{control}'");
+        let plane = deck("plane-strain", &law, 6, 2.5);
+        let space = deck("3d", &law, 4, 2.0);
+        [
+            softest(simulate::<2, _>(&plane, spectrum), 3),
+            softest(simulate::<3, _>(&space, spectrum), 6),
+        ]
+    };
+    let free = of("none");
+    for control in ["wan2019", "silling2017"] {
+        for (controlled, free) in of(control).into_iter().zip(free) {
+            assert!(controlled > 1e-3, "{control}: {controlled}");
+            assert!(free < 0.5 * controlled, "{control}: {controlled} {free}");
+        }
+    }
+}
+
+#[test]
+fn a_checkerboard_is_resisted_and_decays() {
+    let energy = |control: &str| {
+        let law = format!(
+            "youngs_modulus = 5, poisson_ratio = 0.3, damping = 0.5, zero_energy = '{control}'"
+        );
+        simulate::<3, _>(&deck("3d", &law, 6, 2.5), |mut simulation| {
+            let board = |x: [f64; 3]| {
+                let sum: f64 = x.iter().map(|x| x.floor()).sum();
+                if sum % 2.0 == 0.0 { 1.0 } else { -1.0 }
+            };
+            displace(&mut simulation, |x| [x[0] + 1e-3 * board(x), x[1], x[2]]);
+            let sum = |simulation: &mut Simulation<3>| -> f64 {
+                let snapshot = Snapshot::new(simulation);
+                snapshot.stored.energy.iter().sum()
+            };
+            let start = sum(&mut simulation);
+            for _ in 0..40 {
+                simulation.advance();
+            }
+            [start, sum(&mut simulation)]
+        })
+    };
+    let [free, _] = energy("none");
+    for control in ["wan2019", "silling2017"] {
+        let [start, end] = energy(control);
+        assert!(start > 10.0 * free, "{control}: {start} {free}");
+        assert!(end < 0.7 * start, "{control}: {start} {end}");
+    }
+}
+
+#[test]
+fn a_point_with_too_few_bonds_carries_no_force_and_is_counted() {
+    // A crack above and one below a row leave it with bonds along itself alone.
+    let text = "dimension = 'plane-stress'
+        thickness = 0.5
+        grid = { spacing = 1, horizon = 2.5 }
+        material.solid.correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
+        body.block = { material = 'solid', shape.box = { lower = [0, 0], upper = [9, 9] } }
+        crack.above.segment = { from = [-1, 5], to = [10, 5] }
+        crack.below.segment = { from = [-1, 4], to = [10, 4] }
+        time = { end = 1 }
+        ";
+    simulate::<2, _>(text, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| [x + 0.02 * x * y, 1.01 * y, z]);
+        let snapshot = Snapshot::new(&mut simulation);
+        let singular = snapshot.field(&mut simulation, Field::Singular);
+        for (point, force) in forces(&simulation).into_iter().enumerate() {
+            let alone = (simulation.model.position(point)[1] - 4.5).abs() < 0.1;
+            assert_eq!(singular[point] == 1.0, alone);
+            assert!(force.iter().all(|component| component.is_finite()));
+            assert_eq!(force == [0.0; 2], alone);
+        }
+    });
+}
