@@ -169,7 +169,7 @@ fn the_branches_of_the_benchmark_are_found_written_and_drawn() {
             .filter(|row| row[1] < fork[1])
             .all(|row| row[2].abs() < 1e-3)
     );
-    let tips = [0.0, 1.0].map(|number| branch(number).last().unwrap());
+    let tips = [0.0, 1.0].map(|number| branch(number).next_back().unwrap());
     assert!(
         tips.iter().all(|tip| tip[1] > 0.095 && tip[2].abs() > 5e-3),
         "{tips:?}"

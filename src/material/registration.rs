@@ -8,6 +8,7 @@ macro_rules! register {
 
         /// One of the laws.
         #[derive(Debug, Clone, Copy, PartialEq)]
+        #[expect(clippy::large_enum_variant, reason = "there is one a body, not one a point")]
         pub enum AnyLaw {
             $($law($law),)+
         }

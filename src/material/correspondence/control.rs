@@ -9,6 +9,10 @@ use std::f64::consts::PI;
 
 /// The matrix B of the force state ω B z.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one a law, not one a point"
+)]
 pub enum Control {
     /// B = 0.
     None,

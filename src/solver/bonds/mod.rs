@@ -6,7 +6,7 @@
 //! then thresholds or numbers of points. Interior points are worked on while messages are in flight.
 //!
 //! Bonds break where the forces are summed, by what the force states of both ends say. What follows for
-//! the numbers of points is then found anew where it changes: see [`broken`].
+//! the numbers of points is then found anew where it changes: see `broken.rs`.
 
 mod broken;
 mod evaluate;
