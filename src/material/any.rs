@@ -97,7 +97,8 @@ impl AnyLaw {
     }
 }
 
-/// Bonds of linear laws meet no others, so these are bonds of the deformed body.
+/// Bonds of linear laws meet no others, so these are bonds of the deformed body. Nothing is inlined: every
+/// loop over such bonds would be compiled with all laws in it.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = [Lanes; MOST.point];
     type Memory = [Lanes; MOST.memory];
@@ -109,7 +110,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;
 
-    #[inline(always)]
+    #[inline(never)]
     fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
         with_law!(self, law => filled_up(law.whole_share(bond)))
     }
@@ -118,7 +119,7 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::constants(law, sums, numbers));
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn share<const S: usize>(
         &self,
         bond: &Bond<D>,
@@ -128,12 +129,12 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => filled_up(law.share::<S>(bond, &first(own), &first(memory))))
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], step: Option<f64>) {
         with_law!(self, law => Law::<D>::point(law, stage, sums, numbers, step));
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn memory(
         &self,
         bond: &Bond<D>,
@@ -144,12 +145,12 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => filled_up(law.memory(bond, &first(end), &first(before), step)))
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn force(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> [Lanes; D] {
         with_law!(self, law => law.force(bond, &first(end), &first(memory)).vector(bond))
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Lanes {
         with_law!(self, law => law.bond_energy(bond, &first(end), &first(memory)))
     }
@@ -166,12 +167,12 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::is_singular(law, numbers))
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn dissipated(&self, length: Lanes, memory: &Self::Memory) -> Lanes {
         with_law!(self, law => Law::<D>::dissipated(law, length, &first(memory)))
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn stiffness(&self, length: Lanes, end: &Self::Point) -> Lanes {
         with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
     }

@@ -30,6 +30,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
+    const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = L::Memory::COUNT > 0;
     const WANTED: Wanted = wanted(L::LINEAR);
 
@@ -107,6 +108,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = [Lanes; 0];
+    const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
@@ -154,6 +156,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     type Broken = [Lanes; 0];
     type Point = L::Point;
     type Memory = L::Memory;
+    const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]

@@ -71,6 +71,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
+    const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = true;
     const WANTED: Wanted = growth_only(L::LINEAR);
 

@@ -89,14 +89,26 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
     kernel: &K,
     source: Source<'_, D>,
 ) -> Vec<BrokenSums> {
-    if const { !K::EXISTS } {
-        unreachable!("bonds of a law that is not there in {D} dimensions")
-    }
     sweep_from(bonds, points, 0, results, kernel, source)
 }
 
 /// As [`sweep`], with results that are columns over the owned points from `base` on.
 pub fn sweep_from<K: Kernel<D>, const D: usize>(
+    bonds: &mut BlockBonds,
+    points: Range<usize>,
+    base: usize,
+    results: Results<'_, K, D>,
+    kernel: &K,
+    source: Source<'_, D>,
+) -> Vec<BrokenSums> {
+    if const { K::EXISTS } {
+        sweep_there(bonds, points, base, results, kernel, source)
+    } else {
+        unreachable!("bonds of a law that is not there in {D} dimensions")
+    }
+}
+
+fn sweep_there<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
     base: usize,
