@@ -81,16 +81,6 @@ impl<'a> CollectiveFile<'a> {
             .map_err(|error| Error::run(format!("cannot open {error}")))
     }
 
-    /// Opens a file that exists, together with the other ranks, to read it and to write to it.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open), and where it may not be written.
-    pub fn open_to_append(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
-        let raw = comm.raw();
-        Self::begin(path, comm, true, || access::open_to_append(path, raw))
-            .map_err(|error| Error::run(format!("cannot open {error}")))
-    }
-
     fn begin(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -127,6 +117,21 @@ impl<'a> CollectiveFile<'a> {
         self.comm
     }
 
+    /// Gives the open file another name, in the place of any that has it. Collective.
+    ///
+    /// # Errors
+    /// When it cannot be renamed.
+    pub fn rename(&mut self, path: &Path) -> Result<()> {
+        let renamed = match self.comm.rank() {
+            0 => std::fs::rename(&self.path, path)
+                .map_err(|error| Error::run(format!("{}: {error}", path.display()))),
+            _ => Ok(()),
+        };
+        agree(self.comm, renamed)?;
+        self.path = path.to_path_buf();
+        Ok(())
+    }
+
     /// Why writes so far were not collective: bits of HDF5's `H5D_MPIO_…` causes of any rank and
     /// any write, 0 when all were collective. Always 0 for a serial file.
     pub fn no_collective_cause(&self) -> u32 {
@@ -156,26 +161,6 @@ impl<'a> CollectiveFile<'a> {
         let doing = format!("cannot write the attribute {name} of {group}");
         self.together(&doing, |file| {
             set_attribute(&*file.inner.group(group)?, name, value)
-        })
-    }
-
-    /// Sets an attribute of a group to a text, unless it is that already.
-    ///
-    /// # Errors
-    /// As [`set_attribute`](Self::set_attribute).
-    pub fn update_text(&mut self, group: &str, name: &str, value: &str) -> Result<()> {
-        self.size += value.len() as u64;
-        let doing = format!("cannot write the attribute {name} of {group}");
-        self.together(&doing, |file| {
-            let group = file.inner.group(group)?;
-            let stored = group.attr(name).and_then(|attribute| {
-                let text = attribute.read_scalar::<VarLenUnicode>()?;
-                Ok(text.to_string())
-            });
-            match stored {
-                Ok(stored) if stored == value => Ok(()),
-                _ => set_attribute(&group, name, Attribute::Text(value)),
-            }
         })
     }
 
@@ -326,7 +311,6 @@ impl<'a> CollectiveFile<'a> {
     /// The disc is full.
     pub fn flush(&mut self) -> Result<()> {
         self.reserve()?;
-        self.lengthen()?;
         self.together("cannot write out the file", |file| file.inner.flush())?;
         // The library cuts the file to its length here, and thereby gives space back.
         self.reserved = 0;
@@ -347,25 +331,6 @@ impl<'a> CollectiveFile<'a> {
             let inner = unsafe { ManuallyDrop::take(&mut file.inner) };
             file.usable = false;
             inner.close()
-        })
-    }
-
-    /// Gives the file the length that the next flush says it has: the library does so afterwards, and a process
-    /// that is killed in between would leave a file that counts as cut off.
-    fn lengthen(&mut self) -> Result<()> {
-        self.together("cannot lengthen the file", |file| {
-            let length = file.inner.size();
-            if file.comm.rank() != 0 {
-                return Ok(());
-            }
-            let lengthened = || -> std::io::Result<()> {
-                if std::fs::metadata(&file.path)?.len() >= length {
-                    return Ok(());
-                }
-                let disc = std::fs::OpenOptions::new().write(true).open(&file.path)?;
-                disc.set_len(length)
-            };
-            lengthened().map_err(|error| error.to_string().into())
         })
     }
 

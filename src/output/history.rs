@@ -66,43 +66,6 @@ impl History {
         })
     }
 
-    /// Collective. Goes on after the first rows of the history in a file, which are given; later ones are
-    /// dropped. The CSV file is written anew.
-    ///
-    /// # Errors
-    /// A column is missing, or the files cannot be written.
-    pub fn resume(
-        file: &mut CollectiveFile<'_>,
-        contents: &HistoryContents,
-        past: &[Vec<f64>],
-    ) -> Result<Self> {
-        let mut columns = Vec::new();
-        for (name, _) in contents.columns {
-            let mut column = file.open_dataset(&format!("{HISTORY}/{name}"))?;
-            file.resize(&mut column, past.len() as u64)?;
-            columns.push(column);
-        }
-        let csv = contents.csv;
-        let rewritten = || -> Result<File> {
-            // Beside its place, so that the old one is there until the new one is whole.
-            let part = csv.with_extension("csv.part");
-            let mut writer = create_csv(&part, &(header(contents.columns) + &lines(past)))?;
-            let moved = writer.flush().and_then(|()| std::fs::rename(&part, csv));
-            moved.map_err(|error| csv_failure(csv, &error))?;
-            Ok(writer)
-        };
-        let comm = file.communicator();
-        let writer = match comm.rank() {
-            0 => rewritten().map(Some),
-            _ => Ok(None),
-        };
-        Ok(Self {
-            columns,
-            csv: csv.to_path_buf(),
-            writer: agree(comm, writer)?,
-        })
-    }
-
     /// Collective. The first `count` rows of the history in a file, the same on all ranks.
     ///
     /// # Errors
@@ -150,13 +113,19 @@ impl History {
         let Some(writer) = &mut self.writer else {
             return Ok(());
         };
-        if let Some(row) = rows.iter().find(|row| row.len() != self.columns.len()) {
-            let (length, columns) = (row.len(), self.columns.len());
-            let message = format!("a history row has {length} numbers for {columns} columns");
-            return Err(Error::run(message));
+        let mut text = String::new();
+        for row in rows {
+            if row.len() != self.columns.len() {
+                let (length, columns) = (row.len(), self.columns.len());
+                let message = format!("a history row has {length} numbers for {columns} columns");
+                return Err(Error::run(message));
+            }
+            let cells: Vec<_> = row.iter().map(|&value| shortest(value)).collect();
+            text.push_str(&cells.join(","));
+            text.push('\n');
         }
         writer
-            .write_all(lines(rows).as_bytes())
+            .write_all(text.as_bytes())
             .map_err(|error| csv_failure(&self.csv, &error))
     }
 }
@@ -184,16 +153,6 @@ fn header(columns: &[(String, &str)]) -> String {
         }
     }
     text + "\n"
-}
-
-fn lines(rows: &[Vec<f64>]) -> String {
-    let mut text = String::new();
-    for row in rows {
-        let cells: Vec<_> = row.iter().map(|&value| shortest(value)).collect();
-        text.push_str(&cells.join(","));
-        text.push('\n');
-    }
-    text
 }
 
 /// The shortest text that reads back as the same number; whole numbers without a point.

@@ -58,7 +58,7 @@ pub struct ResultFile<'a> {
     points: usize,
     single: bool,
     steps: u64,
-    /// Times of the steps that were there when the file was opened, s.
+    /// Times of the steps that were taken over from an earlier file, s.
     past_times: Vec<f64>,
     /// Steps that there is room for.
     capacity: u64,
@@ -187,11 +187,12 @@ impl<'a> ResultFile<'a> {
         Ok(result)
     }
 
-    /// Goes on with a result after its first `kept` steps and so many rows of its history, in place; later
-    /// ones are dropped, those kept are not touched. Also gives the rows that are kept.
+    /// Goes on with a result after its first `kept` steps and so many rows of its history; later ones
+    /// are dropped. What is kept is copied to a new file, which then takes the place of the old one:
+    /// whenever the process is killed, one of them is there. Also gives the rows that are kept.
     ///
     /// # Errors
-    /// The file cannot be read or written, holds less, or other points or fields.
+    /// The old file cannot be read, holds less, or other points or fields; the disc is full.
     pub fn resume(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -199,11 +200,11 @@ impl<'a> ResultFile<'a> {
         history: &HistoryContents,
         (kept, kept_rows): (u64, u64),
     ) -> Result<(Self, Vec<Vec<f64>>)> {
-        let (piece, steps) = (contents.piece, contents.steps);
-        let mut file = CollectiveFile::open_to_append(path, comm)?;
-        let mut times = file.open_dataset(&format!("{STEPS}/Values"))?;
-        let mut numbers = file.open_dataset(&format!("{STEPS}/Step"))?;
-        let points = file.open_dataset("/VTKHDF/Points")?;
+        let piece = contents.piece;
+        let mut old = CollectiveFile::open(path, comm)?;
+        let times = old.open_dataset(&format!("{STEPS}/Values"))?;
+        let numbers = old.open_dataset(&format!("{STEPS}/Step"))?;
+        let points = old.open_dataset("/VTKHDF/Points")?;
         let found = times.rows().min(numbers.rows());
         let fits = if points.rows() != piece.total {
             Err(Error::run(format!("{}: has other points", path.display())))
@@ -214,70 +215,61 @@ impl<'a> ResultFile<'a> {
             Ok(())
         };
         agree(comm, fits)?;
-        let past_times = file.read_rows(&times, 0, kept as usize)?;
-        let past = History::read(&mut file, history.columns, kept_rows)?;
-        let mut tables = Vec::new();
-        let mut open_table = |file: &mut CollectiveFile<'a>, path: &str, start, stride| {
-            let dataset = file.open_dataset(path)?;
-            tables.push(Table {
-                dataset,
-                start,
-                stride,
-            });
-            Ok::<(), Error>(())
-        };
-        for (field, _) in contents.fixed {
-            open_table(&mut file, &offsets_path(field), 0, 0)?;
+        let times: Vec<f64> = old.read_rows(&times, 0, kept as usize)?;
+        let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept as usize)?;
+
+        let part = path.with_extension("vtkhdf.part");
+        let copied = Self::copy(&mut old, &part, comm, contents, (kept, times, numbers));
+        let finished = copied.and_then(|mut result| {
+            let rows = History::read(&mut old, history.columns, kept_rows)?;
+            old.close()?;
+            result.create_history(history)?;
+            result.append_history(&rows)?;
+            result.file.flush()?;
+            result.file.rename(path)?;
+            Ok((result, rows))
+        });
+        if finished.is_err() && comm.rank() == 0 {
+            // It only takes up space; that it cannot be removed either changes nothing.
+            let _ = std::fs::remove_file(&part);
         }
-        let mut fields = Vec::new();
-        for field in contents.moving {
-            let dataset = file.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
-            fields.push((*field, dataset));
-            open_table(&mut file, &offsets_path(field), 0, piece.total as i64)?;
+        finished
+    }
+
+    /// A new file with the first steps of an old one.
+    fn copy(
+        old: &mut CollectiveFile<'a>,
+        part: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        (kept, times, numbers): (u64, Vec<f64>, Vec<u64>),
+    ) -> Result<Self> {
+        let piece = contents.piece;
+        let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
+        result.make_room(kept)?;
+        for (field, values) in &result.fields {
+            let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
+            for step in 0..kept {
+                let (first, count) = (step * piece.total + piece.first, result.points);
+                if contents.single {
+                    let rows: Vec<f32> = old.read_rows(&stored, first, count)?;
+                    result.file.write_rows(values, first, &rows)?;
+                } else {
+                    let rows: Vec<f64> = old.read_rows(&stored, first, count)?;
+                    result.file.write_rows(values, first, &rows)?;
+                }
+            }
         }
-        for (name, _, value) in STEP_TABLES {
-            open_table(&mut file, &format!("{STEPS}/{name}"), value, 0)?;
+        for (time, number) in times.into_iter().zip(numbers) {
+            append_one(&mut result.file, &mut result.numbers, number)?;
+            append_one(&mut result.file, &mut result.times, time)?;
+            result.past_times.push(time);
         }
-        let rows = fields
-            .iter()
-            .map(|(_, dataset)| dataset.rows() / piece.total);
-        let capacity = tables
-            .iter()
-            .map(|table| table.dataset.rows())
-            .chain(rows)
-            .min();
-        let capacity = capacity.unwrap_or(0);
-        if capacity < kept {
-            let text = format!("has room for {capacity} of the first {kept} outputs");
-            return Err(Error::run(format!("{}: {text}", path.display())));
-        }
-        // The number of steps first: whenever the process is killed, what it counts is there.
-        file.set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
-        file.flush()?;
-        file.resize(&mut times, kept)?;
-        file.resize(&mut numbers, kept)?;
-        let resumed = History::resume(&mut file, history, &past)?;
-        file.flush()?;
-        let mut result = Self {
-            file,
-            piece,
-            points: contents.positions.len(),
-            single: contents.single,
-            steps: kept,
-            capacity,
-            tables,
-            numbers,
-            times,
-            past_times,
-            fields,
-            history: Some(resumed),
-        };
-        result.make_room(steps.max(1))?;
-        for (name, value) in contents.metadata {
-            result.file.update_text("/", name, value)?;
-        }
-        result.file.flush()?;
-        Ok((result, past))
+        result.steps = kept;
+        result
+            .file
+            .set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
+        Ok(result)
     }
 
     /// Adds one step: its time in s, its number and this rank's values of the moving fields, in the
@@ -320,7 +312,7 @@ impl<'a> ResultFile<'a> {
         self.file.flush()
     }
 
-    /// Times of the steps that were there when the file was opened, s.
+    /// Times of the steps that were taken over from an earlier file, s.
     pub fn past_times(&self) -> &[f64] {
         &self.past_times
     }
