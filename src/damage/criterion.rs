@@ -28,7 +28,7 @@ pub struct Ends<'a, L, P> {
     /// The laws.
     pub laws: &'a [L; 2],
     /// The numbers of the points.
-    pub points: &'a [P; 2],
+    pub points: [&'a P; 2],
     /// The ends' thresholds.
     pub thresholds: &'a [Lanes; 2],
 }

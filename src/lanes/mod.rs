@@ -28,24 +28,27 @@ impl Lanes {
         Self([value; WIDTH])
     }
 
-    /// Applies a function to each lane.
+    /// Applies a function to each lane; written out, for a compiler that meets very many of these.
     #[inline(always)]
-    fn map(self, function: impl Fn(f64) -> f64) -> Self {
-        let mut result = self;
-        for k in 0..WIDTH {
-            result.0[k] = function(self.0[k]);
-        }
-        result
+    fn map(self, of: impl Fn(f64) -> f64) -> Self {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        Self([of(a), of(b), of(c), of(d), of(e), of(f), of(g), of(h)])
     }
 
     /// Applies a function to each pair of lanes.
     #[inline(always)]
-    fn zip(self, other: Self, function: impl Fn(f64, f64) -> f64) -> Self {
-        let mut result = self;
-        for k in 0..WIDTH {
-            result.0[k] = function(self.0[k], other.0[k]);
-        }
-        result
+    fn zip(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        let (a, b) = (self.0, other.0);
+        Self([
+            of(a[0], b[0]),
+            of(a[1], b[1]),
+            of(a[2], b[2]),
+            of(a[3], b[3]),
+            of(a[4], b[4]),
+            of(a[5], b[5]),
+            of(a[6], b[6]),
+            of(a[7], b[7]),
+        ])
     }
 
     /// Square root.

@@ -8,7 +8,7 @@
 //! beyond take the closed forms x/((1 + x) + √(1 + x)) and x/(1 + √(1 + x)), which lose no digits
 //! either. All of that is the same to the bit from both ends of a bond: x is.
 
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::{Lanes, Numbers, Simd};
 
 /// The largest |x| for which the series are taken.
 pub const NEAR: f64 = 1.0 / 256.0;
@@ -141,13 +141,13 @@ pub fn deform<S: Simd, const D: usize>(
         inverse,
         inverse_square,
     } = *reference;
-    let deformed: [Lanes; D] = std::array::from_fn(|d| xi[d] + eta[d]);
+    let deformed: [Lanes; D] = Numbers::each(|d| xi[d] + eta[d]);
     let sum = |d: usize| if linear { xi[d] } else { xi[d] + deformed[d] };
     let mut growth = eta[0] * sum(0);
     for d in 1..D {
         growth = simd.multiply_add(eta[d], sum(d), growth);
     }
-    let growth = growth * inverse_square;
+    let growth = simd.whole(growth * inverse_square);
     if linear {
         return Bond {
             reference: xi,

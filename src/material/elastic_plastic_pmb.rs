@@ -102,11 +102,12 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
         _: S,
         laws: &[Self; 2],
         bond: &Bond<D>,
-        _: &[[Lanes; 0]; 2],
+        _: [&[Lanes; 0]; 2],
         [here, there]: &[[Lanes; 2]; 2],
         weights: Weights,
     ) -> Along {
-        let [a, b] = laws.map(|law| Lanes::splat(0.5 * law.elastic.micromodulus));
+        let half = |end: usize| Lanes::splat(0.5 * laws[end].elastic.micromodulus);
+        let (a, b) = (half(0), half(1));
         let elastic = bond.shortening * (bond.inverse * weights.sum(a, b));
         let plastic = bond.inverse * weights.sum(a * here[0], b * there[0]);
         Along(elastic - (Lanes::splat(1.0) - bond.shortening) * plastic)

@@ -2,7 +2,7 @@
 //! bond.
 
 use super::Bond;
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::{Lanes, Numbers, Simd};
 
 /// The force state of one end of eight bonds.
 pub trait ForceState<const D: usize>: Copy {
@@ -20,7 +20,7 @@ pub trait ForceState<const D: usize>: Copy {
 
     /// The work ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η of the force density of a bond, J/m⁶, that pulls without
     /// turning; the same to the bit from both ends.
-    fn work(self, bond: &Bond<D>, linear: bool) -> Lanes;
+    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, linear: bool) -> Lanes;
 
     /// By component.
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
@@ -56,7 +56,7 @@ impl<const D: usize> ForceState<D> for Along {
 
     /// The force acts on the extension: ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
     #[inline(always)]
-    fn work(self, bond: &Bond<D>, linear: bool) -> Lanes {
+    fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool) -> Lanes {
         let share = if linear {
             bond.growth
         } else {
@@ -67,7 +67,7 @@ impl<const D: usize> ForceState<D> for Along {
 
     #[inline(always)]
     fn vector(self, bond: &Bond<D>) -> [Lanes; D] {
-        bond.along.map(|component| self.0 * component)
+        Numbers::each(|d| self.0 * bond.along[d])
     }
 }
 
@@ -75,18 +75,18 @@ impl<const D: usize> ForceState<D> for Along {
 impl<const D: usize> ForceState<D> for [Lanes; D] {
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
-        self.map(|component| component * factor)
+        Numbers::each(|d| self[d] * factor)
     }
 
     #[inline(always)]
     fn plus(self, other: Self) -> Self {
-        std::array::from_fn(|d| self[d] + other[d])
+        Numbers::each(|d| self[d] + other[d])
     }
 
     #[inline(always)]
     fn add<S: Simd>(self, simd: S, _: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]) {
         for d in 0..D {
-            sums[d] += simd.keep(self[d] * volume, bits);
+            sums[d] = simd.multiply_add(simd.keep(self[d], bits), volume, sums[d]);
         }
     }
 
@@ -96,10 +96,10 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
     }
 
     #[inline(always)]
-    fn work(self, bond: &Bond<D>, _: bool) -> Lanes {
+    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, _: bool) -> Lanes {
         let mut sum = self[0] * bond.moved[0];
         for d in 1..D {
-            sum += self[d] * bond.moved[d];
+            sum = simd.multiply_add(self[d], bond.moved[d], sum);
         }
         sum * 0.5
     }

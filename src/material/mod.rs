@@ -156,12 +156,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         _simd: S,
         laws: &[Self; 2],
         bond: &Bond<D>,
-        points: &[Self::Point; 2],
+        points: [&Self::Point; 2],
         memory: &[Self::Memory; 2],
         weights: Weights,
     ) -> Self::Force {
-        let pull = laws[0].force(bond, &points[0], &memory[0]);
-        let push = laws[1].force(bond, &points[1], &memory[1]);
+        let pull = laws[0].force(bond, points[0], &memory[0]);
+        let push = laws[1].force(bond, points[1], &memory[1]);
         match weights {
             Weights::One => pull.plus(push),
             Weights::Same(weight) => pull.plus(push).times(weight),

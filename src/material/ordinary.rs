@@ -212,7 +212,7 @@ impl<const D: usize> Law<D> for Ordinary {
         simd: S,
         _: &[Self; 2],
         bond: &Bond<D>,
-        [here, there]: &[[Lanes; 2]; 2],
+        [here, there]: [&[Lanes; 2]; 2],
         _: &[[Lanes; 0]; 2],
         weights: Weights,
     ) -> Along {

@@ -110,12 +110,12 @@ impl<const D: usize> Law<D> for Pmb {
         _: S,
         laws: &[Self; 2],
         bond: &Bond<D>,
-        _: &[[Lanes; 0]; 2],
+        _: [&[Lanes; 0]; 2],
         _: &[[Lanes; 0]; 2],
         weights: Weights,
     ) -> Along {
-        let [here, there] = laws.map(|law| Lanes::splat(0.5 * law.micromodulus));
-        Along(bond.shortening * (bond.inverse * weights.sum(here, there)))
+        let half = |end: usize| Lanes::splat(0.5 * laws[end].micromodulus);
+        Along(bond.shortening * (bond.inverse * weights.sum(half(0), half(1))))
     }
 
     #[inline(always)]

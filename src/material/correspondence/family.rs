@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix};
 
 use super::super::Bond;
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Numbers};
 
 /// A shape tensor is singular where its determinant is below this share of that of a family of the same
 /// size that looks alike in all directions.
@@ -43,7 +43,7 @@ pub type FamilyShare<const D: usize> = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D
 #[inline(always)]
 pub fn family_share<const D: usize>(bond: &Bond<D>) -> FamilyShare<D> {
     let xi = &bond.reference;
-    let motion = bond.moved.map(|eta| xi.map(|xi| eta * xi));
+    let motion = Numbers::each(|k| bond.moved[k / D] * xi[k % D]);
     (shape_share(xi), motion)
 }
 
@@ -54,7 +54,7 @@ pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) 
     for (k, (a, b)) in mixed::<D>().enumerate() {
         others[k] = xi[a] * xi[b];
     }
-    (xi.map(|xi| xi * xi), others)
+    (Numbers::each(|d| xi[d] * xi[d]), others)
 }
 
 /// K = Σ ω ξ⊗ξ Ṽ of a point.

@@ -22,7 +22,7 @@ use super::bond::Weights;
 use super::{
     Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Values, Word,
 };
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::{Lanes, Numbers, Simd};
 use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
 use family::{extremes, shape_share, symmetric};
@@ -102,10 +102,48 @@ impl Described for Correspondence {
 
 /// The constants of a point: a spring constant that its energy nowhere exceeds, and that of Silling's
 /// control (N/m⁷); then A, and the diagonal and mixed entries of B.
-type Point<const D: usize> = ([Lanes; 2], ([[Lanes; D]; D], ([Lanes; D], [Lanes; D])));
+type Point<const D: usize> = ([Lanes; 2], Tensors<D>);
 
 /// W − ½ P : H (J/m³), and whether the shape tensor is singular.
 const OWN: usize = 2;
+
+/// A, and the diagonal and mixed entries of B.
+type Tensors<const D: usize> = ([[Lanes; D]; D], ([Lanes; D], [Lanes; D]));
+
+/// A ξ + B η. Row by row, written out: the compiler keeps loops over so much as loops, and then all of their
+/// numbers in memory.
+#[inline(always)]
+fn times_bond<S: Simd, const D: usize>(
+    simd: S,
+    tensors: &Tensors<D>,
+    bond: &Bond<D>,
+) -> [Lanes; D] {
+    let mut product = [row(simd, tensors, bond, 0); D];
+    if D > 1 {
+        product[1] = row(simd, tensors, bond, 1);
+    }
+    if D > 2 {
+        product[2] = row(simd, tensors, bond, 2);
+    }
+    product
+}
+
+#[inline(always)]
+fn row<S: Simd, const D: usize>(
+    simd: S,
+    (direct, control): &Tensors<D>,
+    bond: &Bond<D>,
+    a: usize,
+) -> Lanes {
+    let mut sum = direct[a][0] * bond.reference[0];
+    for b in 1..D {
+        sum = simd.multiply_add(direct[a][b], bond.reference[b], sum);
+    }
+    for b in 0..D {
+        sum = simd.multiply_add(symmetric(control, a, b), bond.moved[b], sum);
+    }
+    sum
+}
 
 impl<const D: usize> Law<D> for Correspondence {
     type Point = Point<D>;
@@ -193,21 +231,13 @@ impl<const D: usize> Law<D> for Correspondence {
         simd: S,
         _: &[Self; 2],
         bond: &Bond<D>,
-        [(_, here), (_, there)]: &[Point<D>; 2],
+        [(_, here), (_, there)]: [&Point<D>; 2],
         _: &[[Lanes; 0]; 2],
         weights: Weights,
     ) -> [Lanes; D] {
-        // The tensors of both ends first, then their product with the bond.
-        let mut force = [Lanes::splat(0.0); D];
-        for a in 0..D {
-            for b in 0..D {
-                let direct = weights.sum(here.0[a][b], there.0[a][b]);
-                force[a] = simd.multiply_add(direct, bond.reference[b], force[a]);
-                let control = weights.sum(symmetric(&here.1, a, b), symmetric(&there.1, a, b));
-                force[a] = simd.multiply_add(control, bond.moved[b], force[a]);
-            }
-        }
-        force
+        let pull = times_bond(simd, here, bond);
+        let push = times_bond(simd, there, bond);
+        Numbers::each(|d| simd.whole(weights.sum(pull[d], push[d])))
     }
 
     #[inline(always)]

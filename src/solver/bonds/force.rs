@@ -48,7 +48,7 @@ impl<L> Force<L> {
     fn work<S: Simd, const D: usize>(
         &self,
         simd: S,
-        group: &Group<Self, D>,
+        group: &Group<'_, Self, D>,
         weighted: L::Force,
     ) -> Lanes
     where
@@ -61,12 +61,12 @@ impl<L> Force<L> {
                 simd,
                 &self.laws,
                 &group.bond,
-                &group.points,
+                group.points(),
                 &group.memory,
                 Weights::One,
             ),
         };
-        whole.work(&group.bond, L::LINEAR)
+        whole.work(simd, &group.bond, L::LINEAR)
     }
 }
 
@@ -97,7 +97,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         force: &mut [Lanes; D],
         (told, lost): &mut Self::Broken,
     ) {
@@ -105,7 +105,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
             && L::Memory::COUNT > 0
         {
             let [own, far] = &self.laws;
-            let [here, there] = &group.points;
+            let [here, there] = group.points();
             group.memory = [
                 own.memory(&group.bond, here, &group.memory[0], step),
                 far.memory(&group.bond, there, &group.memory[1], step),
@@ -115,7 +115,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
             simd,
             &self.laws,
             &group.bond,
-            &group.points,
+            group.points(),
             &group.memory,
             group.weights,
         );
@@ -126,7 +126,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         };
         let ends = Ends {
             laws: &self.laws,
-            points: &group.points,
+            points: group.points(),
             thresholds: &group.thresholds,
         };
         let broken = group.intact & self.criterion.met::<S, L, D>(simd, &group.bond, ends, work);
@@ -134,17 +134,18 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
             let broken = broken & group.breakable;
             group.intact &= !broken;
             // Copies, so that a loop need not keep them where they can be pointed to.
-            let (bond, points, thresholds) = (group.bond, group.points, group.thresholds);
+            let (bond, own, far) = (group.bond, *group.own, group.far);
             let (laws, memory, criterion) = (self.laws, group.memory[0], self.criterion);
+            let thresholds = group.thresholds;
             let (volume, weight) = (group.volume, group.weights.own() * group.own_volume);
             simd.aside(move || {
                 let bond = bond.with_stretch(L::LINEAR);
                 let ends = Ends {
                     laws: &laws,
-                    points: &points,
+                    points: [&own, &far],
                     thresholds: &thresholds,
                 };
-                let energy = laws[0].bond_energy(&bond, &points[0], &memory) * weight * volume;
+                let energy = laws[0].bond_energy(&bond, &own, &memory) * weight * volume;
                 let overshoot = energy * criterion.overshoot::<L, D>(&bond, ends, work);
                 told[0] += simd.keep(Lanes::splat(1.0), broken);
                 told[1] += simd.keep(energy, broken);

@@ -153,7 +153,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         // SAFETY: `new` has checked the lengths.
         unsafe {
             Here {
-                displacement: std::array::from_fn(|d| eight(self.displacement[d], place)),
+                displacement: Numbers::each(|d| eight(self.displacement[d], place)),
                 numbers: self.numbers(place),
                 threshold: self.thresholds(place),
             }
@@ -165,24 +165,24 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// The vector must be one of the grid, the offset one of its.
     #[inline(always)]
-    pub unsafe fn load<S: Simd>(
+    pub unsafe fn load<'h, S: Simd>(
         &self,
         simd: S,
-        here: &Here<K::Point, D>,
+        here: &'h Here<K::Point, D>,
         vector: &mut Adjacent<'_>,
         o: usize,
-    ) -> Group<K, D> {
+    ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
         let far = vector.far(offset);
         // SAFETY: `far` is a place of the grid with seven more after it.
         let (displacement, numbers, threshold) = unsafe {
             let component = |d| eight(self.displacement[d], far);
-            let displacement: [Lanes; D] = std::array::from_fn(component);
+            let displacement: [Lanes; D] = Numbers::each(component);
             (displacement, self.far_numbers(far), self.thresholds(far))
         };
-        let eta = std::array::from_fn(|d| displacement[d] - here.displacement[d]);
+        let eta = Numbers::each(|d: usize| displacement[d] - here.displacement[d]);
         let reference = Reference {
-            along: std::array::from_fn(|d| Lanes::splat(offset.reference[d])),
+            along: Numbers::each(|d| Lanes::splat(offset.reference[d])),
             length: Lanes::splat(offset.length),
             inverse: Lanes::splat(offset.inverse),
             inverse_square: Lanes::splat(offset.inverse_square),
@@ -197,7 +197,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
                 [true, false] => Weights::Same(Lanes::splat(offset.weights[0])),
                 [true, true] => Weights::Each(offset.weights.map(Lanes::splat)),
             },
-            points: [here.numbers, numbers],
+            own: &here.numbers,
+            far: numbers,
             thresholds: [here.threshold, threshold],
             memory: load_memory::<K::Memory>(&mut vector.groups, o),
             intact,

@@ -9,7 +9,7 @@ use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
 
 /// Eight bonds: what is read of both ends, and what is kept of the bonds.
-pub struct Group<K: Kernel<D>, const D: usize> {
+pub struct Group<'a, K: Kernel<D>, const D: usize> {
     /// What laws see.
     pub bond: Bond<D>,
     /// Volumes of the own ends, m³.
@@ -18,8 +18,10 @@ pub struct Group<K: Kernel<D>, const D: usize> {
     pub volume: Lanes,
     /// What volumes are multiplied by.
     pub weights: Weights,
-    /// The numbers of the own and of the far ends.
-    pub points: [K::Point; 2],
+    /// The numbers of the own ends.
+    pub own: &'a K::Point,
+    /// The numbers of the far ends.
+    pub far: K::Point,
     /// Stretches at which the bonds of the own and the far ends break, where the kernel reads them.
     pub thresholds: [Lanes; 2],
     /// What the bonds keep for their own and their far ends.
@@ -32,7 +34,13 @@ pub struct Group<K: Kernel<D>, const D: usize> {
     pub breakable: u8,
 }
 
-impl<K: Kernel<D>, const D: usize> Group<K, D> {
+impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
+    /// The numbers of both ends.
+    #[inline(always)]
+    pub fn points(&self) -> [&K::Point; 2] {
+        [self.own, &self.far]
+    }
+
     /// A bit for each intact bond that counts in the own end's sums.
     #[inline(always)]
     pub fn family(&self) -> u8 {
@@ -117,7 +125,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut Self::Sums,
         broken: &mut Self::Broken,
     );

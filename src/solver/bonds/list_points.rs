@@ -161,8 +161,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             )
         };
         Here {
-            reference: std::array::from_fn(|d| Lanes::splat(node[d])),
-            displacement: std::array::from_fn(|d| Lanes::splat(node[DISPLACEMENT + d])),
+            reference: Numbers::each(|d| Lanes::splat(node[d])),
+            displacement: Numbers::each(|d| Lanes::splat(node[DISPLACEMENT + d])),
             volume: Lanes::splat(node[VOLUME]),
             numbers,
             threshold,
@@ -174,20 +174,20 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// # Safety
     /// The row must be one of a list with this reach.
     #[inline(always)]
-    pub unsafe fn load<S: Simd>(
+    pub unsafe fn load<'h, S: Simd>(
         &self,
         simd: S,
-        here: &Here<K::Point, D>,
+        here: &'h Here<K::Point, D>,
         row: &mut Row<'_>,
         group: usize,
-    ) -> Group<K, D> {
+    ) -> Group<'h, K, D> {
         let neighbours = &row.neighbours[group];
         debug_assert!(neighbours.iter().all(|n| (*n as usize) < self.nodes.len()));
         // SAFETY: `new` has checked the length.
         let node = |k: usize| unsafe { &self.nodes.get_unchecked(neighbours[k] as usize).0 };
         let columns = simd.transpose(std::array::from_fn(node));
-        let along: [Lanes; D] = std::array::from_fn(|d| columns[d] - here.reference[d]);
-        let eta = std::array::from_fn(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
+        let along: [Lanes; D] = Numbers::each(|d| columns[d] - here.reference[d]);
+        let eta = Numbers::each(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
         let mut square = along[0] * along[0];
         for xi in &along[1..] {
             square = simd.multiply_add(*xi, *xi, square);
@@ -213,7 +213,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
                 [Some(weights), None] => Weights::Same(weights[group]),
                 [Some(own), Some(far)] => Weights::Each([own[group], far[group]]),
             },
-            points: [here.numbers, numbers],
+            own: &here.numbers,
+            far: numbers,
             thresholds: [here.threshold, threshold],
             memory: load_memory::<K::Memory>(&mut row.groups, group),
             whole: if K::WHOLE { row.whole(group) } else { 0 },

@@ -38,11 +38,11 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut [Lanes; 4],
         _: &mut [Lanes; 0],
     ) {
-        let (family, own) = (group.family(), &group.points[0]);
+        let (family, own) = (group.family(), group.own);
         let energy = self.law.bond_energy(&group.bond, own, &group.memory[0]);
         sums[0] += simd.keep(group.own_share(energy), family);
         sums[1] += simd.keep(group.volume, family);
@@ -69,7 +69,7 @@ impl<const D: usize> Kernel<D> for FamilyVolume {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         [sum]: &mut [Lanes; 1],
         _: &mut [Lanes; 0],
     ) {
@@ -115,14 +115,14 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut [Lanes; 6],
         _: &mut [Lanes; 0],
     ) {
         let length = group.bond.length;
         let xi = &group.bond.reference;
-        let own = self.laws[0].stiffness(length, &group.points[0]) * group.weights.own();
-        let far = self.laws[1].stiffness(length, &group.points[1]) * group.weights.far();
+        let own = self.laws[0].stiffness(length, group.own) * group.weights.own();
+        let far = self.laws[1].stiffness(length, &group.far) * group.weights.far();
         // Either all of a spring or the share along the bond.
         let [own_across, far_across] = self.laws.map(|law| law.resists_across());
         let none = Lanes::splat(0.0);
@@ -163,11 +163,11 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut [Lanes; 6],
         _: &mut [Lanes; 0],
     ) {
-        let own = &group.points[0];
+        let own = group.own;
         let force = self.law.force(&group.bond, own, &group.memory[0]);
         let force = force.times(group.weights.own()).times(group.volume);
         add_tensor::<S, D>(simd, sums, group.intact, |a, b| {
@@ -192,7 +192,7 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut Self::Sums,
         _: &mut [Lanes; 0],
     ) {
@@ -222,7 +222,7 @@ impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut [Lanes; 2],
         _: &mut [Lanes; 0],
     ) {

@@ -40,11 +40,11 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut L::Sum,
         _: &mut [Lanes; 0],
     ) {
-        let share = (self.law).share::<N>(&group.bond, &group.points[0], &group.memory[0]);
+        let share = (self.law).share::<N>(&group.bond, group.own, &group.memory[0]);
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
             // The stretch of a bond that only fills up a group is not a number.
@@ -79,7 +79,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         sums: &mut L::WholeSum,
         _: &mut [Lanes; 0],
     ) {
@@ -114,7 +114,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     fn add<S: Simd>(
         &self,
         simd: S,
-        group: &mut Group<Self, D>,
+        group: &mut Group<'_, Self, D>,
         [smallest]: &mut [Lanes; 1],
         _: &mut [Lanes; 0],
     ) {

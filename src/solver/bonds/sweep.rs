@@ -176,12 +176,31 @@ fn split<P: Part, R: Runner<P>>(
     let border = part.point(half);
     let (part_a, part_b) = part.split_at(half);
     let [results_a, results_b] = R::Sums::split_at(results, border - base);
-    let (mut all, mut rest) = rayon::join(
-        || split(part_a, base, results_a, runner, leaf, instructions),
-        || split(part_b, border, results_b, runner, leaf, instructions),
-    );
+    let half = |part, base, results| {
+        let mut work = Some((part, results));
+        move |told: &mut Vec<BrokenSums>| {
+            if let Some((part, results)) = work.take() {
+                *told = split(part, base, results, runner, leaf, instructions);
+            }
+        }
+    };
+    let [mut all, mut rest] = both([
+        &mut half(part_a, base, results_a),
+        &mut half(part_b, border, results_b),
+    ]);
     all.append(&mut rest);
     all
+}
+
+/// Half of the work of a task.
+type Half<'a> = &'a mut (dyn FnMut(&mut Vec<BrokenSums>) + Send);
+
+/// Does both halves, on several threads if some are free; compiled once for all loops.
+fn both([first, second]: [Half<'_>; 2]) -> [Vec<BrokenSums>; 2] {
+    let mut told = [Vec::new(), Vec::new()];
+    let [of_first, of_second] = &mut told;
+    rayon::join(|| first(of_first), || second(of_second));
+    told
 }
 
 fn run<P: Part, R: Runner<P>>(
@@ -272,14 +291,36 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
     }
 }
 
-impl BrokenSums {
-    /// From the sums of eight lanes.
-    fn new<N: Numbers>(point: usize, broken: &N, value: impl Fn(Lanes) -> f64) -> Self {
-        let mut sums = [0.0; MOST_BROKEN];
-        for (k, sum) in sums.iter_mut().enumerate().take(N::COUNT) {
-            *sum = value(broken.get(k));
+/// The sums over bonds that break, 0 for those that a kernel does not have.
+#[inline(always)]
+fn all_broken<N: Numbers>(broken: &N) -> [Lanes; MOST_BROKEN] {
+    Numbers::each(|k| {
+        if k < N::COUNT {
+            broken.get(k)
+        } else {
+            Lanes::splat(0.0)
         }
-        Self { point, sums }
+    })
+}
+
+/// Notes what comes of the bonds of a point that break.
+#[cold]
+#[inline(never)]
+fn note_point(told: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; MOST_BROKEN]) {
+    let sums = broken.map(Lanes::sum);
+    told.push(BrokenSums { point, sums });
+}
+
+/// Notes what comes of the bonds of eight adjacent points that break.
+#[cold]
+#[inline(never)]
+fn note_vector(told: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MOST_BROKEN]) {
+    for lane in 0..WIDTH {
+        let sums = broken.map(|lanes| lanes.0[lane]);
+        if sums[0] > 0.0 {
+            let point = first + lane;
+            told.push(BrokenSums { point, sums });
+        }
     }
 }
 
@@ -331,8 +372,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let column = K::Sums::column_mut(&mut results, quantity);
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
-            if any_broken {
-                told.push(BrokenSums::new(row.point, &broken, Lanes::sum));
+            if K::Broken::COUNT > 0 && any_broken {
+                note_point(&mut told, row.point, &all_broken(&broken));
             }
         }
         told
@@ -395,13 +436,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     }
                 }
             }
-            if any_broken {
-                for lane in 0..WIDTH {
-                    told.push(BrokenSums::new(vector.point + lane, &broken, |lanes| {
-                        lanes.0[lane]
-                    }));
-                }
-                told.retain(|told: &BrokenSums| told.sums[0] > 0.0);
+            if K::Broken::COUNT > 0 && any_broken {
+                note_vector(&mut told, vector.point, &all_broken(&broken));
             }
         }
         told
