@@ -42,31 +42,77 @@ pub struct Force<L> {
 }
 
 impl<L> Force<L> {
+    /// The weighted sum of the force states of both ends.
+    #[inline(always)]
+    fn total<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> L::Force
+    where
+        L: Law<D>,
+    {
+        self.weighted(simd, group, group.weights)
+    }
+
+    #[inline(always)]
+    fn weighted<S: Simd, const D: usize>(
+        &self,
+        simd: S,
+        group: &Group<'_, Self, D>,
+        weights: Weights,
+    ) -> L::Force
+    where
+        L: Law<D>,
+    {
+        let (laws, points) = (&self.laws, group.points());
+        L::bond_force(simd, laws, &group.bond, points, &group.memory, weights)
+    }
+
     /// The work ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η of each bond of whole cells, J/m⁶, from the weighted sum of the
-    /// force states.
+    /// force states; 0 if the criterion does not read it.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,
         simd: S,
         group: &Group<'_, Self, D>,
-        weighted: L::Force,
+        total: L::Force,
     ) -> Lanes
     where
         L: Law<D>,
     {
+        if !self.criterion.reads_work() {
+            return Lanes::splat(0.0);
+        }
         let whole = match group.weights {
-            Weights::One => weighted,
-            _ if self.influence => weighted,
-            _ => L::bond_force(
-                simd,
-                &self.laws,
-                &group.bond,
-                group.points(),
-                &group.memory,
-                Weights::One,
-            ),
+            Weights::One => total,
+            _ if self.influence => total,
+            _ => self.weighted(simd, group, Weights::One),
         };
         whole.work(simd, &group.bond, L::LINEAR)
+    }
+
+    /// A bit for each bond that breaks.
+    #[inline(always)]
+    fn breaks<S: Simd, const D: usize>(
+        &self,
+        simd: S,
+        group: &Group<'_, Self, D>,
+        work: Lanes,
+    ) -> u8
+    where
+        L: Law<D>,
+    {
+        let met = (self.criterion).met::<S, L, D>(simd, &group.bond, self.ends(group), work);
+        group.intact & group.breakable & met
+    }
+
+    #[inline(always)]
+    fn ends<'a, const D: usize>(&'a self, group: &'a Group<'_, Self, D>) -> Ends<'a, L, L::Point>
+    where
+        L: Law<D>,
+    {
+        Ends {
+            laws: &self.laws,
+            points: group.points(),
+            thresholds: &group.thresholds,
+        }
     }
 }
 
@@ -94,13 +140,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     }
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        force: &mut [Lanes; D],
-        (told, lost): &mut Self::Broken,
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
         if let Evolution::Step(step) = self.evolution
             && L::Memory::COUNT > 0
         {
@@ -111,48 +151,33 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
                 far.memory(&group.bond, there, &group.memory[1], step),
             ];
         }
-        let total = L::bond_force(
-            simd,
-            &self.laws,
-            &group.bond,
-            group.points(),
-            &group.memory,
-            group.weights,
-        );
-        let work = if self.criterion.reads_work() {
-            self.work(simd, group, total)
-        } else {
-            Lanes::splat(0.0)
-        };
-        let ends = Ends {
-            laws: &self.laws,
-            points: group.points(),
-            thresholds: &group.thresholds,
-        };
-        let broken = group.intact & self.criterion.met::<S, L, D>(simd, &group.bond, ends, work);
-        if broken != 0 {
-            let broken = broken & group.breakable;
-            group.intact &= !broken;
-            // Copies, so that a loop need not keep them where they can be pointed to.
-            let (bond, own, far) = (group.bond, *group.own, group.far);
-            let (laws, memory, criterion) = (self.laws, group.memory[0], self.criterion);
-            let thresholds = group.thresholds;
-            let (volume, weight) = (group.volume, group.weights.own() * group.own_volume);
-            simd.aside(move || {
-                let bond = bond.with_stretch(L::LINEAR);
-                let ends = Ends {
-                    laws: &laws,
-                    points: [&own, &far],
-                    thresholds: &thresholds,
-                };
-                let energy = laws[0].bond_energy(&bond, &own, &memory) * weight * volume;
-                let overshoot = energy * criterion.overshoot::<L, D>(&bond, ends, work);
-                told[0] += simd.keep(Lanes::splat(1.0), broken);
-                told[1] += simd.keep(energy, broken);
-                told[2] += simd.keep(overshoot, broken);
-                total.add(simd, &bond, volume, broken, lost);
-            });
-        }
+        let total = self.total(simd, group);
+        let work = self.work(simd, group, total);
+        group.intact &= !self.breaks(simd, group, work);
         total.add(simd, &group.bond, group.volume, group.intact, force);
+    }
+
+    #[inline(always)]
+    fn add_broken<S: Simd>(
+        &self,
+        simd: S,
+        group: &mut Group<'_, Self, D>,
+        (told, lost): &mut Self::Broken,
+    ) {
+        let total = self.total(simd, group);
+        let work = self.work(simd, group, total);
+        let broken = self.breaks(simd, group, work);
+        group.intact &= !broken;
+        let bond = group.bond.with_stretch(L::LINEAR);
+        let share = group.weights.own() * group.own_volume * group.volume;
+        let energy = self.laws[0].bond_energy(&bond, group.own, &group.memory[0]) * share;
+        let overshoot = energy
+            * self
+                .criterion
+                .overshoot::<L, D>(&bond, self.ends(group), work);
+        told[0] += simd.keep(Lanes::splat(1.0), broken);
+        told[1] += simd.keep(energy, broken);
+        told[2] += simd.keep(overshoot, broken);
+        total.add(simd, &bond, group.volume, broken, lost);
     }
 }

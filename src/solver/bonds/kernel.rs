@@ -121,12 +121,17 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::Sums::splat(0.0)
     }
 
-    /// Adds eight bonds; may break them and change what they keep.
-    fn add<S: Simd>(
+    /// Adds eight bonds but for those that break, whose bits it clears; may change what bonds keep.
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
+
+    /// Clears the bits of those of eight bonds that break, and adds them. Groups come here after
+    /// [`Self::add`], if it has broken any bond of the same point or vector: what is rarely done takes no
+    /// registers from the loop.
+    fn add_broken<S: Simd>(
         &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut Self::Sums,
-        broken: &mut Self::Broken,
-    );
+        _simd: S,
+        _group: &mut Group<'_, Self, D>,
+        _broken: &mut Self::Broken,
+    ) {
+    }
 }

@@ -35,13 +35,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut [Lanes; 4],
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
         let (family, own) = (group.family(), group.own);
         let energy = self.law.bond_energy(&group.bond, own, &group.memory[0]);
         sums[0] += simd.keep(group.own_share(energy), family);
@@ -66,13 +60,7 @@ impl<const D: usize> Kernel<D> for FamilyVolume {
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        [sum]: &mut [Lanes; 1],
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, [sum]: &mut [Lanes; 1]) {
         *sum += simd.keep(group.volume, group.family());
     }
 }
@@ -112,13 +100,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut [Lanes; 6],
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
         let length = group.bond.length;
         let xi = &group.bond.reference;
         let own = self.laws[0].stiffness(length, group.own) * group.weights.own();
@@ -160,13 +142,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut [Lanes; 6],
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
         let own = group.own;
         let force = self.law.force(&group.bond, own, &group.memory[0]);
         let force = force.times(group.weights.own()).times(group.volume);
@@ -189,13 +165,7 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut Self::Sums,
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         let share = family_share(&group.bond);
         for k in 0..FamilyShare::<D>::COUNT {
@@ -219,13 +189,7 @@ impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
     const WANTED: Wanted = wanted(LINEAR);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut [Lanes; 2],
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 2]) {
         let length = group.bond.length;
         let weight = length * length * group.volume * group.weights.own();
         let growth = weight * group.bond.stretch;

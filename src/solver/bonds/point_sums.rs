@@ -37,13 +37,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
     };
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut L::Sum,
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::Sum) {
         let share = (self.law).share::<N>(&group.bond, group.own, &group.memory[0]);
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
@@ -76,13 +70,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
     const WANTED: Wanted = growth_only(L::LINEAR);
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        sums: &mut L::WholeSum,
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::WholeSum) {
         let share = self.law.whole_share(&group.bond);
         for k in 0..L::WholeSum::COUNT {
             let share = share.get(k) * group.volume * group.weights.own();
@@ -111,13 +99,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     }
 
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        group: &mut Group<'_, Self, D>,
-        [smallest]: &mut [Lanes; 1],
-        _: &mut [Lanes; 0],
-    ) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, [smallest]: &mut [Lanes; 1]) {
         let none = Lanes::splat(f64::INFINITY);
         let growth = simd.select(group.bond.growth, group.family(), none);
         *smallest = growth.min(*smallest);

@@ -346,19 +346,15 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
         for k in 0..rows.len() {
             let mut row: Row<'_> = rows.row(k);
             let mut sums = kernel.start();
-            let mut broken = K::Broken::splat(0.0);
-            let mut any_broken = false;
+            let mut gone = 0;
             // SAFETY: the rows are those of the list whose reach `points` was made for.
             let here = unsafe { points.here(row.point) };
             for group in 0..row.neighbours.len() {
                 // SAFETY: as above.
                 let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };
                 let before = bonds.intact;
-                kernel.add(simd, &mut bonds, &mut sums, &mut broken);
-                if bonds.intact != before {
-                    row.groups.intact[group] = bonds.intact;
-                    any_broken = true;
-                }
+                kernel.add(simd, &mut bonds, &mut sums);
+                gone |= before ^ bonds.intact;
                 if K::Memory::COUNT > 0 && kernel.remembers() {
                     store_memory(row.groups.numbers(group), &bonds.memory, before);
                 }
@@ -372,8 +368,20 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let column = K::Sums::column_mut(&mut results, quantity);
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
-            if K::Broken::COUNT > 0 && any_broken {
-                note_point(&mut told, row.point, &all_broken(&broken));
+            if K::Broken::COUNT > 0 && gone != 0 {
+                let told = &mut told;
+                simd.aside(move || {
+                    let mut broken = K::Broken::splat(0.0);
+                    // SAFETY: as above.
+                    let here = unsafe { points.here(row.point) };
+                    for group in 0..row.neighbours.len() {
+                        // SAFETY: as above.
+                        let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };
+                        kernel.add_broken(simd, &mut bonds, &mut broken);
+                        row.groups.intact[group] = bonds.intact;
+                    }
+                    note_point(told, row.point, &all_broken(&broken));
+                });
             }
         }
         told
@@ -406,8 +414,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
             let mut vector: Adjacent<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
             let mut sums = kernel.start();
-            let mut broken = K::Broken::splat(0.0);
-            let mut any_broken = false;
+            let mut gone = 0;
             // SAFETY: the vectors are those of the grid that `points` was made for.
             let here = unsafe { points.here(vector.place) };
             for o in 0..vector.offsets.len() {
@@ -417,11 +424,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     bonds.whole = whole.map_or(0, |bits| bits[o]);
                 }
                 let before = bonds.intact;
-                kernel.add(simd, &mut bonds, &mut sums, &mut broken);
-                if bonds.intact != before {
-                    vector.groups.intact[o] = bonds.intact;
-                    any_broken = true;
-                }
+                kernel.add(simd, &mut bonds, &mut sums);
+                gone |= before ^ bonds.intact;
                 if K::Memory::COUNT > 0 && kernel.remembers() {
                     store_memory(vector.groups.numbers(o), &bonds.memory, before);
                 }
@@ -436,8 +440,20 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     }
                 }
             }
-            if K::Broken::COUNT > 0 && any_broken {
-                note_vector(&mut told, vector.point, &all_broken(&broken));
+            if K::Broken::COUNT > 0 && gone != 0 {
+                let told = &mut told;
+                simd.aside(move || {
+                    let mut broken = K::Broken::splat(0.0);
+                    // SAFETY: as above.
+                    let here = unsafe { points.here(vector.place) };
+                    for o in 0..vector.offsets.len() {
+                        // SAFETY: as above.
+                        let mut bonds = unsafe { points.load(simd, &here, &mut vector, o) };
+                        kernel.add_broken(simd, &mut bonds, &mut broken);
+                        vector.groups.intact[o] = bonds.intact;
+                    }
+                    note_vector(told, vector.point, &all_broken(&broken));
+                });
             }
         }
         told
