@@ -1,10 +1,10 @@
 //! The adaptive step: no step breaks more bonds of a point than the rule has it, what it dissipates depends
 //! less on the step, and it can be stopped at any step and goes on to the same bits on any ranks.
 
+use crate::support::saved::{state, whole};
 use crate::support::{plan, simulate, simulate_on};
-use fissure::comm::{Communicator, IdOrder, threads};
+use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
-use fissure::solver::motion::Saved;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// A notched plate that is torn fast.
@@ -73,23 +73,6 @@ fn no_step_breaks_more_bonds_of_a_point_than_it_may() {
     assert!(smallest <= 0.25 * largest, "{smallest} of {largest}");
     let raises = rows.windows(2).filter(|pair| pair[1][size] > pair[0][size]);
     assert!(raises.count() > 3);
-}
-
-/// The state of all points, by the parts of the ranks.
-fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
-    let owned = simulation.model.owned();
-    let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
-    let order = IdOrder::new(simulation.comm, ids, total);
-    let saved = simulation.save(&order);
-    (order, saved)
-}
-
-/// Parts of the ranks put together.
-fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
-    let values = parts.iter().flat_map(|part| &part.values);
-    let values = values.map(|value| value.to_bits()).collect();
-    let bonds = parts.iter().flat_map(|part| part.bonds.clone()).collect();
-    (values, bonds, parts[0].progress.clone())
 }
 
 #[test]

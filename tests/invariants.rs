@@ -222,10 +222,11 @@ fn forces_are_equal_and_opposite() {
         displace(&mut simulation, wave);
         let laws = simulation.plan.bodies.iter().map(|body| &body.material.law);
         let mut kept = laws.map(|law| (law.declaration.invariants)(&law.values));
-        let bound = match kept.all(|invariants| invariants.angular_momentum) {
-            true => 1e-12,
+        let bound = if kept.all(|invariants| invariants.angular_momentum) {
+            1e-12
+        } else {
             // The square of a strain, of the part that the family does not see.
-            false => 1e-2,
+            1e-2
         };
         for [net, gross] in moments(&simulation) {
             assert!(net.abs() <= bound * gross, "moment {net} of {gross}");

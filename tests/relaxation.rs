@@ -2,11 +2,11 @@
 //! the load steps; bonds break between equilibria, without the overshoot of a wave; it can be stopped
 //! within a load step and goes on to the same bits.
 
+use crate::support::saved::{state, whole};
 use crate::support::{plan, simulate, simulate_on};
-use fissure::comm::{Communicator, IdOrder, threads};
+use fissure::comm::{Communicator, threads};
 use fissure::deck::Plan;
 use fissure::solver::Simulation;
-use fissure::solver::motion::Saved;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// Makes all load steps.
@@ -297,23 +297,6 @@ fn torn(family: &str) -> String {
         time = {{ end = 4, method = 'relaxation', relaxation = {{ load_steps = 8, tolerance = 1e-5 }} }}
         "
     )
-}
-
-/// The state of all points, by the parts of the ranks.
-fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
-    let owned = simulation.model.owned();
-    let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
-    let order = IdOrder::new(simulation.comm, ids, total);
-    let saved = simulation.save(&order);
-    (order, saved)
-}
-
-/// Parts of the ranks put together.
-fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
-    let values = parts.iter().flat_map(|part| &part.values);
-    let values = values.map(|value| value.to_bits()).collect();
-    let bonds = parts.iter().flat_map(|part| part.bonds.clone()).collect();
-    (values, bonds, parts[0].progress.clone())
 }
 
 #[test]

@@ -76,6 +76,24 @@ fn has_checkpoint(out: &Path) -> bool {
         .any(|name| out.join(name).exists())
 }
 
+/// How many outputs a result has; none while it is just being written to.
+fn outputs(out: &Path) -> usize {
+    let steps = ResultReader::open(&result(out)).and_then(|result| result.steps());
+    steps.map_or(0, |steps| steps.len())
+}
+
+/// Starts a run, and waits for its second output.
+fn with_two_outputs(mut command: Command, out: &Path) -> Child {
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    while outputs(out) < 2 {
+        std::thread::sleep(Duration::from_millis(20));
+        let ended = child.try_wait().unwrap();
+        assert!(ended.is_none(), "the run ended by itself");
+    }
+    child
+}
+
 /// Kills one rank of a run after a while; returns whether that ended the run.
 fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
     let mut child = command
@@ -172,21 +190,7 @@ fn a_signal_to_any_rank_stops_all_and_nothing_is_lost() {
         (3, "-USR1"),
     ] {
         let out = folder.join(format!("{ranks}{signal}"));
-        let mut command = run(ranks, &deck, &out, &[]);
-        let mut child = command
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        while ResultReader::open(&result(&out)).map_or(0, |it| it.times().map_or(0, |t| t.len()))
-            < 2
-        {
-            std::thread::sleep(Duration::from_millis(20));
-            assert!(
-                child.try_wait().unwrap().is_none(),
-                "the run ended by itself"
-            );
-        }
+        let child = with_two_outputs(run(ranks, &deck, &out, &[]), &out);
         send(signal, *rank_processes(&child, ranks).last().unwrap());
         let output = wait(child);
         let printed = text(&output);
@@ -269,24 +273,11 @@ fn a_checkpoint_is_written_on_request() {
     let folder = Folder::new("request");
     let deck = folder.write("deck.toml", &plate("1e-2", ""));
     let out = folder.join("out");
-    let mut command = run(2, &deck, &out, &[]);
-    let mut child = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // A file that is just being written to may not be readable for a moment.
-    let outputs = || {
-        let steps = ResultReader::open(&result(&out)).and_then(|result| result.steps());
-        steps.map_or(0, |steps| steps.len())
-    };
-    while outputs() < 2 {
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    let mut child = with_two_outputs(run(2, &deck, &out, &[]), &out);
     assert!(!has_checkpoint(&out));
     send("-USR2", *rank_processes(&child, 2).last().unwrap());
-    let before = outputs();
-    while !has_checkpoint(&out) || outputs() <= before {
+    let before = outputs(&out);
+    while !has_checkpoint(&out) || outputs(&out) <= before {
         std::thread::sleep(Duration::from_millis(20));
         assert!(child.try_wait().unwrap().is_none(), "the run goes on");
     }
@@ -693,20 +684,7 @@ fn the_side_car_is_there_after_a_kill() {
     let deck = folder.write("deck.toml", &plate("1e-2", ""));
     for ranks in [1, 2] {
         let out = folder.join(format!("out{ranks}"));
-        let mut child = run(ranks, &deck, &out, &[])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        while ResultReader::open(&result(&out)).map_or(0, |it| it.times().map_or(0, |t| t.len()))
-            < 2
-        {
-            std::thread::sleep(Duration::from_millis(20));
-            assert!(
-                child.try_wait().unwrap().is_none(),
-                "the run ended by itself"
-            );
-        }
+        let child = with_two_outputs(run(ranks, &deck, &out, &[]), &out);
         for process in rank_processes(&child, ranks) {
             send("-KILL", process);
         }

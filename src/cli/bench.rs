@@ -118,9 +118,10 @@ fn deck(arguments: &BenchArguments) -> String {
     let family = arguments.family.name();
     let [x, y, z] = arguments.points;
     let last = warm_up(arguments) + u64::from(arguments.steps);
-    let damage = match arguments.no_failure {
-        true => "",
-        false => "damage = 'block'",
+    let damage = if arguments.no_failure {
+        ""
+    } else {
+        "damage = 'block'"
     };
     format!(
         "title = 'Benchmark'
@@ -225,26 +226,26 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         ("peak", resident(|r| r.peak, after)),
     ];
     let instructions = simulation.forces.instructions();
-    let family = match total(simulation.forces.lattice_bonds()) > 0.0 {
-        true => Family::Lattice,
-        false => Family::List,
+    let family = if total(simulation.forces.lattice_bonds()) > 0.0 {
+        Family::Lattice
+    } else {
+        Family::List
     };
     drop(simulation);
-    let limits = match arguments.no_limits {
-        true => None,
-        false => {
-            let limits = machine_limits::measure(world, threads);
-            let (law, failure) = (arguments.law, !arguments.no_failure);
-            let by_points = points * (MOTION_BYTES + law.passes() * PASS_BYTES);
-            let moved = law.passes() as f64 * bonds_bytes + by_points as f64;
-            let operations = bonds * law.operations(failure) as f64;
-            Some(Limited {
-                bandwidth: total(limits.bandwidth as u64),
-                moved: moved * steps / seconds,
-                arithmetic: total(limits.arithmetic as u64),
-                done: operations * steps / seconds,
-            })
-        }
+    let limits = if arguments.no_limits {
+        None
+    } else {
+        let limits = machine_limits::measure(world, threads);
+        let (law, failure) = (arguments.law, !arguments.no_failure);
+        let by_points = points * (MOTION_BYTES + law.passes() * PASS_BYTES);
+        let moved = law.passes() as f64 * bonds_bytes + by_points as f64;
+        let operations = bonds * law.operations(failure) as f64;
+        Some(Limited {
+            bandwidth: total(limits.bandwidth as u64),
+            moved: moved * steps / seconds,
+            arithmetic: total(limits.arithmetic as u64),
+            done: operations * steps / seconds,
+        })
     };
     Ok(Figures {
         law: arguments.law,

@@ -108,17 +108,19 @@ impl Figures {
 
     /// Prints a table, or one line of JSON.
     pub fn print(&self, json: bool) {
-        match json {
-            true => say!("{}", self.json()),
-            false => self.table(),
+        if json {
+            say!("{}", self.json())
+        } else {
+            self.table()
         }
     }
 
     fn table(&self) {
         let line = |name: &str, value: String| say!("  {name:<17}{value}");
-        let failure = match self.failure {
-            true => "bonds can break",
-            false => "bonds cannot break",
+        let failure = if self.failure {
+            "bonds can break"
+        } else {
+            "bonds cannot break"
         };
         let family = self.family.name();
         say!("benchmark: {}, {failure}, family {family}", self.law_name());
@@ -205,9 +207,10 @@ impl Figures {
             ("edges".to_owned(), format!("[{x}, {y}, {z}]")),
         ];
         let mut number = |name: &str, value: f64| {
-            let text = match value.is_finite() {
-                true => format!("{value:?}"),
-                false => "null".to_owned(),
+            let text = if value.is_finite() {
+                format!("{value:?}")
+            } else {
+                "null".to_owned()
             };
             entries.push((name.replace(['-', ' '], "_"), text));
         };

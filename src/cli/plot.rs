@@ -139,9 +139,10 @@ impl<'a> Look<'a> {
     }
 
     fn displacements(&self, index: usize) -> Result<Vec<f64>> {
-        match self.has_displacement {
-            true => self.result.field("displacement", index),
-            false => Ok(vec![0.0; 3 * self.positions.len()]),
+        if self.has_displacement {
+            self.result.field("displacement", index)
+        } else {
+            Ok(vec![0.0; 3 * self.positions.len()])
         }
     }
 

@@ -132,9 +132,10 @@ impl Observer for Log {
             Message::SetAside { why, kept } if self.rank == 0 => {
                 let kept: Vec<String> =
                     kept.iter().map(|path| path.display().to_string()).collect();
-                let kept = match kept.is_empty() {
-                    true => String::new(),
-                    false => format!("; it is kept as {}", kept.join(" and ")),
+                let kept = if kept.is_empty() {
+                    String::new()
+                } else {
+                    format!("; it is kept as {}", kept.join(" and "))
                 };
                 tell!("warning: {why}: a new result begins here{kept}");
             }

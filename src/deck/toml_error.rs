@@ -230,9 +230,10 @@ fn keys(value: Option<&DeValue>) -> String {
         .into_iter()
         .flat_map(|table| table.keys().map(|key| format!("`{}`", key.get_ref())))
         .collect();
-    match keys.is_empty() {
-        true => "none".to_owned(),
-        false => keys.join(", "),
+    if keys.is_empty() {
+        "none".to_owned()
+    } else {
+        keys.join(", ")
     }
 }
 

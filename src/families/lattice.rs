@@ -88,9 +88,10 @@ impl BondLattice {
             own_volume: volume(here),
             offsets,
             weighted: [false; 2],
-            vectors: match none {
-                true => Vec::new(),
-                false => vectors(&grid, domain.owned),
+            vectors: if none {
+                Vec::new()
+            } else {
+                vectors(&grid, domain.owned)
             },
             around,
             shifts,

@@ -50,12 +50,13 @@ pub(super) fn offsets(
     extent: [f64; 3],
     dimension: usize,
 ) -> (Vec<Offset>, Vec<[i64; 2]>) {
-    let range = |k: usize| match k < dimension {
-        true => {
+    let range = |k: usize| {
+        if k < dimension {
             let reach = steps(cutoff, spacing[k], extent[k]);
             -reach..=reach
+        } else {
+            0..=0
         }
-        false => 0..=0,
     };
     let (mut offsets, mut around) = (Vec::new(), Vec::new());
     for z in range(2) {

@@ -155,6 +155,35 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
 
+/// The force state of a bond of stiffness A/m and d κ θ/m (N/m⁷) that has taken a part e of its deviatoric
+/// extension by itself, given as e/|ξ|.
+#[inline(always)]
+pub(super) fn eased_force<const D: usize>(
+    bond: &Bond<D>,
+    pull: Lanes,
+    push: Lanes,
+    taken: Lanes,
+) -> Along {
+    let eased = taken * (Lanes::splat(1.0) - bond.shortening);
+    Along(push + bond.shortening * (pull - push) - pull * eased)
+}
+
+/// The energy ½ (A/m) (ε² + λ (e² − 2 ε_d e)) of such a bond, J/m⁶, that carries the share λ of its force
+/// by what has taken e; θ/d gives ε_d.
+#[inline(always)]
+pub(super) fn eased_energy<const D: usize>(
+    bond: &Bond<D>,
+    pull: Lanes,
+    even: Lanes,
+    taken: Lanes,
+    share: f64,
+) -> Lanes {
+    let deviatoric = bond.stretch - even;
+    let eased = (taken - deviatoric * 2.0) * taken * share;
+    let square = bond.stretch * bond.stretch + eased;
+    square * (bond.length * bond.length) * pull * 0.5
+}
+
 impl Described for Ordinary {
     fn described(&self) -> Vec<(&'static str, String)> {
         vec![("forces", "ordinary state-based".to_owned())]

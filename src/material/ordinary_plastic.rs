@@ -12,7 +12,7 @@
 
 use std::f64::consts::PI;
 
-use super::ordinary::Ordinary;
+use super::ordinary::{Ordinary, eased_energy, eased_force};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Word,
 };
@@ -175,8 +175,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         [pull, push, ..]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
     ) -> Along {
-        let yielded = *plastic * (Lanes::splat(1.0) - bond.shortening);
-        Along(*push + bond.shortening * (*pull - *push) - *pull * yielded)
+        eased_force(bond, *pull, *push, *plastic)
     }
 
     #[inline(always)]
@@ -186,10 +185,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         [pull, _, even, _]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
     ) -> Lanes {
-        let deviatoric = bond.stretch - *even;
-        let yielded = (*plastic - deviatoric * 2.0) * *plastic;
-        let square = bond.stretch * bond.stretch + yielded;
-        square * (bond.length * bond.length) * *pull * 0.5
+        eased_energy(bond, *pull, *even, *plastic, 1.0)
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {

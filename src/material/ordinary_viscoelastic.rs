@@ -9,7 +9,7 @@
 //! β = 1 − (τ/Δt)(1 − a). The constants are those of the instantaneous response; in the end the shear
 //! modulus is (1 − λ) of it.
 
-use super::ordinary::{INFLUENCE, Ordinary};
+use super::ordinary::{INFLUENCE, Ordinary, eased_energy, eased_force};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
 };
@@ -162,8 +162,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         [pull, push, _]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Along {
-        let relaxed = *back * self.relaxing_share * (Lanes::splat(1.0) - bond.shortening);
-        Along(*push + bond.shortening * (*pull - *push) - *pull * relaxed)
+        eased_force(bond, *pull, *push, *back * self.relaxing_share)
     }
 
     #[inline(always)]
@@ -173,11 +172,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         [pull, _, even]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
-        // ε² + λ (e_b² − 2 ε_d e_b) is ε² less what the spring of the dashpot has lost.
-        let deviatoric = bond.stretch - *even;
-        let relaxed = (*back - deviatoric * 2.0) * *back * self.relaxing_share;
-        let square = bond.stretch * bond.stretch + relaxed;
-        square * (bond.length * bond.length) * *pull * 0.5
+        eased_energy(bond, *pull, *even, *back, self.relaxing_share)
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {

@@ -168,9 +168,10 @@ impl<'a> ResultFile<'a> {
         for field in moving {
             let per_append = piece.total;
             let rows = Rows::Extensible { per_append };
-            let empty = match single {
-                true => FieldData::F32(&[]),
-                false => FieldData::F64(&[]),
+            let empty = if single {
+                FieldData::F32(&[])
+            } else {
+                FieldData::F64(&[])
             };
             let dataset = create_field(&mut result.file, field, &empty, rows)?;
             result.fields.push((*field, dataset));

@@ -50,9 +50,10 @@ impl SideCar {
             number,
             dynamic,
         };
-        let real = match contents.single {
-            true => Number::F32,
-            false => Number::F64,
+        let real = if contents.single {
+            Number::F32
+        } else {
+            Number::F64
         };
         let fixed = contents.fixed.iter();
         let fixed = fixed.map(|(field, data)| stored(field, data.number(), false));
@@ -160,9 +161,10 @@ fn write_attribute(
 ) -> fmt::Result {
     let (name, components) = (escaped(&field.name), field.components);
     let place = format!("{file}:/VTKHDF/PointData/{name}");
-    let (first, rows) = match field.dynamic {
-        true => (step * points, steps * points),
-        false => (0, points),
+    let (first, rows) = if field.dynamic {
+        (step * points, steps * points)
+    } else {
+        (0, points)
     };
     let parts: Vec<_> = match components {
         6 => SYMMETRIC

@@ -80,9 +80,10 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
             point.id = id;
         }
         // Appending would copy the first piece, which most often is the only one.
-        match points.is_empty() {
-            true => points = piece,
-            false => points.extend(piece),
+        if points.is_empty() {
+            points = piece
+        } else {
+            points.extend(piece)
         }
         total += all;
     }

@@ -42,9 +42,10 @@ impl Files {
             .chain(Checkpoints::paths(&self.folder))
             .find(|file| file.exists());
         if let (Some(file), false) = (existing, overwrite) {
-            let restart = match Checkpoints::paths(&self.folder).any(|path| path.exists()) {
-                true => "--restart continues the run, ",
-                false => "",
+            let restart = if Checkpoints::paths(&self.folder).any(|path| path.exists()) {
+                "--restart continues the run, "
+            } else {
+                ""
             };
             return Err(Error::input(format!(
                 "{} exists already; {restart}--overwrite replaces it, --output DIR writes elsewhere",

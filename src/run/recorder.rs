@@ -235,9 +235,10 @@ impl<'a> Recorder<'a> {
         &mut self,
         simulation: &mut Simulation<'_, D>,
     ) -> Result<()> {
-        match self.outputs.is_due(&simulation.clock) {
-            true => self.flush(),
-            false => self.write(simulation, true, false),
+        if self.outputs.is_due(&simulation.clock) {
+            self.flush()
+        } else {
+            self.write(simulation, true, false)
         }
     }
 

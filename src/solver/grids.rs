@@ -120,9 +120,10 @@ fn detected(
         let (low, high, gap) = (smallest[k], -smallest[3 + k], smallest[6 + k]);
         centre[k] = low;
         // One layer of points fits any edge.
-        edges[k] = match gap < f64::MAX {
-            true => (high - low) / ((high - low) / gap).round(),
-            false => longest,
+        edges[k] = if gap < f64::MAX {
+            (high - low) / ((high - low) / gap).round()
+        } else {
+            longest
         };
     }
     let cell: f64 = edges[..dimension].iter().product::<f64>() * plan.dimension.section();

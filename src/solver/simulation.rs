@@ -442,9 +442,10 @@ fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<
     }
     let counts = vec![Cell::new(0); plan.cracks.len()];
     forces.cut(|here, there| {
-        let (first, second) = match model.ids[here] < model.ids[there] {
-            true => (here, there),
-            false => (there, here),
+        let (first, second) = if model.ids[here] < model.ids[there] {
+            (here, there)
+        } else {
+            (there, here)
         };
         let [from, to] = [first, second].map(|point| model.position(point));
         let mut cut = false;

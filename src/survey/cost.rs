@@ -100,9 +100,10 @@ impl Cost {
         let on_lattice = plan.family != FamilyRule::List
             && plan.quadrature == Quadrature::Midpoint
             && plan.bodies.iter().all(|body| is_lattice(&body.points));
-        let (bytes, listed) = match on_lattice {
-            true => (ON_LATTICE, 0.0),
-            false => (LISTED, directed_bonds),
+        let (bytes, listed) = if on_lattice {
+            (ON_LATTICE, 0.0)
+        } else {
+            (LISTED, directed_bonds)
         };
         let counts = Counts {
             points,

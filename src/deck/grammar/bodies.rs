@@ -1,0 +1,150 @@
+//! Bodies, and what is told of their points by place: sets and cracks.
+
+use serde::{Deserialize, Serialize};
+use serde_spanned::Spanned;
+
+use super::Text;
+use crate::deck::number::{Edges, Number, Vector};
+
+/// A body: a shape filled with lattice points, or a file of points.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Name of the material.
+    pub material: Text,
+    /// Name of the damage law; without it bonds never break.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Text>,
+    /// The shape that is filled with lattice points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Spanned<Shape>>,
+    /// The file that holds the points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointFile>,
+    /// Lattice spacing of this body in m; that of `[grid]` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing: Option<Spanned<Edges>>,
+    /// Horizon of this body in m; that of `[grid]` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub horizon: Option<Number>,
+}
+
+/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointFile {
+    /// Path, relative to the deck.
+    pub file: Text,
+    /// Take only the rows with this block number; all rows if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<Spanned<u32>>,
+}
+
+/// A region of space.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    /// A box (interval, rectangle) between two corners, in m.
+    Box {
+        /// Lower corner.
+        lower: Vector,
+        /// Upper corner.
+        upper: Vector,
+    },
+    /// A disc (plane problems).
+    Disc {
+        /// Centre.
+        centre: Vector,
+        /// Radius.
+        radius: Number,
+    },
+    /// A cylinder (3-D) between the centres of its two ends.
+    Cylinder {
+        /// Centre of one end.
+        from: Vector,
+        /// Centre of the other end.
+        to: Vector,
+        /// Radius.
+        radius: Number,
+    },
+    /// A ball (3-D).
+    Sphere {
+        /// Centre.
+        centre: Vector,
+        /// Radius.
+        radius: Number,
+    },
+    /// A polygon (plane problems).
+    Polygon {
+        /// Corners [x, y] in order.
+        vertices: Spanned<Vec<Vector>>,
+    },
+    /// A polygon in x and y, extruded along z (3-D).
+    Prism {
+        /// Corners [x, y] in order.
+        vertices: Spanned<Vec<Vector>>,
+        /// Lower z.
+        bottom: Number,
+        /// Upper z.
+        top: Number,
+    },
+    /// Whatever lies in one of the shapes.
+    Union(Spanned<Vec<Spanned<Shape>>>),
+    /// Whatever lies in the first shape and in none of the others.
+    Difference(Spanned<Vec<Spanned<Shape>>>),
+}
+
+/// A set of points; exactly one of the keys.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Set {
+    /// A condition on the reference position, such as `"x < 2*dx && y > 0"`.
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
+    pub condition: Option<Number>,
+    /// A region.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Spanned<Shape>>,
+    /// The points' global ids, from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ids: Option<Spanned<Vec<Spanned<u64>>>>,
+}
+
+/// A surface that cuts bonds.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Crack {
+    /// A straight cut (plane problems).
+    Segment {
+        /// One end.
+        from: Vector,
+        /// The other end.
+        to: Vector,
+        /// Width in m of a cut with two faces, half on each side; 0 if not given.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
+    },
+    /// A parallelogram (3-D).
+    Rectangle {
+        /// A corner.
+        corner: Vector,
+        /// The edge from the corner to a neighbouring one.
+        edge_a: Vector,
+        /// The edge from the corner to the other neighbouring one.
+        edge_b: Vector,
+        /// As of a segment.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
+    },
+    /// A flat disc (3-D).
+    Disc {
+        /// Centre.
+        centre: Vector,
+        /// Normal, of any length.
+        normal: Vector,
+        /// Radius.
+        radius: Number,
+        /// As of a segment.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        width: Option<Number>,
+    },
+}

@@ -1,0 +1,54 @@
+//! Initial values, loads and supports.
+
+use serde::{Deserialize, Serialize};
+
+use super::Text;
+use crate::deck::number::{Number, Vector};
+
+/// Initial values of a set; expressions of x, y, z, one a component.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Initial {
+    /// The set; all points if not given.
+    #[serde(default = "super::all_points")]
+    pub set: Text,
+    /// Displacement in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub displacement: Option<Vector>,
+    /// Velocity in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vector>,
+}
+
+/// A load or support of a set; exactly one of the quantities. Values are expressions of x, y, z, t,
+/// one a component; the string `"free"` leaves a component of a motion free.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    /// The set that it acts on.
+    pub set: Text,
+    /// Prescribed displacement in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub displacement: Option<Vector>,
+    /// Prescribed velocity in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vector>,
+    /// Body force density in N/m³.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_force: Option<Vector>,
+    /// Traction in Pa on a surface layer of thickness `depth`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction: Option<Vector>,
+    /// Pressure in Pa against the outward `normal` of a surface layer of thickness `depth`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<Number>,
+    /// Total force in N, spread over the set in proportion to volume.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force: Option<Vector>,
+    /// Thickness in m of the layer that carries a traction or pressure; the spacing if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth: Option<Number>,
+    /// Outward normal for a pressure, of any length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normal: Option<Vector>,
+}

@@ -1,0 +1,124 @@
+//! The grid, and the bonds between bodies.
+
+use serde::{Deserialize, Serialize};
+use serde_spanned::Spanned;
+
+use super::{Tables, Text};
+use crate::deck::number::{Edges, Number, Vector};
+
+/// The lattice and the range of the bonds.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Edge of a lattice cell in m, or a list with one a dimension; for bodies given as shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing: Option<Spanned<Edges>>,
+    /// Horizon δ in m: points up to this distance are bonded.
+    pub horizon: Number,
+    /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Vector>,
+    /// What the volumes of points near the edge of a family count: `"exact"`, `"linear"` or `"none"`; if not
+    /// given, `"exact"` where all points are centres of square or cubic cells, and else `"none"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_correction: Option<Spanned<VolumeCorrection>>,
+    /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
+    #[serde(default)]
+    pub quadrature: Quadrature,
+    /// How bonds are kept: `"lattice"`, one bit each, for points on a regular grid (those of a file
+    /// may be), `"list"` for any, or `"auto"`, a lattice where possible. Bonds between bodies on
+    /// different grids are always listed. Results differ by rounding only.
+    #[serde(default = "automatic")]
+    pub family: Spanned<Family>,
+}
+
+fn automatic() -> Spanned<Family> {
+    Spanned::new(0..0, Family::Auto)
+}
+
+/// How bonds are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// As lattices where bodies have them, else in lists.
+    Auto,
+    /// A list for each point.
+    List,
+    /// Fixed offsets for all points.
+    Lattice,
+}
+
+/// How volumes near the edge of a family are corrected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum VolumeCorrection {
+    /// Points within the horizon count whole.
+    None,
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too (PA-HHB); LAMMPS ends
+    /// this taper at δ, Peridigm has none.
+    Linear,
+    /// Points count the share of their cell within the horizon.
+    Exact,
+}
+
+/// The points of a lattice cell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quadrature {
+    /// One at the centre.
+    #[default]
+    Midpoint,
+    /// 2 in 1-D, 4 in the plane, 8 in 3-D.
+    Gauss,
+}
+
+/// The bonds between blocks.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Interface {
+    /// What constants they have: `"own"`, `"average"` or `"minimum"`. With `"own"` each end exerts its
+    /// half with its own modulus and horizon; else both have the mean or the smaller of each. `"none"`:
+    /// there are none, however near the bodies are.
+    #[serde(default = "own")]
+    pub rule: Spanned<Rule>,
+    /// Pairs of bodies with a rule of their own, by any name.
+    #[serde(default)]
+    pub pair: Tables<Pair>,
+}
+
+impl Default for Interface {
+    fn default() -> Self {
+        Self {
+            rule: own(),
+            pair: Tables::default(),
+        }
+    }
+}
+
+fn own() -> Spanned<Rule> {
+    Spanned::new(0..0, Rule::Own)
+}
+
+/// The bonds between two bodies.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pair {
+    /// Names of the two bodies, in any order.
+    pub bodies: Spanned<Vec<Text>>,
+    /// As for all pairs.
+    pub rule: Spanned<Rule>,
+}
+
+/// What constants bonds between blocks have, if there are any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// No bonds.
+    None,
+    /// Means.
+    Average,
+    /// The smaller.
+    Minimum,
+    /// Those of each end.
+    Own,
+}

@@ -1,0 +1,147 @@
+//! Materials and damage laws.
+
+use std::fmt;
+
+use indexmap::IndexMap;
+use serde::de::{EnumAccess, VariantAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_spanned::Spanned;
+
+use super::Text;
+use crate::deck::number::{Number, default_number};
+use crate::elastic::Constant;
+
+/// A material: its law, and the table of the law.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// Name of the law.
+    pub law: Text,
+    /// Density and damping, one or two elastic constants, and the keys that the law
+    /// [declares](crate::material::Declaration::keys).
+    pub table: Spanned<LawTable>,
+}
+
+/// The keys and values of a law. A value is a number, an expression or a word.
+pub type LawTable = IndexMap<Text, Number>;
+
+/// Density ρ in kg/m³.
+pub const DENSITY: &str = "density";
+
+/// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
+pub const DAMPING: &str = "damping";
+
+/// The elastic constants: moduli in Pa, and Poisson's ratio.
+pub const ELASTIC_CONSTANTS: [(&str, Constant); 5] = [
+    ("youngs_modulus", Constant::Young),
+    ("bulk_modulus", Constant::Bulk),
+    ("shear_modulus", Constant::Shear),
+    ("lame_lambda", Constant::Lame),
+    ("poisson_ratio", Constant::Poisson),
+];
+
+/// The keys of every law's table.
+pub fn common_keys() -> impl Iterator<Item = &'static str> + Clone {
+    let constants = ELASTIC_CONSTANTS.into_iter().map(|(name, _)| name);
+    [DENSITY].into_iter().chain(constants).chain([DAMPING])
+}
+
+/// As an enumeration of laws would be, whose names are looked at later.
+impl<'de> Deserialize<'de> for Material {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct MaterialVisitor;
+
+        impl<'de> Visitor<'de> for MaterialVisitor {
+            type Value = Material;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("a table")
+            }
+
+            fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<Material, A::Error> {
+                let (law, table) = data.variant()?;
+                let table = table.newtype_variant()?;
+                Ok(Material { law, table })
+            }
+        }
+
+        deserializer.deserialize_enum("Material", &[], MaterialVisitor)
+    }
+}
+
+impl Serialize for Material {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map([(&self.law, &self.table)])
+    }
+}
+
+/// A damage law.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Damage {
+    /// A bond breaks for good at a critical stretch.
+    CriticalStretch(Spanned<CriticalStretch>),
+    /// A bond that is pulled breaks for good when it has taken a work.
+    Energy(Spanned<BondEnergy>),
+}
+
+/// Critical stretch, from one of three measures of toughness.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CriticalStretch {
+    /// Fracture energy G0 in J/m².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy: Option<Number>,
+    /// Fracture toughness K_Ic in Pa·√m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_toughness: Option<Number>,
+    /// The critical stretch s0 itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub critical_stretch: Option<Number>,
+    /// α in s ≥ s0 − α s_min; 0 if not given, a plain critical stretch.
+    #[serde(default = "default_alpha")]
+    pub alpha: Number,
+    /// Sets of points whose bonds never break.
+    #[serde(default)]
+    pub no_failure: Vec<Text>,
+}
+
+/// The work of bonds, from one of two measures of toughness.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct BondEnergy {
+    /// Fracture energy G0 in J/m².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy: Option<Number>,
+    /// Fracture toughness K_Ic in Pa·√m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_toughness: Option<Number>,
+    /// How the critical work follows: "energy" (all bonds across an area take the fracture energy) or
+    /// "willberg2022" (as in Willberg et al. 2022, eq. 16 and 18).
+    #[serde(default)]
+    pub calibration: Calibration,
+    /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
+    #[serde(default = "no_alpha")]
+    pub alpha: Number,
+    /// Sets of points whose bonds never break.
+    #[serde(default)]
+    pub no_failure: Vec<Text>,
+}
+
+/// How the critical work of bonds follows from the fracture energy.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Calibration {
+    /// From the energy of all bonds across an area.
+    #[default]
+    Energy,
+    /// As printed in Willberg et al. 2022.
+    Willberg2022,
+}
+
+fn no_alpha() -> Number {
+    default_number(0.0)
+}
+
+fn default_alpha() -> Number {
+    default_number(0.0)
+}

@@ -1,0 +1,113 @@
+//! The deck's grammar: what may stand in the TOML file, section by section.
+//!
+//! Every number may be a string with an expression of the `[parameters]`; all values are SI.
+//! Unknown keys are errors. Choices are tables named by the choice (`[material.glass.pmb]`), which
+//! keeps the place of an error.
+
+mod bodies;
+mod conditions;
+mod grid;
+mod material;
+mod outputs;
+mod time;
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+use serde_spanned::Spanned;
+
+use crate::deck::number::Number;
+pub use bodies::*;
+pub use conditions::*;
+pub use grid::*;
+pub use material::*;
+pub use outputs::*;
+pub use time::*;
+
+/// A string with its place in the deck.
+pub type Text = Spanned<String>;
+
+/// Named tables in the order of the deck.
+pub type Tables<T> = IndexMap<String, Spanned<T>>;
+
+/// A whole deck.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deck {
+    /// One line for summaries and pictures.
+    #[serde(default = "nowhere")]
+    pub title: Text,
+    /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
+    pub dimension: Spanned<DimensionName>,
+    /// Thickness of a plane body in m; 1 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<Number>,
+    /// Cross-section of a 1-D body in m²; 1 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_section: Option<Number>,
+    /// Named numbers for use in expressions; may build on one another.
+    #[serde(default)]
+    pub parameters: IndexMap<Text, Number>,
+    /// Spacing and horizon.
+    pub grid: Spanned<Grid>,
+    /// The bonds between blocks.
+    #[serde(default)]
+    pub interface: Interface,
+    /// Materials by name: `[material.NAME.LAW]`.
+    pub material: Tables<Material>,
+    /// Damage laws by name.
+    #[serde(default)]
+    pub damage: Tables<Damage>,
+    /// Bodies by name; each is a block with its own material and damage.
+    pub body: Tables<Body>,
+    /// Sets of points by name. `all` and the names of the bodies are sets as well.
+    #[serde(default)]
+    pub set: Tables<Set>,
+    /// Pre-cracks by name: bonds that cross one start broken.
+    #[serde(default)]
+    pub crack: Tables<Crack>,
+    /// Initial displacements and velocities by name.
+    #[serde(default)]
+    pub initial: Tables<Initial>,
+    /// Loads and supports by name.
+    #[serde(default)]
+    pub condition: Tables<Condition>,
+    /// End time and step.
+    pub time: Spanned<Time>,
+    /// The stages of the run in their order; without them there is one, that of `[time]`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stage: Vec<Spanned<Stage>>,
+    /// What is written to the result, and how often.
+    #[serde(default = "nowhere")]
+    pub output: Spanned<Output>,
+    /// What is written to the history, and how often.
+    #[serde(default = "nowhere")]
+    pub history: Spanned<History>,
+    /// How often the run can be continued from.
+    #[serde(default = "nowhere")]
+    pub checkpoint: Spanned<Checkpoint>,
+}
+
+fn nowhere<T: Default>() -> Spanned<T> {
+    Spanned::new(0..0, T::default())
+}
+
+/// The setting of the problem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+pub enum DimensionName {
+    /// A bar under uniaxial strain.
+    #[serde(rename = "1d")]
+    Line,
+    /// A thin plate, free of stress across its thickness.
+    #[serde(rename = "plane-stress")]
+    PlaneStress,
+    /// A slice of a long body, without strain along it.
+    #[serde(rename = "plane-strain")]
+    PlaneStrain,
+    /// A solid.
+    #[serde(rename = "3d")]
+    Space,
+}
+
+fn all_points() -> Text {
+    Spanned::new(0..0, "all".to_owned())
+}

@@ -1,0 +1,166 @@
+//! What is written: the result, the history, checkpoints.
+
+use std::num::NonZeroU64;
+
+use serde::{Deserialize, Serialize};
+use serde_spanned::Spanned;
+
+use super::{Tables, Text};
+use crate::deck::number::{Number, Vector};
+
+/// The result file.
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// Simulated time between outputs in s; a fiftieth of the run if neither is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Number>,
+    /// Steps between outputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<Spanned<NonZeroU64>>,
+    /// Names of the fields.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fields: Option<Vec<Text>>,
+    /// Of the fields that change in time: `"double"`, 8 bytes a number, or `"single"`, 4 bytes.
+    #[serde(default)]
+    pub precision: Precision,
+    /// The set whose points the result holds; all points if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub set: Option<Text>,
+}
+
+/// How long the numbers of a result are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 8 bytes: every bit.
+    #[default]
+    Double,
+    /// 4 bytes: seven digits.
+    Single,
+}
+
+/// The history: sums and probes over time.
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct History {
+    /// Simulated time between rows in s; a five-hundredth of the run if neither is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Number>,
+    /// Steps between rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<Spanned<NonZeroU64>>,
+    /// Sets whose reaction force is recorded, by component.
+    #[serde(default)]
+    pub reactions: Vec<Text>,
+    /// Forces of supports along a direction, by name.
+    #[serde(default)]
+    pub force: Tables<SupportForce>,
+    /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage_threshold: Option<Number>,
+    /// Places whose nearest point is followed, by name.
+    #[serde(default)]
+    pub probe: Tables<Probe>,
+    /// Fronts that are followed along lines, by name.
+    #[serde(default)]
+    pub front: Tables<Front>,
+    /// Cracks whose path and length are found, by name; plane problems.
+    #[serde(default)]
+    pub crack: Tables<CrackPath>,
+    /// Crack tips that are followed, by name.
+    #[serde(default)]
+    pub tip: Tables<Tip>,
+}
+
+/// Checkpoints; at most one of the keys.
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Checkpoint {
+    /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if
+    /// nothing is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Text>,
+    /// Steps between checkpoints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<Spanned<NonZeroU64>>,
+    /// Simulated time between checkpoints in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_time: Option<Number>,
+}
+
+/// The force of the supports on a set along a direction.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupportForce {
+    /// The set.
+    pub set: Text,
+    /// The direction in which the force counts, of any length.
+    pub direction: Vector,
+}
+
+/// A crack: the lines through the middle of the damage that hangs together from a place on, each
+/// branch by itself.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrackPath {
+    /// Where the crack starts, m; damage within one horizon of it belongs to the crack.
+    pub from: Vector,
+    /// The points that are looked at; all if not given.
+    #[serde(default = "super::all_points")]
+    pub set: Text,
+    /// What the damage must exceed; `damage_threshold` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<Number>,
+}
+
+/// A place to watch.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// The place in m; the nearest point is followed.
+    pub at: Vector,
+}
+
+/// A front: how far a field has come along a line. Of the points near the line, the farthest one above
+/// the threshold; from there to the next point ahead, linear interpolation to where the threshold is
+/// crossed.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Front {
+    /// Where the line starts, m.
+    pub from: Vector,
+    /// Where it leads, of any length.
+    pub direction: Vector,
+    /// Length of the line in m; to the end of the bodies if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length: Option<Number>,
+    /// Points up to this distance from the line count, in m; the horizon if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<Number>,
+    /// Name of an output field.
+    pub field: Text,
+    /// `"x"`, `"y"` or `"z"` of a vector, whose length is taken if nothing is given; `"xx"`, `"yy"`,
+    /// `"zz"`, `"xy"`, `"yz"` or `"xz"` of a stress.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub component: Option<Text>,
+    /// What the size of the field must exceed, in the unit of the field.
+    pub threshold: Number,
+}
+
+/// A crack tip: the farthest point of a set, in one direction, with more damage than a threshold; from
+/// there on as for a [`Front`].
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tip {
+    /// Where the length of the crack is counted from, m.
+    pub from: Vector,
+    /// Where the crack runs, of any length; its own length is counted along this.
+    pub direction: Vector,
+    /// The points that are looked at; all if not given.
+    #[serde(default = "super::all_points")]
+    pub set: Text,
+    /// What the damage must exceed; `damage_threshold` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<Number>,
+}

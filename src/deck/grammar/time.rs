@@ -1,0 +1,189 @@
+//! The time axis, stages, and how points come to move.
+
+use std::num::NonZeroU64;
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_spanned::Spanned;
+
+use super::Text;
+use crate::deck::number::{Number, default_number};
+
+/// The time axis.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// End time in s.
+    pub end: Number,
+    /// A fixed time step in s; automatic if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<Number>,
+    /// Automatic step as a fraction of the stable one.
+    #[serde(default = "default_safety")]
+    pub safety: Number,
+    /// How the points come to move: `"explicit"`, by the equation of motion, or `"relaxation"`, from one
+    /// equilibrium to the next.
+    #[serde(default = "explicit")]
+    pub method: Spanned<Method>,
+    /// How equilibria are found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<Spanned<Relaxation>>,
+    /// How many times its density a body has in the equation of motion; more than 1 to take larger steps
+    /// through slow loading.
+    #[serde(default = "default_density_scale")]
+    pub density_scale: Number,
+    /// The step follows the number of bonds that break in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<Spanned<Adaptive>>,
+}
+
+fn default_density_scale() -> Number {
+    default_number(1.0)
+}
+
+fn default_safety() -> Number {
+    default_number(0.8)
+}
+
+/// A stage of the run. What it does not say is as in `[time]`.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stage {
+    /// When it ends, s; the last stage ends with the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Spanned<Method>>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub safety: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<Spanned<Relaxation>>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density_scale: Option<Number>,
+    /// As in `[time]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<Spanned<Adaptive>>,
+    /// Names of the loads and supports that act; all if neither this nor `off` is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on: Option<Spanned<Vec<Text>>>,
+    /// Names of the loads and supports that do not act.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub off: Option<Spanned<Vec<Text>>>,
+}
+
+fn explicit() -> Spanned<Method> {
+    Spanned::new(0..0, Method::Explicit)
+}
+
+/// How the points come to move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Velocity Verlet.
+    Explicit,
+    /// Adaptive dynamic relaxation in load steps; t is the load parameter.
+    Relaxation,
+}
+
+/// A step that follows the number of bonds that break in it.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptive {
+    /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
+    #[serde(default = "default_most_broken", deserialize_with = "count")]
+    pub most_broken: NonZeroU64,
+    /// A step that breaks no more bonds of any point is calm.
+    #[serde(default = "default_stable_broken")]
+    pub stable_broken: Spanned<u64>,
+    /// Calm steps in a row before the step is raised.
+    #[serde(default = "default_calm_steps", deserialize_with = "count")]
+    pub steps: NonZeroU64,
+    /// What the step is multiplied with when one is undone.
+    #[serde(default = "default_reduce")]
+    pub reduce: Number,
+    /// What it is multiplied with when it is raised.
+    #[serde(default = "default_raise")]
+    pub raise: Number,
+    /// The smallest step in s; a hundredth of the largest if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smallest: Option<Number>,
+    /// The largest step in s; that of `step` or `safety` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest: Option<Number>,
+}
+
+/// A number of things, at least 1, that TOML can write: its integers end at 2⁶³.
+fn count<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NonZeroU64, D::Error> {
+    let number = NonZeroU64::deserialize(deserializer)?;
+    if number.get() > i64::MAX as u64 {
+        return Err(D::Error::custom(format!(
+            "must be at most {}, is {number}",
+            i64::MAX
+        )));
+    }
+    Ok(number)
+}
+
+fn default_most_broken() -> NonZeroU64 {
+    NonZeroU64::new(2).expect("not 0")
+}
+
+fn default_stable_broken() -> Spanned<u64> {
+    Spanned::new(0..0, 1)
+}
+
+fn default_calm_steps() -> NonZeroU64 {
+    NonZeroU64::new(10).expect("not 0")
+}
+
+fn default_reduce() -> Number {
+    default_number(0.5)
+}
+
+fn default_raise() -> Number {
+    default_number(1.5)
+}
+
+/// How equilibria are found.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Relaxation {
+    /// Number of load steps.
+    #[serde(default = "default_load_steps", deserialize_with = "count")]
+    pub load_steps: NonZeroU64,
+    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    #[serde(default = "default_tolerance")]
+    pub tolerance: Number,
+    /// The most iterations of a load step.
+    #[serde(default = "default_iterations", deserialize_with = "count")]
+    pub iterations: NonZeroU64,
+}
+
+impl Default for Relaxation {
+    fn default() -> Self {
+        Self {
+            load_steps: default_load_steps(),
+            tolerance: default_tolerance(),
+            iterations: default_iterations(),
+        }
+    }
+}
+
+fn default_load_steps() -> NonZeroU64 {
+    NonZeroU64::new(20).expect("not 0")
+}
+
+fn default_tolerance() -> Number {
+    default_number(1e-6)
+}
+
+fn default_iterations() -> NonZeroU64 {
+    NonZeroU64::new(100_000).expect("not 0")
+}

@@ -1,0 +1,292 @@
+//! Bodies: their points, materials, bonds and damage, and what is told of them by place.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use super::{Calibration, Law};
+use crate::deck::expression::Expression;
+use crate::elastic::Isotropic;
+
+/// A body, which is a block with its own material and damage.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Its name in the deck.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The material's name.
+    pub material_name: String,
+    /// The material.
+    pub material: Material,
+    /// The damage law, if bonds can break.
+    pub damage: Option<Damage>,
+    /// Horizon δ, m.
+    pub horizon: f64,
+    /// Where its horizon stands in the deck: its own or that of the grid.
+    pub horizon_place: Range<usize>,
+    /// Where its points come from.
+    pub points: PointSource,
+}
+
+/// A material: density, elastic constants and the law that uses them.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// The law.
+    pub law: Law,
+    /// kg/m³.
+    pub density: f64,
+    /// E and ν; for a bond-based law ν is the law's own.
+    pub elastic: Isotropic,
+    /// Viscous damping r, 1/s: a force density −r ρ u̇.
+    pub damping: f64,
+}
+
+/// What volumes near the edge of a family count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VolumeCorrection {
+    /// Whole or not at all.
+    None,
+    /// A share that falls linearly with the distance.
+    Linear,
+    /// The share of the cell that lies within the horizon.
+    Exact,
+}
+
+/// Where the points of a lattice cell lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quadrature {
+    /// One at the centre.
+    Midpoint,
+    /// Two by direction, at ±√3/3 of half the edge.
+    Gauss,
+}
+
+impl Quadrature {
+    /// Number of points of a cell of so many dimensions.
+    pub fn points(self, dimension: usize) -> u32 {
+        match self {
+            Self::Midpoint => 1,
+            Self::Gauss => 1 << dimension,
+        }
+    }
+}
+
+/// How bonds are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FamilyRule {
+    /// As bits for bodies on a lattice, in lists for others.
+    Auto,
+    /// In lists.
+    List,
+    /// As bits; every body must lie on a lattice.
+    Lattice,
+}
+
+/// The bonds between blocks.
+#[derive(Debug, Clone)]
+pub struct Interface {
+    /// The rule of pairs without one of their own.
+    pub rule: InterfaceRule,
+    /// Pairs of bodies, by name, with a rule of their own.
+    pub pairs: Vec<([String; 2], InterfaceRule)>,
+}
+
+impl Interface {
+    /// The rule of the bonds between two bodies; the same for both orders.
+    pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
+        let joins = |names: &[String; 2]| {
+            let [a, b] = [&names[0], &names[1]];
+            (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)
+        };
+        let own = self.pairs.iter().find(|(names, _)| joins(names));
+        own.map_or(self.rule, |(_, rule)| *rule)
+    }
+}
+
+/// What constants the bonds between two blocks have, if there are any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InterfaceRule {
+    /// No bonds join the blocks.
+    None,
+    /// Means of the moduli and of the horizons.
+    Average,
+    /// The smaller of the moduli and of the horizons.
+    Minimum,
+    /// Each end exerts its own half.
+    Own,
+}
+
+/// When bonds break.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Damage {
+    /// What they break by.
+    pub rule: DamageRule,
+    /// How much it takes.
+    pub toughness: Toughness,
+    /// α in s ≥ s0 − α s_min.
+    pub alpha: f64,
+    /// Indices of sets whose bonds never break.
+    pub no_failure: Vec<usize>,
+}
+
+/// What bonds break by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DamageRule {
+    /// Their stretch.
+    CriticalStretch,
+    /// The work that they have taken.
+    Energy(Calibration),
+}
+
+/// Three measures of how much a material resists a crack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Toughness {
+    /// G0, J/m².
+    FractureEnergy(f64),
+    /// K_Ic, Pa·√m.
+    FractureToughness(f64),
+    /// s0 itself; for bonds that break by their stretch.
+    CriticalStretch(f64),
+}
+
+/// Where points come from.
+#[derive(Debug, Clone)]
+pub enum PointSource {
+    /// The centres of lattice cells within a shape.
+    Lattice {
+        /// The shape.
+        shape: Shape,
+        /// Edges of a cell, m.
+        spacing: [f64; 3],
+        /// A corner of a cell, m.
+        origin: [f64; 3],
+    },
+    /// The rows of a file.
+    File {
+        /// Path, already relative to the working directory.
+        path: PathBuf,
+        /// Only rows with this block number.
+        block: Option<u32>,
+        /// Where the file is named in the deck.
+        span: Range<usize>,
+    },
+}
+
+/// A region of space, lengths in m.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Between two corners.
+    Box {
+        /// Lower corner.
+        lower: [f64; 3],
+        /// Upper corner.
+        upper: [f64; 3],
+    },
+    /// A disc or ball.
+    Ball {
+        /// Centre.
+        centre: [f64; 3],
+        /// Radius.
+        radius: f64,
+    },
+    /// Between the centres of its ends.
+    Cylinder {
+        /// Centre of one end.
+        from: [f64; 3],
+        /// Centre of the other.
+        to: [f64; 3],
+        /// Radius.
+        radius: f64,
+    },
+    /// A polygon in x and y, between two values of z.
+    Prism {
+        /// Corners in order.
+        vertices: Vec<[f64; 2]>,
+        /// Lower z; −∞ in the plane.
+        bottom: f64,
+        /// Upper z; ∞ in the plane.
+        top: f64,
+    },
+    /// In any of them.
+    Union(Vec<Shape>),
+    /// In the first and in none of the others.
+    Difference(Vec<Shape>),
+}
+
+/// A named set of points.
+#[derive(Debug, Clone)]
+pub struct Set {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Which points.
+    pub selector: Selector,
+}
+
+/// How points are chosen.
+#[derive(Debug, Clone)]
+pub enum Selector {
+    /// All points.
+    All,
+    /// The points of a body, by index.
+    Body(usize),
+    /// Those whose reference position makes this true.
+    Where(Expression),
+    /// Those within a region.
+    Within(Shape),
+    /// Those with these global ids.
+    Ids {
+        /// Sorted.
+        ids: Vec<u64>,
+        /// Where the largest one stands in the deck.
+        largest: Range<usize>,
+    },
+}
+
+/// A crack that is there from the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreCrack {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The surface.
+    pub surface: Crack,
+}
+
+/// A surface that cuts bonds; lengths in m.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Crack {
+    /// In the plane.
+    Segment {
+        /// One end.
+        from: [f64; 3],
+        /// The other.
+        to: [f64; 3],
+        /// From face to face, half on each side; 0 for a cut without width.
+        width: f64,
+    },
+    /// A parallelogram.
+    Rectangle {
+        /// A corner.
+        corner: [f64; 3],
+        /// One edge from it.
+        edge_a: [f64; 3],
+        /// The other edge from it.
+        edge_b: [f64; 3],
+        /// As of a segment.
+        width: f64,
+    },
+    /// A flat disc.
+    Disc {
+        /// Centre.
+        centre: [f64; 3],
+        /// Unit normal.
+        normal: [f64; 3],
+        /// Radius.
+        radius: f64,
+        /// As of a segment.
+        width: f64,
+    },
+}

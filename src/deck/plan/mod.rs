@@ -1,0 +1,77 @@
+//! The validated deck: every number known, every name resolved.
+//!
+//! Positions and vectors have three components; those beyond the dimension are 0.
+
+mod bodies;
+mod conditions;
+mod outputs;
+mod time;
+
+use std::ops::Range;
+
+use crate::deck::source::Source;
+use crate::dimension::Dimension;
+
+pub use super::law::Law;
+pub use crate::damage::Calibration;
+pub use bodies::*;
+pub use conditions::*;
+pub use outputs::*;
+pub use time::*;
+
+/// Everything that a run needs to know.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The deck's text, for errors found later and for the result's metadata.
+    pub source: Source,
+    /// What the deck may say but most likely does not mean, each with file and line.
+    pub warnings: Vec<String>,
+    /// One line.
+    pub title: String,
+    /// Where some of the values stand in the deck.
+    pub places: Places,
+    /// The setting.
+    pub dimension: Dimension,
+    /// Horizon δ of the grid, m; bodies may have their own.
+    pub horizon: f64,
+    /// What volumes near the edge of a family count.
+    pub volume_correction: VolumeCorrection,
+    /// Where the points of a lattice cell lie.
+    pub quadrature: Quadrature,
+    /// How bonds are kept.
+    pub family: FamilyRule,
+    /// The bonds between blocks.
+    pub interface: Interface,
+    /// Bodies in the order of the deck; the index is the block number.
+    pub bodies: Vec<Body>,
+    /// Sets: `all`, then the bodies, then those of the deck.
+    pub sets: Vec<Set>,
+    /// Pre-cracks.
+    pub cracks: Vec<PreCrack>,
+    /// Initial values, applied in order.
+    pub initials: Vec<Initial>,
+    /// Loads and supports, applied in order.
+    pub conditions: Vec<Condition>,
+    /// The time axis.
+    pub time: Time,
+    /// The stages of the run in their order; without them there is one, in which all conditions act. The
+    /// last one ends with [`Self::time`], of which nothing else counts then.
+    pub stages: Vec<Stage>,
+    /// The result file.
+    pub output: Output,
+    /// The history.
+    pub history: History,
+    /// When checkpoints are written.
+    pub checkpoint: CheckpointRule,
+}
+
+/// Where values stand in the deck whose mistakes only the points show.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Places {
+    /// The horizon of the grid.
+    pub horizon: Range<usize>,
+    /// The end time.
+    pub end: Range<usize>,
+    /// The time step; the end time if the step is automatic.
+    pub step: Range<usize>,
+}

@@ -1,0 +1,261 @@
+//! What is written: the result, the history, checkpoints.
+
+use std::ops::Range;
+
+/// How often something is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Interval {
+    /// Seconds of simulated time.
+    Seconds(f64),
+    /// Time steps.
+    Steps(u64),
+}
+
+/// When checkpoints are written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CheckpointRule {
+    /// So many seconds of wall-clock time apart.
+    WallClock(f64),
+    /// So many steps or so much simulated time apart.
+    Simulation(Interval),
+}
+
+/// The result file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    /// How often.
+    pub every: Interval,
+    /// Which fields.
+    pub fields: Vec<Field>,
+    /// Whether the fields are rounded to 4-byte numbers.
+    pub single: bool,
+    /// Index of the set whose points the result holds, and where it is named; `None` for all points.
+    pub set: Option<(usize, Range<usize>)>,
+}
+
+/// The history.
+#[derive(Debug, Clone)]
+pub struct History {
+    /// How often.
+    pub every: Interval,
+    /// Sets whose reaction force is recorded, by component.
+    pub reactions: Vec<Reaction>,
+    /// Forces of supports along a direction.
+    pub support_forces: Vec<SupportForce>,
+    /// Damage above which a point counts as cracked.
+    pub damage_threshold: f64,
+    /// Places that are watched.
+    pub probes: Vec<Probe>,
+    /// Fronts that are followed.
+    pub fronts: Vec<Front>,
+    /// Cracks whose path is found.
+    pub cracks: Vec<CrackPath>,
+    /// Crack tips that are followed.
+    pub tips: Vec<Tip>,
+}
+
+/// A set whose reaction force is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reaction {
+    /// Index of the set.
+    pub set: usize,
+    /// Where it is named.
+    pub span: Range<usize>,
+}
+
+/// A set on which the force of the supports along a direction is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SupportForce {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Index of the set.
+    pub set: usize,
+    /// Unit vector.
+    pub direction: [f64; 3],
+}
+
+/// A crack whose path is found.
+#[derive(Debug, Clone)]
+pub struct CrackPath {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Where it starts, m.
+    pub from: [f64; 3],
+    /// Index of the set that is looked at.
+    pub set: usize,
+    /// What the damage must exceed.
+    pub threshold: f64,
+}
+
+/// A place whose nearest point is followed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The place, m.
+    pub at: [f64; 3],
+}
+
+/// A start and a way from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Where it starts, m.
+    pub from: [f64; 3],
+    /// Unit vector.
+    pub direction: [f64; 3],
+}
+
+/// How far a field has come along a line.
+#[derive(Debug, Clone)]
+pub struct Front {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The line.
+    pub line: Line,
+    /// Length of the line, m.
+    pub length: f64,
+    /// Points up to this distance from the line count, m.
+    pub radius: f64,
+    /// The field.
+    pub field: Field,
+    /// The entry of a row of the field; `None` is the length of a vector.
+    pub component: Option<usize>,
+    /// What the size of the field must exceed.
+    pub threshold: f64,
+}
+
+/// The farthest point with damage in a direction.
+#[derive(Debug, Clone)]
+pub struct Tip {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Where the crack starts, and where it runs.
+    pub line: Line,
+    /// Index of the set that is looked at.
+    pub set: usize,
+    /// What the damage must exceed.
+    pub threshold: f64,
+}
+
+/// A field of the result that changes with time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Field {
+    /// u, m.
+    Displacement,
+    /// u̇, m/s.
+    Velocity,
+    /// ü, m/s².
+    Acceleration,
+    /// Internal force density, N/m³.
+    ForceDensity,
+    /// φ, share of the family's volume that is cut off.
+    Damage,
+    /// W, J/m³.
+    StrainEnergyDensity,
+    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane.
+    Dilatation,
+    /// m = Σ ω|ξ|²Ṽ, m⁵.
+    WeightedVolume,
+    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz = ν (xx + yy), in 1-D
+    /// yy = zz = ν/(1 − ν) xx.
+    Stress,
+    /// Σ T⊗Y Ṽ over the volume that the deformed body has for one of the undeformed: Cauchy's stress,
+    /// Pa, in the same order.
+    CauchyStress,
+    /// von Mises' equivalent of Cauchy's stress, Pa.
+    VonMisesStress,
+    /// F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row; I where too few are left.
+    DeformationGradient,
+    /// Number of intact bonds, with points in the own family or that have the point in theirs.
+    Neighbours,
+    /// Number of the point's bonds that have broken since the start.
+    BrokenBonds,
+    /// 1 where a point has too few bonds left for its law and carries no force, else 0.
+    Singular,
+    /// The rank that owns the point.
+    Rank,
+}
+
+impl Field {
+    /// All fields.
+    pub const ALL: [Self; 16] = [
+        Self::Displacement,
+        Self::Velocity,
+        Self::Acceleration,
+        Self::ForceDensity,
+        Self::Damage,
+        Self::StrainEnergyDensity,
+        Self::Dilatation,
+        Self::WeightedVolume,
+        Self::Stress,
+        Self::CauchyStress,
+        Self::VonMisesStress,
+        Self::DeformationGradient,
+        Self::Neighbours,
+        Self::BrokenBonds,
+        Self::Singular,
+        Self::Rank,
+    ];
+
+    /// Its name in decks and results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::ForceDensity => "force_density",
+            Self::Damage => "damage",
+            Self::StrainEnergyDensity => "strain_energy_density",
+            Self::Dilatation => "dilatation",
+            Self::WeightedVolume => "weighted_volume",
+            Self::Stress => "stress",
+            Self::CauchyStress => "cauchy_stress",
+            Self::VonMisesStress => "von_mises_stress",
+            Self::DeformationGradient => "deformation_gradient",
+            Self::Neighbours => "neighbours",
+            Self::BrokenBonds => "broken_bonds",
+            Self::Singular => "singular",
+            Self::Rank => "rank",
+        }
+    }
+
+    /// Its SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Displacement => "m",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s^2",
+            Self::ForceDensity => "N/m^3",
+            Self::Damage
+            | Self::Dilatation
+            | Self::DeformationGradient
+            | Self::Neighbours
+            | Self::BrokenBonds
+            | Self::Singular
+            | Self::Rank => "1",
+            Self::WeightedVolume => "m^5",
+            Self::Stress | Self::CauchyStress | Self::VonMisesStress => "Pa",
+            Self::StrainEnergyDensity => "J/m^3",
+        }
+    }
+
+    /// 3 for vectors, 6 for symmetric tensors and 9 for others (padded in 1-D and 2-D), 1 for scalars.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Displacement | Self::Velocity | Self::Acceleration | Self::ForceDensity => 3,
+            Self::Stress | Self::CauchyStress => 6,
+            Self::DeformationGradient => 9,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The time axis, stages, and how points come to move.
+
+/// The time axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Time {
+    /// End time, s.
+    pub end: f64,
+    /// The step.
+    pub step: StepRule,
+    /// How the points come to move.
+    pub method: Method,
+    /// How many times its density a body has in the equation of motion.
+    pub density_scale: f64,
+    /// How the step follows the number of bonds that break in it, if it does.
+    pub adaptive: Option<Adaptive>,
+}
+
+/// How the step follows the number of bonds that break in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adaptive {
+    /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
+    pub most_broken: u64,
+    /// A step that breaks no more bonds of any point is calm.
+    pub stable_broken: u64,
+    /// Calm steps in a row before the step is raised.
+    pub steps: u64,
+    /// What the step is multiplied with when one is undone.
+    pub reduce: f64,
+    /// What it is multiplied with when it is raised.
+    pub raise: f64,
+    /// The smallest step, s; `None` is a hundredth of the largest.
+    pub smallest: Option<f64>,
+    /// The largest step, s; `None` is the one that [`Time::step`] says.
+    pub largest: Option<f64>,
+}
+
+/// A stage of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// Its end, counted from the start of the run, and how it gets there.
+    pub time: Time,
+    /// Whether each condition acts.
+    pub acting: Vec<bool>,
+}
+
+/// How the points come to move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// By the equation of motion, with velocity Verlet.
+    Explicit,
+    /// From one equilibrium to the next; t is the load parameter, and [`Time::step`] is not used.
+    Relaxation(Relaxation),
+}
+
+/// How equilibria are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relaxation {
+    /// Number of load steps.
+    pub load_steps: u64,
+    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    pub tolerance: f64,
+    /// The most iterations of a load step.
+    pub iterations: u64,
+}
+
+/// How the time step is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StepRule {
+    /// This fraction of the stable step.
+    Automatic(f64),
+    /// Fixed, s.
+    Fixed(f64),
+}

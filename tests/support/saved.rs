@@ -1,0 +1,22 @@
+//! What a run keeps, from all its ranks.
+
+use fissure::comm::IdOrder;
+use fissure::solver::Simulation;
+use fissure::solver::motion::Saved;
+
+/// The state of all points, by the parts of the ranks.
+pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
+    let owned = simulation.model.owned();
+    let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
+    let order = IdOrder::new(simulation.comm, ids, total);
+    let saved = simulation.save(&order);
+    (order, saved)
+}
+
+/// Parts of the ranks put together.
+pub fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
+    let values = parts.iter().flat_map(|part| &part.values);
+    let values = values.map(|value| value.to_bits()).collect();
+    let bonds = parts.iter().flat_map(|part| part.bonds.clone()).collect();
+    (values, bonds, parts[0].progress.clone())
+}
