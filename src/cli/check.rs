@@ -10,8 +10,8 @@ use fissure::solver::Simulation;
 use fissure::solver::assign::cutoffs;
 use fissure::solver::motion::Clock;
 use fissure::solver::observers::HistoryObserver;
-use fissure::solver::simulation::choose_steps;
 use fissure::solver::size::is_feasible;
+use fissure::solver::steps::choose_steps;
 use fissure::survey::{Cost, Interior, Measured, Size, Survey, ghost_share, interior, size};
 
 use super::check_report as say;

@@ -24,6 +24,7 @@ mod crack_files;
 mod decisions;
 mod energy_watch;
 mod files;
+mod layout;
 mod observer;
 mod options;
 mod physics;
@@ -49,7 +50,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
 use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
-use crate::solver::simulation::choose_steps;
+use crate::solver::steps::choose_steps;
 use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;

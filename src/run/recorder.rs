@@ -9,8 +9,7 @@ use crate::deck::plan::Field;
 use crate::error::{Error, ErrorKind, Result};
 use crate::output::checkpoint::Header;
 use crate::output::{
-    Contents, Creation, FieldData, FieldDescription, HistoryContents, Number, Piece, ResultFile,
-    ResultReader, SideCar, StoredField, mix,
+    Creation, HistoryContents, Number, ResultFile, ResultReader, SideCar, StoredField, mix,
 };
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
@@ -20,6 +19,7 @@ use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
 use super::crack_files;
 use super::files::Files;
+use super::layout::{Layout, pick};
 use super::observer::{Observer, Row};
 use super::physics::history_differences;
 
@@ -58,19 +58,6 @@ pub enum Start {
     New(Creation),
     /// After so many outputs and history rows of files that are there.
     After(u64, u64),
-}
-
-/// What a result consists of, whether it is new or continued.
-struct Layout<'a> {
-    places: Vec<f64>,
-    ids: Vec<u64>,
-    blocks: Vec<u32>,
-    volumes: Vec<f64>,
-    moving: Vec<FieldDescription>,
-    metadata: &'a [(&'a str, String)],
-    single: bool,
-    piece: Piece,
-    steps: u64,
 }
 
 impl<'a> Recorder<'a> {
@@ -298,15 +285,6 @@ fn kept<const D: usize>(
     ))
 }
 
-/// The rows that are kept of values with `width` numbers a row.
-fn pick<T: Copy>(kept: &Option<Vec<usize>>, values: Vec<T>, width: usize) -> Vec<T> {
-    let Some(kept) = kept else {
-        return values;
-    };
-    let row = |row: &usize| &values[row * width..(row + 1) * width];
-    kept.iter().flat_map(row).copied().collect()
-}
-
 /// Why the result that a checkpoint belongs to cannot be continued, if it cannot: it is not there, damaged or
 /// another one, or the plan asks for other fields or columns. Collective.
 ///
@@ -385,63 +363,4 @@ fn wanted_fields(plan: &Plan) -> Vec<&'static str> {
         .iter()
         .map(|field| field.name())
         .collect()
-}
-
-impl<'a> Layout<'a> {
-    fn new<const D: usize>(
-        simulation: &Simulation<'_, D>,
-        (order, kept): (&IdOrder, &Option<Vec<usize>>),
-        steps: u64,
-        metadata: &'a [(&'a str, String)],
-    ) -> Self {
-        let (comm, model) = (simulation.comm, &simulation.model);
-        let owned = model.owned();
-        let first = order.first();
-        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
-        let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
-        let output = &simulation.plan.output;
-        let describe = |field: &Field| FieldDescription {
-            name: field.name(),
-            unit: field.unit(),
-            components: field.components(),
-        };
-        let ids = pick(kept, (first..first + order.count() as u64).collect(), 1);
-        let (first, total) = comm::scan(comm, ids.len() as u64);
-        Self {
-            places: pick(kept, order.collect(comm, &places, 3), 3),
-            blocks: pick(kept, order.collect(comm, &blocks, 1), 1),
-            volumes: pick(kept, order.collect(comm, &model.volume[..owned], 1), 1),
-            ids,
-            moving: output.fields.iter().map(describe).collect(),
-            metadata,
-            single: output.single,
-            piece: Piece { first, total },
-            steps,
-        }
-    }
-
-    fn fixed(&self) -> [(FieldDescription, FieldData<'_>); 3] {
-        let scalar = |name, unit| FieldDescription {
-            name,
-            unit,
-            components: 1,
-        };
-        [
-            (scalar("id", "1"), FieldData::U64(&self.ids)),
-            (scalar("block", "1"), FieldData::U32(&self.blocks)),
-            (scalar("volume", "m^3"), FieldData::F64(&self.volumes)),
-        ]
-    }
-
-    fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
-        Contents {
-            piece: self.piece,
-            positions: bytemuck::cast_slice(&self.places),
-            fixed,
-            moving: &self.moving,
-            metadata: self.metadata,
-            single: self.single,
-            steps: self.steps,
-        }
-    }
 }

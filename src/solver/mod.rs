@@ -10,5 +10,6 @@ pub mod observers;
 pub mod simulation;
 pub mod size;
 mod stages;
+pub mod steps;
 
 pub use simulation::Simulation;

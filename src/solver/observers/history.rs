@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
-use crate::comm::{self, Communicator};
 use crate::deck::plan::{self, Reaction};
 use crate::error::Result;
 use crate::solver::Simulation;
@@ -11,6 +10,7 @@ use crate::solver::conditions::{members, not_empty};
 
 use super::centre_line::{self, Branch};
 use super::crack_path::CrackPath;
+use super::cracked::Cracked;
 use super::front::Front;
 use super::nearest::nearest;
 use super::snapshot::Snapshot;
@@ -390,43 +390,4 @@ fn point_sums<const D: usize>(
                 a
             },
         )
-}
-
-/// The points of a rank that count as cracked.
-struct Cracked {
-    points: u64,
-    lower: [f64; 3],
-    upper: [f64; 3],
-}
-
-impl Cracked {
-    fn new<const D: usize>(simulation: &Simulation<'_, D>, snapshot: &Snapshot) -> Self {
-        let mut cracked = Self {
-            points: 0,
-            lower: [f64::MAX; 3],
-            upper: [f64::MIN; 3],
-        };
-        let threshold = simulation.plan.history.damage_threshold;
-        for point in 0..simulation.model.owned() {
-            if snapshot.damage(&simulation.family_volume, point) > threshold {
-                let position = simulation.model.position(point);
-                cracked.points += 1;
-                for d in 0..3 {
-                    cracked.lower[d] = cracked.lower[d].min(position[d]);
-                    cracked.upper[d] = cracked.upper[d].max(position[d]);
-                }
-            }
-        }
-        cracked
-    }
-
-    /// Corners (m) of the box around the cracked points of all ranks; NaN if there is none.
-    fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
-        comm::min(comm, &mut self.lower);
-        comm.max(&mut self.upper);
-        if self.lower[0] > self.upper[0] {
-            return ([f64::NAN; 3], [f64::NAN; 3]);
-        }
-        (self.lower, self.upper)
-    }
 }

@@ -4,6 +4,7 @@
 mod centre_line;
 mod contact;
 mod crack_path;
+mod cracked;
 mod front;
 pub mod history;
 pub mod nearest;

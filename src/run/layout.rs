@@ -1,0 +1,90 @@
+//! What a result consists of.
+
+use crate::comm::{self, IdOrder};
+use crate::deck::plan::Field;
+use crate::output::{Contents, FieldData, FieldDescription, Piece};
+use crate::solver::Simulation;
+
+/// What a result consists of, whether it is new or continued.
+pub struct Layout<'a> {
+    places: Vec<f64>,
+    ids: Vec<u64>,
+    blocks: Vec<u32>,
+    volumes: Vec<f64>,
+    moving: Vec<FieldDescription>,
+    metadata: &'a [(&'a str, String)],
+    single: bool,
+    piece: Piece,
+    steps: u64,
+}
+
+impl<'a> Layout<'a> {
+    /// From all ranks.
+    pub fn new<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        (order, kept): (&IdOrder, &Option<Vec<usize>>),
+        steps: u64,
+        metadata: &'a [(&'a str, String)],
+    ) -> Self {
+        let (comm, model) = (simulation.comm, &simulation.model);
+        let owned = model.owned();
+        let first = order.first();
+        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
+        let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
+        let output = &simulation.plan.output;
+        let describe = |field: &Field| FieldDescription {
+            name: field.name(),
+            unit: field.unit(),
+            components: field.components(),
+        };
+        let ids = pick(kept, (first..first + order.count() as u64).collect(), 1);
+        let (first, total) = comm::scan(comm, ids.len() as u64);
+        Self {
+            places: pick(kept, order.collect(comm, &places, 3), 3),
+            blocks: pick(kept, order.collect(comm, &blocks, 1), 1),
+            volumes: pick(kept, order.collect(comm, &model.volume[..owned], 1), 1),
+            ids,
+            moving: output.fields.iter().map(describe).collect(),
+            metadata,
+            single: output.single,
+            piece: Piece { first, total },
+            steps,
+        }
+    }
+
+    /// The fields that do not change.
+    pub fn fixed(&self) -> [(FieldDescription, FieldData<'_>); 3] {
+        let scalar = |name, unit| FieldDescription {
+            name,
+            unit,
+            components: 1,
+        };
+        [
+            (scalar("id", "1"), FieldData::U64(&self.ids)),
+            (scalar("block", "1"), FieldData::U32(&self.blocks)),
+            (scalar("volume", "m^3"), FieldData::F64(&self.volumes)),
+        ]
+    }
+
+    /// With the fields that [`Self::fixed`] gives.
+    pub fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
+        Contents {
+            piece: self.piece,
+            positions: bytemuck::cast_slice(&self.places),
+            fixed,
+            moving: &self.moving,
+            metadata: self.metadata,
+            single: self.single,
+            steps: self.steps,
+        }
+    }
+}
+
+/// The rows that are kept of values with `width` numbers a row.
+pub fn pick<T: Copy>(kept: &Option<Vec<usize>>, values: Vec<T>, width: usize) -> Vec<T> {
+    let Some(kept) = kept else {
+        return values;
+    };
+    let row = |row: &usize| &values[row * width..(row + 1) * width];
+    kept.iter().flat_map(row).copied().collect()
+}

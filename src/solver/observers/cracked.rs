@@ -1,0 +1,47 @@
+//! The part of the body that counts as cracked.
+
+use crate::comm::{self, Communicator};
+use crate::solver::Simulation;
+
+use super::snapshot::Snapshot;
+
+/// The points of a rank that count as cracked.
+pub struct Cracked {
+    /// How many there are.
+    pub points: u64,
+    lower: [f64; 3],
+    upper: [f64; 3],
+}
+
+impl Cracked {
+    /// At this moment.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, snapshot: &Snapshot) -> Self {
+        let mut cracked = Self {
+            points: 0,
+            lower: [f64::MAX; 3],
+            upper: [f64::MIN; 3],
+        };
+        let threshold = simulation.plan.history.damage_threshold;
+        for point in 0..simulation.model.owned() {
+            if snapshot.damage(&simulation.family_volume, point) > threshold {
+                let position = simulation.model.position(point);
+                cracked.points += 1;
+                for d in 0..3 {
+                    cracked.lower[d] = cracked.lower[d].min(position[d]);
+                    cracked.upper[d] = cracked.upper[d].max(position[d]);
+                }
+            }
+        }
+        cracked
+    }
+
+    /// Corners (m) of the box around the cracked points of all ranks; NaN if there is none.
+    pub fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
+        comm::min(comm, &mut self.lower);
+        comm.max(&mut self.upper);
+        if self.lower[0] > self.upper[0] {
+            return ([f64::NAN; 3], [f64::NAN; 3]);
+        }
+        (self.lower, self.upper)
+    }
+}
