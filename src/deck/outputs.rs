@@ -1,10 +1,8 @@
 //! What a deck writes to the result, and how often; validated.
 
-use std::num::NonZeroU64;
-
 use serde_spanned::Spanned;
 
-use super::grammar::{self, Deck};
+use super::grammar::{self, Count, Deck};
 use super::number::Number;
 use super::plan;
 use super::resolve::{Scope, find};
@@ -19,7 +17,7 @@ pub fn interval(
     scope: &Scope,
     key: &str,
     every: &Option<Number>,
-    every_steps: &Option<Spanned<NonZeroU64>>,
+    every_steps: &Option<Spanned<Count>>,
     default: f64,
 ) -> Result<plan::Interval> {
     match (every, every_steps) {
@@ -27,25 +25,12 @@ pub fn interval(
         (Some(every), None) => scope
             .positive(every, &format!("{key} every"))
             .map(plan::Interval::Seconds),
-        (None, Some(steps)) => Ok(plan::Interval::Steps(countable(scope, key, steps)?)),
+        (None, Some(steps)) => Ok(plan::Interval::Steps(steps.get_ref().get())),
         (Some(_), Some(steps)) => Err(scope.error(
             steps.span(),
             format!("{key} every_steps: give either `every` or `every_steps`"),
         )),
     }
-}
-
-/// A number of steps that TOML can write: its integers end at 2⁶³.
-fn countable(scope: &Scope, key: &str, steps: &Spanned<NonZeroU64>) -> Result<u64> {
-    let number = steps.get_ref().get();
-    if number > i64::MAX as u64 {
-        let message = format!(
-            "{key} every_steps: must be at most {}, is {number}",
-            i64::MAX
-        );
-        return Err(scope.error(steps.span(), message));
-    }
-    Ok(number)
 }
 
 /// Validates what is written to the result; `end` (s) is the end of the run.
@@ -128,7 +113,7 @@ pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<plan::CheckpointRule> {
             }
         },
         (None, Some(steps), None) => {
-            let interval = Interval::Steps(countable(scope, "[checkpoint]", steps)?);
+            let interval = Interval::Steps(steps.get_ref().get());
             Ok(CheckpointRule::Simulation(interval))
         }
         (None, None, Some(time)) => {

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod conditions;
+mod count;
 mod grid;
 mod material;
 mod outputs;
@@ -18,6 +19,7 @@ use serde_spanned::Spanned;
 use crate::deck::number::Number;
 pub use bodies::*;
 pub use conditions::*;
+pub use count::Count;
 pub use grid::*;
 pub use material::*;
 pub use outputs::*;

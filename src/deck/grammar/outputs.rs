@@ -1,11 +1,9 @@
 //! What is written: the result, the history, checkpoints.
 
-use std::num::NonZeroU64;
-
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
-use super::{Tables, Text};
+use super::{Count, Tables, Text};
 use crate::deck::number::{Number, Vector};
 
 /// The result file.
@@ -17,7 +15,7 @@ pub struct Output {
     pub every: Option<Number>,
     /// Steps between outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub every_steps: Option<Spanned<NonZeroU64>>,
+    pub every_steps: Option<Spanned<Count>>,
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
@@ -49,7 +47,7 @@ pub struct History {
     pub every: Option<Number>,
     /// Steps between rows.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub every_steps: Option<Spanned<NonZeroU64>>,
+    pub every_steps: Option<Spanned<Count>>,
     /// Sets whose reaction force is recorded, by component.
     #[serde(default)]
     pub reactions: Vec<Text>,
@@ -83,7 +81,7 @@ pub struct Checkpoint {
     pub every: Option<Text>,
     /// Steps between checkpoints.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub every_steps: Option<Spanned<NonZeroU64>>,
+    pub every_steps: Option<Spanned<Count>>,
     /// Simulated time between checkpoints in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_time: Option<Number>,

@@ -1,12 +1,9 @@
 //! The time axis, stages, and how points come to move.
 
-use std::num::NonZeroU64;
-
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
-use super::Text;
+use super::{Count, Text};
 use crate::deck::number::{Number, default_number};
 
 /// The time axis.
@@ -97,14 +94,14 @@ pub enum Method {
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
     /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
-    #[serde(default = "default_most_broken", deserialize_with = "count")]
-    pub most_broken: NonZeroU64,
+    #[serde(default = "default_most_broken")]
+    pub most_broken: Count,
     /// A step that breaks no more bonds of any point is calm.
     #[serde(default = "default_stable_broken")]
     pub stable_broken: Spanned<u64>,
     /// Calm steps in a row before the step is raised.
-    #[serde(default = "default_calm_steps", deserialize_with = "count")]
-    pub steps: NonZeroU64,
+    #[serde(default = "default_calm_steps")]
+    pub steps: Count,
     /// What the step is multiplied with when one is undone.
     #[serde(default = "default_reduce")]
     pub reduce: Number,
@@ -119,28 +116,16 @@ pub struct Adaptive {
     pub largest: Option<Number>,
 }
 
-/// A number of things, at least 1, that TOML can write: its integers end at 2⁶³.
-fn count<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NonZeroU64, D::Error> {
-    let number = NonZeroU64::deserialize(deserializer)?;
-    if number.get() > i64::MAX as u64 {
-        return Err(D::Error::custom(format!(
-            "must be at most {}, is {number}",
-            i64::MAX
-        )));
-    }
-    Ok(number)
-}
-
-fn default_most_broken() -> NonZeroU64 {
-    NonZeroU64::new(2).expect("not 0")
+fn default_most_broken() -> Count {
+    Count::new(2)
 }
 
 fn default_stable_broken() -> Spanned<u64> {
     Spanned::new(0..0, 1)
 }
 
-fn default_calm_steps() -> NonZeroU64 {
-    NonZeroU64::new(10).expect("not 0")
+fn default_calm_steps() -> Count {
+    Count::new(10)
 }
 
 fn default_reduce() -> Number {
@@ -156,14 +141,14 @@ fn default_raise() -> Number {
 #[serde(deny_unknown_fields)]
 pub struct Relaxation {
     /// Number of load steps.
-    #[serde(default = "default_load_steps", deserialize_with = "count")]
-    pub load_steps: NonZeroU64,
+    #[serde(default = "default_load_steps")]
+    pub load_steps: Count,
     /// What the forces that are out of balance may be, as a share of loads and reactions.
     #[serde(default = "default_tolerance")]
     pub tolerance: Number,
     /// The most iterations of a load step.
-    #[serde(default = "default_iterations", deserialize_with = "count")]
-    pub iterations: NonZeroU64,
+    #[serde(default = "default_iterations")]
+    pub iterations: Count,
 }
 
 impl Default for Relaxation {
@@ -176,14 +161,14 @@ impl Default for Relaxation {
     }
 }
 
-fn default_load_steps() -> NonZeroU64 {
-    NonZeroU64::new(20).expect("not 0")
+fn default_load_steps() -> Count {
+    Count::new(20)
 }
 
 fn default_tolerance() -> Number {
     default_number(1e-6)
 }
 
-fn default_iterations() -> NonZeroU64 {
-    NonZeroU64::new(100_000).expect("not 0")
+fn default_iterations() -> Count {
+    Count::new(100_000)
 }

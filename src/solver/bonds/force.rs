@@ -44,14 +44,6 @@ pub struct Force<L> {
 impl<L> Force<L> {
     /// The weighted sum of the force states of both ends.
     #[inline(always)]
-    fn total<S: Simd, const D: usize>(&self, simd: S, group: &Group<'_, Self, D>) -> L::Force
-    where
-        L: Law<D>,
-    {
-        self.weighted(simd, group, group.weights)
-    }
-
-    #[inline(always)]
     fn weighted<S: Simd, const D: usize>(
         &self,
         simd: S,
@@ -151,7 +143,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
                 far.memory(&group.bond, there, &group.memory[1], step),
             ];
         }
-        let total = self.total(simd, group);
+        let total = self.weighted(simd, group, group.weights);
         let work = self.work(simd, group, total);
         group.intact &= !self.breaks(simd, group, work);
         total.add(simd, &group.bond, group.volume, group.intact, force);
@@ -164,7 +156,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         group: &mut Group<'_, Self, D>,
         (told, lost): &mut Self::Broken,
     ) {
-        let total = self.total(simd, group);
+        let total = self.weighted(simd, group, group.weights);
         let work = self.work(simd, group, total);
         let broken = self.breaks(simd, group, work);
         group.intact &= !broken;

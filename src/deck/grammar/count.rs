@@ -1,0 +1,44 @@
+//! Numbers of things.
+
+use std::fmt;
+use std::num::NonZeroU64;
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// A number of things, at least 1, that TOML can write: its integers end at 2⁶³.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Count(NonZeroU64);
+
+impl Count {
+    /// # Panics
+    /// When it is 0.
+    pub const fn new(number: u64) -> Self {
+        Self(NonZeroU64::new(number).expect("not 0"))
+    }
+
+    /// As a plain number.
+    pub fn get(self) -> u64 {
+        self.0.get()
+    }
+}
+
+impl fmt::Display for Count {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(formatter)
+    }
+}
+
+impl<'de> Deserialize<'de> for Count {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let number = NonZeroU64::deserialize(deserializer)?;
+        if number.get() > i64::MAX as u64 {
+            let most = i64::MAX;
+            return Err(D::Error::custom(format!(
+                "must be at most {most}, is {number}"
+            )));
+        }
+        Ok(Self(number))
+    }
+}
