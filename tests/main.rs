@@ -21,6 +21,7 @@ mod laws;
 mod library;
 mod plasticity;
 mod readers;
+mod refinement;
 mod restart;
 mod stable_step;
 mod support;

@@ -44,6 +44,9 @@ pub struct Deck {
     /// The bonds between blocks.
     #[serde(default)]
     pub interface: Interface,
+    /// Finer grids in parts of the bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Spanned<Refinement>>,
     /// Materials by name: `[material.NAME.LAW]`.
     pub material: Tables<Material>,
     /// Damage laws by name.
@@ -74,6 +77,9 @@ pub struct Deck {
     /// How often the run can be continued from.
     #[serde(default = "nowhere")]
     pub checkpoint: Spanned<Checkpoint>,
+    /// When points are dealt out anew to the ranks; never if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub balance: Option<Spanned<Balance>>,
 }
 
 fn nowhere<T: Default>() -> Spanned<T> {
@@ -164,6 +170,51 @@ pub enum Quadrature {
     Midpoint,
     /// 2 in 1-D, 4 in the plane, 8 in 3-D.
     Gauss,
+}
+
+/// Refinement: points of bodies given as shapes get new ones around them at half the spacing, level by
+/// level; neighbours differ by one level at most.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// The finest level: the spacing there is that of the grid divided by 2^levels.
+    pub levels: Spanned<u64>,
+    /// How horizons go with the spacing: `"delta"`, m = δ/dx stays, or `"delta-m"`, m rises.
+    #[serde(default)]
+    pub rule: HorizonRule,
+    /// With `"delta-m"`: m of the levels from 1 on; by 1 more from level to level if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub m: Option<Spanned<Vec<Number>>>,
+    /// What the horizon of points is multiplied by that have a coarser level within it, so that their
+    /// families do not lose volume; √2 with `"delta"` and 1 with `"delta-m"` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interface_factor: Option<Number>,
+    /// What is refined from the start, by any name.
+    #[serde(default)]
+    pub region: Tables<RefinedRegion>,
+}
+
+/// How the horizon goes with the spacing from level to level.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HorizonRule {
+    /// δ/dx stays.
+    #[default]
+    Delta,
+    /// δ/dx rises with the level.
+    DeltaM,
+}
+
+/// Points that are refined from the start.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct RefinedRegion {
+    /// A condition on the reference position.
+    #[serde(rename = "where")]
+    pub condition: Number,
+    /// The level that points there get at least; the finest if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<Spanned<u64>>,
 }
 
 /// The bonds between blocks.
@@ -573,6 +624,28 @@ pub struct Checkpoint {
     /// Simulated time between checkpoints in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_time: Option<Number>,
+}
+
+/// Points are dealt out anew to the ranks when these have become unequal: their times in the loops over
+/// bonds are compared now and then. Results do not depend on it.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Balance {
+    /// Steps between looks at the times; 500 if not given.
+    #[serde(default = "default_look")]
+    pub every_steps: Spanned<NonZeroU64>,
+    /// The time of the slowest rank, as a multiple of the mean, above which points are dealt out anew;
+    /// 1.2 if not given.
+    #[serde(default = "default_imbalance")]
+    pub imbalance: Number,
+}
+
+fn default_look() -> Spanned<NonZeroU64> {
+    Spanned::new(0..0, NonZeroU64::new(500).expect("not 0"))
+}
+
+fn default_imbalance() -> Number {
+    default_number(1.2)
 }
 
 /// A place to watch.

@@ -5,6 +5,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+pub use super::blocks::{Block, Kind};
 use super::expression::Expression;
 pub use super::law::Law;
 use super::source::Source;
@@ -34,8 +35,10 @@ pub struct Plan {
     pub family: FamilyRule,
     /// The bonds between blocks.
     pub interface: Interface,
-    /// Bodies in the order of the deck; the index is the block number.
+    /// Bodies in the order of the deck.
     pub bodies: Vec<Body>,
+    /// Finer grids in parts of the bodies.
+    pub refinement: Option<Refinement>,
     /// Sets: `all`, then the bodies, then those of the deck.
     pub sets: Vec<Set>,
     /// Pre-cracks.
@@ -52,6 +55,8 @@ pub struct Plan {
     pub history: History,
     /// When checkpoints are written.
     pub checkpoint: CheckpointRule,
+    /// When points are dealt out anew to the ranks.
+    pub balance: Option<Balance>,
 }
 
 /// Where values stand in the deck whose mistakes only the points show.
@@ -84,6 +89,43 @@ pub struct Body {
     pub horizon_place: Range<usize>,
     /// Where its points come from.
     pub points: PointSource,
+}
+
+/// Refinement of the grid (Dipasquale et al. 2014, §2).
+#[derive(Debug, Clone)]
+pub struct Refinement {
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The finest level: the spacing there is that of the grid divided by 2^levels.
+    pub levels: u32,
+    /// The horizons of the levels.
+    pub rule: HorizonRule,
+    /// What the horizon of points is multiplied by that have a coarser level within it.
+    pub interface_factor: f64,
+    /// What is refined from the start.
+    pub regions: Vec<RefinedRegion>,
+}
+
+/// How the horizon goes with the spacing from level to level.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HorizonRule {
+    /// δ convergence: m = δ/dx is the same.
+    Delta,
+    /// δm convergence: m of each level from 1 on.
+    DeltaM(Vec<f64>),
+}
+
+/// Points that are refined from the start.
+#[derive(Debug, Clone)]
+pub struct RefinedRegion {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Points of lower levels are refined until they have this level.
+    pub level: u32,
+    /// Which points, by reference position.
+    pub condition: Expression,
 }
 
 /// A material: density, elastic constants and the law that uses them.
@@ -150,8 +192,12 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// The rule of the bonds between two bodies; the same for both orders.
+    /// The rule of the bonds between two bodies; the same for both orders. Within a body each end has its
+    /// own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
+        if here.name == there.name {
+            return InterfaceRule::Own;
+        }
         let joins = |names: &[String; 2]| {
             let [a, b] = [&names[0], &names[1]];
             (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)
@@ -414,6 +460,15 @@ pub enum CheckpointRule {
     WallClock(f64),
     /// So many steps or so much simulated time apart.
     Simulation(Interval),
+}
+
+/// When points are dealt out anew to the ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Balance {
+    /// Steps between looks at the ranks' times.
+    pub every_steps: u64,
+    /// What the time of the slowest rank must exceed, as a multiple of the mean.
+    pub imbalance: f64,
 }
 
 /// The result file.

@@ -47,6 +47,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
 use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
+use crate::solver::repartition::BalanceWatch;
 use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
@@ -229,6 +230,7 @@ impl<'a> Job<'a> {
             simulation.clock.number(),
         );
         let mut contact = Some(ContactWatch::new(simulation));
+        let mut balance = BalanceWatch::new(simulation);
         while !simulation.clock.is_over() {
             simulation.advance();
             let clock = simulation.clock;
@@ -256,6 +258,13 @@ impl<'a> Job<'a> {
             self.observer.step(simulation);
             if let (Some(reason), false) = (stop, complete) {
                 return Ok(Left::Stopped(reason));
+            }
+            if !complete && let Some(done) = balance.look(simulation)? {
+                recorder.follow(simulation)?;
+                self.observer.message(&Message::Repartitioned {
+                    number: clock.number(),
+                    what: done,
+                });
             }
         }
         Ok(Left::Complete)

@@ -32,6 +32,7 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
     plan.history.fronts.clear();
     plan.history.tips.clear();
     plan.checkpoint = Default::default();
+    plan.balance = None;
     format!("{WITHOUT_DECK}{plan:#?}\n")
 }
 

@@ -55,6 +55,7 @@ struct Layout<'a> {
     ids: Vec<u64>,
     blocks: Vec<u32>,
     volumes: Vec<f64>,
+    levels: Option<Vec<u32>>,
     moving: Vec<FieldDescription>,
     metadata: &'a [(&'a str, String)],
     piece: Piece,
@@ -74,7 +75,7 @@ impl<'a> Recorder<'a> {
     ) -> Result<Self> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
-        let order = id_order(simulation);
+        let order = simulation.id_order();
         let clock = &simulation.clock;
         let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.history.every));
         let layout = Layout::new(simulation, &order, outputs.count(clock), metadata);
@@ -123,6 +124,15 @@ impl<'a> Recorder<'a> {
             rows,
             held: Vec::new(),
         })
+    }
+
+    /// Follows the points after they have been dealt out anew. Collective.
+    ///
+    /// # Errors
+    /// As those of [`HistoryObserver::new`].
+    pub fn follow<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
+        self.order = simulation.id_order();
+        self.observer.follow(simulation)
     }
 
     /// Whether something is due after a step.
@@ -213,12 +223,6 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// The way between a simulation's points and the order of their ids. Collective.
-pub fn id_order<const D: usize>(simulation: &Simulation<'_, D>) -> IdOrder {
-    let model = &simulation.model;
-    IdOrder::new(simulation.comm, &model.ids[..model.owned()], model.total)
-}
-
 /// Whether the result that a checkpoint belongs to is there, with the fields and columns that the plan
 /// asks for, so that it can be continued. Collective.
 ///
@@ -283,16 +287,20 @@ impl<'a> Layout<'a> {
     ) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let owned = model.owned();
-        let first = order.first();
+        let plan = simulation.plan;
         let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
-        let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
+        let body = |block: &u16| plan.body_of(usize::from(*block)) as u32;
+        let blocks: Vec<u32> = model.block.iter().map(body).collect();
+        let level = |block: &u16| plan.block(usize::from(*block)).level;
+        let levels: Option<Vec<u32>> =
+            (plan.refinement.is_some()).then(|| model.block.iter().map(level).collect());
         Self {
             places: order.collect(comm, &places, 3),
-            ids: (first..first + order.count() as u64).collect(),
+            ids: order.collect(comm, &model.ids[..owned], 1),
             blocks: order.collect(comm, &blocks, 1),
             volumes: order.collect(comm, &model.volume[..owned], 1),
-            moving: simulation
-                .plan
+            levels: levels.map(|levels| order.collect(comm, &levels, 1)),
+            moving: plan
                 .output
                 .fields
                 .iter()
@@ -304,24 +312,28 @@ impl<'a> Layout<'a> {
                 .collect(),
             metadata,
             piece: Piece {
-                first,
+                first: order.first(),
                 total: model.total,
             },
             steps,
         }
     }
 
-    fn fixed(&self) -> [(FieldDescription, FieldData<'_>); 3] {
+    fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,
             unit,
             components: 1,
         };
-        [
+        let mut fixed = vec![
             (scalar("id", "1"), FieldData::U64(&self.ids)),
             (scalar("block", "1"), FieldData::U32(&self.blocks)),
             (scalar("volume", "m^3"), FieldData::F64(&self.volumes)),
-        ]
+        ];
+        if let Some(levels) = &self.levels {
+            fixed.push((scalar("level", "1"), FieldData::U32(levels)));
+        }
+        fixed
     }
 
     fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {

@@ -14,7 +14,7 @@ pub use interior::{Interior, interior};
 pub use size::{Size, size};
 
 use crate::comm::total;
-use crate::deck::plan::{Plan, PointSource, Selector};
+use crate::deck::plan::{Block, Plan, PointSource, Selector};
 use crate::deck::shown;
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
@@ -88,6 +88,7 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
     let count = simulation.plan.bodies.len();
     let mut bonds = vec![0; count * count];
     for ([here, there], own) in simulation.forces.bonds_of_blocks() {
+        let [here, there] = [here, there].map(|block| simulation.plan.body_of(block));
         bonds[here * count + there] += own;
     }
     simulation.comm.sum(&mut bonds);
@@ -122,7 +123,9 @@ fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
 
 fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
     for body in &plan.bodies {
-        let critical = block_laws(plan, body).damage.map(|damage| damage.critical);
+        let critical = block_laws(plan, &Block::unrefined(body))
+            .damage
+            .map(|damage| damage.critical);
         if let Some(critical) = critical.filter(|critical| *critical >= LARGEST_STRETCH) {
             let message = format!(
                 "[body.{}] damage: its bonds break at a stretch of {critical:.3}, at {:.3} times their \
