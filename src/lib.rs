@@ -12,6 +12,7 @@ pub mod output;
 pub mod partition;
 pub mod picture;
 pub mod points;
+pub mod refine;
 pub mod run;
 pub mod solver;
 pub mod survey;

@@ -103,6 +103,22 @@ fields = ['displacement', 'damage', 'strain_energy_density', 'dilatation', 'weig
 every_steps = 3
 ";
 
+/// Two levels of refinement across a notch and the border of a body, with horizons of both rules.
+fn refined(rule: &str) -> String {
+    let plate = PLATE.replace("end = 12e-6", "end = 5e-6");
+    let plate = plate.replace("fracture_energy = 20", "fracture_energy = 2");
+    format!(
+        "{plate}
+        [refinement]
+        levels = 2
+        rule = '{rule}'
+        [refinement.region]
+        tip.where = '(x - 12*dx)^2 + y^2 < (3*dx)^2'
+        side = {{ where = 'x > 35*dx', level = 1 }}
+        "
+    )
+}
+
 /// The same with one law, so that its own loops run.
 fn with_one_law(law: &str) -> String {
     let mut lines: Vec<String> = LAWS.lines().map(str::to_owned).collect();
@@ -205,6 +221,9 @@ fn same_everywhere(name: &str, text: &str, must_break: bool) {
             command.arg("run").arg(&deck).arg("--output").arg(&out);
             let printed = succeed(command.args(["--threads", threads, "-v"]));
             assert!(printed.contains("all writes were collective"), "{printed}");
+            let moves = ranks > 1 && text.contains("[balance]");
+            let moved = printed.matches("changed their rank").count();
+            assert_eq!(moved > 1, moves, "{moved} repartitions: {printed}");
             let found = datasets(&out.join("result.vtkhdf"));
             if expected.is_empty() {
                 let last = |column: &str| {
@@ -247,6 +266,31 @@ fn bonds_as_long_as_the_volume_correction_reaches() {
         .replace(plain, "")
         .replace("horizon = '3*dx'", horizon);
     same_everywhere("tie", &deck, true);
+}
+
+#[test]
+fn a_plate_with_refined_parts() {
+    same_everywhere("refined", &refined("delta"), true);
+}
+
+/// One rank is always slower than the mean.
+const RESTLESS: &str = "[balance]\nevery_steps = 5\nimbalance = 1\n";
+
+#[test]
+fn a_plate_with_refined_parts_that_is_dealt_out_anew() {
+    let deck = refined("delta-m") + RESTLESS;
+    same_everywhere("refined-balance", &deck, true);
+}
+
+#[test]
+fn blocks_of_different_laws_that_are_dealt_out_anew() {
+    same_everywhere("laws-balance", &(LAWS.to_owned() + "\n" + RESTLESS), true);
+    let law = "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.01 }";
+    same_everywhere(
+        "plastic-balance",
+        &(with_one_law(law) + "\n" + RESTLESS),
+        true,
+    );
 }
 
 #[test]

@@ -26,6 +26,7 @@ mod ordinary_history;
 mod plasticity;
 mod pmma;
 mod readers;
+mod refinement;
 mod relaxation;
 mod restart;
 mod stable_step;

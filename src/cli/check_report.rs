@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fissure::damage::DamageLaw;
 use fissure::deck::Plan;
-use fissure::deck::plan::{Body, PointSource};
+use fissure::deck::plan::{Block, Body, PointSource};
 use fissure::dimension::Dimension;
 use fissure::solver::assign::block_laws;
 use fissure::solver::motion::Clock;
@@ -35,7 +35,7 @@ pub fn body(report: &mut Report, plan: &Plan, body: &Body) {
         "Poisson's ratio",
         format_args!("{:.4}", elastic.poisson_ratio),
     );
-    let laws = block_laws(plan, body);
+    let laws = block_laws(plan, &Block::unrefined(body));
     for (name, value) in laws.law.described() {
         report.line(name, value);
     }

@@ -10,6 +10,7 @@ use fissure::comm::{Communicator, agree};
 use fissure::deck;
 use fissure::error::Result;
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Signals, View};
+use fissure::solver::repartition::Repartition;
 
 use super::format::{count, si};
 use super::progress::Progress;
@@ -144,6 +145,20 @@ impl Observer for Log {
                 for (name, what) in decided {
                     say!("  {name:<17}{what}");
                 }
+            }
+            Message::Repartitioned { number, what } if self.speaks && self.verbose => {
+                let Repartition {
+                    imbalance,
+                    moved,
+                    seconds,
+                } = what;
+                let (moved, seconds) = (count(*moved), si(*seconds, "s"));
+                self.progress.aside(|| {
+                    say!(
+                        "after step {number} the slowest rank took {imbalance:.2} times the mean: \
+                         {moved} points changed their rank in {seconds}"
+                    );
+                });
             }
             Message::Warning(text) if self.rank == 0 => {
                 self.progress.aside(|| tell!("warning: {text}"));

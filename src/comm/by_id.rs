@@ -1,6 +1,8 @@
-//! Values of points in the order of their global ids, dealt out to the ranks in equal blocks.
+//! Values of points in the order of their global ids, dealt out to the ranks in blocks.
 //!
-//! Files hold points in this order, so that they do not depend on the number of ranks.
+//! Files hold points in this order, so that they do not depend on the number of ranks. Points of refined
+//! grids have ids above those of level 0, and follow the one of level 0 that their id is a multiple of the
+//! number of such points away from.
 
 use std::ops::Range;
 
@@ -8,7 +10,7 @@ use bytemuck::Pod;
 
 use super::Communicator;
 
-/// The way between the points that a rank owns and its block of consecutive ids.
+/// The way between the points that a rank owns and its block of points by id.
 pub struct IdOrder {
     first: u64,
     count: usize,
@@ -19,19 +21,19 @@ pub struct IdOrder {
 }
 
 impl IdOrder {
-    /// For owned points with these ids, of `total` points on all ranks. Collective.
-    pub fn new(comm: &dyn Communicator, ids: &[u64], total: u64) -> Self {
+    /// For owned points with these ids; on all ranks `coarsest` points are of level 0. Collective.
+    pub fn new(comm: &dyn Communicator, ids: &[u64], coarsest: u64) -> Self {
         let size = comm.size() as u64;
-        let border = |rank: u64| (u128::from(total) * u128::from(rank) / u128::from(size)) as u64;
+        let border =
+            |rank: u64| (u128::from(coarsest) * u128::from(rank) / u128::from(size)) as u64;
         // The first guess can be one too low, by the rounding of the borders.
         let home = |id: u64| {
-            let guess = (u128::from(id) * u128::from(size) / u128::from(total)) as u64;
+            let id = id % coarsest;
+            let guess = (u128::from(id) * u128::from(size) / u128::from(coarsest)) as u64;
             (guess..size)
                 .find(|rank| id < border(rank + 1))
                 .unwrap_or(guess) as usize
         };
-        let rank = comm.rank() as u64;
-        let (first, end) = (border(rank), border(rank + 1));
         let mut owned = vec![Vec::new(); comm.size()];
         let mut outgoing = vec![Vec::new(); comm.size()];
         for (index, id) in ids.iter().enumerate() {
@@ -39,31 +41,32 @@ impl IdOrder {
             owned[home].push(index as u32);
             outgoing[home].extend_from_slice(&id.to_ne_bytes());
         }
-        let row = |id: &u64| (id - first) as u32;
-        let rows = comm
-            .all_to_all(outgoing)
-            .iter()
-            .map(|bytes| {
-                bytemuck::pod_collect_to_vec::<u8, u64>(bytes)
-                    .iter()
-                    .map(row)
-                    .collect()
-            })
+        let incoming = comm.all_to_all(outgoing);
+        let incoming = incoming.iter();
+        let incoming: Vec<Vec<u64>> = incoming
+            .map(|bytes| bytemuck::pod_collect_to_vec::<u8, u64>(bytes))
             .collect();
+        let key = |id: u64| (id % coarsest, id / coarsest);
+        let mut sorted: Vec<(u64, u64)> = incoming.iter().flatten().map(|id| key(*id)).collect();
+        sorted.sort_unstable();
+        let row = |id: &u64| sorted.partition_point(|other| *other < key(*id)) as u32;
+        let rows = incoming.iter().map(|ids| ids.iter().map(row).collect());
+        let rows = rows.collect();
+        let (first, _) = super::scan(comm, sorted.len() as u64);
         Self {
             first,
-            count: (end - first) as usize,
+            count: sorted.len(),
             owned,
             rows,
         }
     }
 
-    /// The first id of this rank's block.
+    /// Number of points in the blocks of the ranks before this one.
     pub fn first(&self) -> u64 {
         self.first
     }
 
-    /// Number of ids in this rank's block.
+    /// Number of points in this rank's block.
     pub fn count(&self) -> usize {
         self.count
     }

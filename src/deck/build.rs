@@ -37,6 +37,7 @@ impl Plan {
                 pairs: Vec::new(),
             },
             bodies: Vec::new(),
+            refinement: None,
             sets: vec![Set {
                 name: "all".to_owned(),
                 span: 0..0,
@@ -70,6 +71,7 @@ impl Plan {
                 tips: Vec::new(),
             },
             checkpoint: CheckpointRule::default(),
+            balance: None,
         }
     }
 

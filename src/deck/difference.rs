@@ -11,7 +11,14 @@ use super::source::Source;
 use crate::error::{Error, Result};
 
 /// Sections that a restart may change. Parameters count where they are used.
-const FREE: [&str; 5] = ["title", "parameters", "output", "history", "checkpoint"];
+const FREE: [&str; 6] = [
+    "title",
+    "parameters",
+    "output",
+    "history",
+    "checkpoint",
+    "balance",
+];
 
 /// Keys within sections that a restart may change.
 const FREE_KEYS: [&str; 1] = ["time.end"];

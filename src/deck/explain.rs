@@ -4,7 +4,7 @@ use super::grammar::{
     DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
-use super::plan::{self, CheckpointRule, Interval, Plan};
+use super::plan::{self, CheckpointRule, HorizonRule, Interval, Plan};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
@@ -47,6 +47,19 @@ fn fill(deck: &mut Deck, plan: &Plan) {
             body.spacing = body.spacing.take().or(grid.spacing.clone());
         }
         body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
+    }
+    if let (Some(table), Some(refinement)) = (&mut deck.refinement, &plan.refinement) {
+        let table = table.get_mut();
+        let factor = number(refinement.interface_factor);
+        table.interface_factor = table.interface_factor.take().or(factor);
+        if let HorizonRule::DeltaM(ratios) = &refinement.rule {
+            let ratios = ratios.iter().copied().map(default_number).collect();
+            table.m.get_or_insert_with(|| Spanned::new(0..0, ratios));
+        }
+        for region in table.region.values_mut().map(|region| region.get_mut()) {
+            let finest = || Spanned::new(0..0, u64::from(refinement.levels));
+            region.level.get_or_insert_with(finest);
+        }
     }
     for material in deck.material.values_mut() {
         fill_material(material.get_mut(), plan.dimension);

@@ -1,5 +1,6 @@
 //! Decks: the TOML file that describes a run, from its text to a validated [`Plan`].
 
+mod blocks;
 mod bodies;
 mod build;
 mod conditions;
@@ -18,6 +19,7 @@ mod number;
 mod outputs;
 mod parameters;
 pub mod plan;
+mod refinement;
 mod resolve;
 mod sets;
 mod shapes;

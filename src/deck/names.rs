@@ -27,6 +27,9 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
     all(scope, "initial", &deck.initial)?;
     all(scope, "condition", &deck.condition)?;
     all(scope, "interface.pair", &deck.interface.pair)?;
+    if let Some(refinement) = &deck.refinement {
+        all(scope, "refinement.region", &refinement.get_ref().region)?;
+    }
     all(scope, "history.force", &history.force)?;
     all(scope, "history.probe", &history.probe)?;
     all(scope, "history.front", &history.front)?;

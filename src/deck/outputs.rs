@@ -2,7 +2,7 @@
 
 use serde_spanned::Spanned;
 
-use super::grammar::{self, Count, Deck};
+use super::grammar::{self, Balance, Count, Deck};
 use super::number::Number;
 use super::plan;
 use super::resolve::{Scope, find};
@@ -88,6 +88,22 @@ pub const OUTPUTS: f64 = 50.0;
 
 /// Rows of the history of a run whose deck does not say how many.
 pub const ROWS: f64 = 500.0;
+
+/// Validates when points are dealt out anew.
+///
+/// # Errors
+/// On a bound that every partition exceeds.
+pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<plan::Balance>> {
+    let rule = |table: &Spanned<Balance>| {
+        let table = table.get_ref();
+        let key = "[balance] imbalance";
+        Ok(plan::Balance {
+            every_steps: table.every_steps.get_ref().get(),
+            imbalance: scope.within(&table.imbalance, key, 1.0..f64::INFINITY, "1 or more")?,
+        })
+    };
+    deck.balance.as_ref().map(rule).transpose()
+}
 
 /// Wall-clock time between checkpoints if the deck does not say, s.
 pub const DEFAULT_CHECKPOINT: f64 = 600.0;

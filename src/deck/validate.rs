@@ -8,7 +8,8 @@ use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
 use super::source::Source;
 use super::{
-    bodies, conditions, damage, history, interface, materials, names, outputs, sets, shapes, time,
+    bodies, conditions, damage, history, interface, materials, names, outputs, refinement, sets,
+    shapes, time,
 };
 use crate::dimension::Dimension;
 use crate::error::Result;
@@ -37,6 +38,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     let volume_correction = volume_correction(&scope, deck, &bodies)?;
     let family = family(&scope, deck)?;
     let interface = interface::interface(&scope, deck, &bodies)?;
+    let refinement = refinement::refinement(&scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| {
         shapes::crack(&scope, name, table)
     })?;
@@ -56,6 +58,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         family,
         interface,
         bodies,
+        refinement,
         cracks: cracks.into_values().collect(),
         initials: conditions::initials(&scope, deck, &sets)?,
         conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
@@ -63,6 +66,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         output: outputs::output(&scope, deck, &sets, time.end)?,
         history: history::history(&scope, deck, &sets, time.end, horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
+        balance: outputs::balance(&scope, deck)?,
         sets,
         time,
     })

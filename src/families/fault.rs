@@ -47,9 +47,9 @@ impl Fault {
 fn same_place(plan: &Plan, points: &[Point; 2]) -> Error {
     let [a, b] = *points;
     let [first, second] = if a.id < b.id { [a, b] } else { [b, a] };
-    let [body, other] = [second, first].map(|point| &plan.bodies[point.block as usize]);
+    let [body, other] = [second, first].map(|point| plan.block(point.block as usize).body);
     let place = &first.position[..plan.dimension.count()];
-    let message = if second.block == first.block {
+    let message = if body.name == other.name {
         format!(
             "[body.{}]: its points {} and {} lie at the same place, {place:?} m",
             body.name, first.id, second.id
@@ -76,7 +76,8 @@ fn too_many_neighbours(
     neighbours: Option<f64>,
     spacings: Option<f64>,
 ) -> Error {
-    let [body, other] = blocks.map(|block| &plan.bodies[block]);
+    let [near, other] = blocks.map(|block| plan.block(block));
+    let (body, other) = (near.body, other.body);
     let key = if body.horizon_place == plan.places.horizon {
         "[grid] horizon".to_owned()
     } else {
@@ -98,7 +99,7 @@ fn too_many_neighbours(
     let message = format!(
         "{key}: {} m{is}, so a point of [body.{}] would have {count} neighbours there \
          ({MOST_NEIGHBOURS} at most); is the horizon in metres?",
-        shown(body.horizon),
+        shown(near.horizon),
         body.name
     );
     plan.source.error(body.horizon_place.clone(), message)

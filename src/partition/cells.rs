@@ -36,6 +36,14 @@ pub struct Cells {
     counts: [usize; 3],
 }
 
+/// What cells are before they are dealt out anew.
+pub struct Present {
+    /// Time that their points take, ns.
+    pub costs: Vec<u64>,
+    /// A rank that has points of each, −1 where there are none.
+    pub ranks: Vec<f64>,
+}
+
 impl Cells {
     /// The grid for all points of all ranks and a cut-off in m, with so many cells at `most`.
     pub fn new(
@@ -130,6 +138,21 @@ impl Cells {
         }
         comm.sum(&mut occupation);
         occupation
+    }
+
+    /// Costs of the cells and where they are now, from this rank's points and what each of them costs.
+    /// Collective.
+    pub fn present(&self, comm: &dyn Communicator, points: &[Point], each: u64) -> Present {
+        let mut costs = vec![0; self.count()];
+        let mut ranks = vec![-1.0; self.count()];
+        for point in points {
+            let cell = self.of(point.position);
+            costs[cell] += each;
+            ranks[cell] = comm.rank() as f64;
+        }
+        comm.sum(&mut costs);
+        comm.max(&mut ranks);
+        Present { costs, ranks }
     }
 }
 

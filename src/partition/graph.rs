@@ -1,8 +1,10 @@
 //! Dealing out cells to ranks with METIS. The only file that names `metis`.
 
+use std::collections::HashMap;
+
 use crate::error::{Error, Result};
 
-use super::cells::Cells;
+use super::cells::{Cells, Present};
 
 /// METIS adds up weights in 32 bits.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
@@ -18,11 +20,17 @@ pub const NOBODY: u32 = u32::MAX;
 const FEW_CELLS_PER_PART: usize = 30;
 
 /// The rank of each cell, [`NOBODY`] where there is no point, given the number of points in each. A cell's weight is the bonds of its
-/// points, an edge's weight the bonds across.
+/// points, an edge's weight the bonds across. Where it is known what the cells cost, their weights are
+/// corrected by that, and parts are numbered so that most points stay on their ranks.
 ///
 /// # Errors
 /// When METIS fails.
-pub fn partition(cells: &Cells, occupation: &[u64], ranks: usize) -> Result<Vec<u32>> {
+pub fn partition(
+    cells: &Cells,
+    occupation: &[u64],
+    present: Option<&Present>,
+    ranks: usize,
+) -> Result<Vec<u32>> {
     let occupied: Vec<usize> = (0..cells.count())
         .filter(|cell| occupation[*cell] > 0)
         .collect();
@@ -56,7 +64,8 @@ pub fn partition(cells: &Cells, occupation: &[u64], ranks: usize) -> Result<Vec<
             neighbours.push(vertex[other] as metis::Idx);
             bonds_across.push(across * if displaced[0] { ALONG_X } else { 1.0 });
         }
-        bonds.push(sum);
+        let cost = present.map_or(1.0, |known| known.costs[*cell] as f64 / here);
+        bonds.push(sum * cost);
         starts.push(neighbours.len() as metis::Idx);
     }
     let vertex_weights = to_integers(&bonds);
@@ -75,10 +84,47 @@ pub fn partition(cells: &Cells, occupation: &[u64], ranks: usize) -> Result<Vec<
     };
     cut.map_err(|error| failed(&error))?;
     fill_empty_parts(&mut part, ranks);
+    if let Some(present) = present {
+        let now = |k: usize| (present.ranks[occupied[k]] as usize, occupation[occupied[k]]);
+        renumber(&mut part, ranks, now);
+    }
     for (cell, rank) in occupied.iter().zip(part) {
         owner[*cell] = rank as u32;
     }
     Ok(owner)
+}
+
+/// Numbers parts so that much stays where it is: `now` has the rank and the number of points of each cell.
+fn renumber(part: &mut [metis::Idx], ranks: usize, now: impl Fn(usize) -> (usize, u64)) {
+    let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
+    for (k, part) in part.iter().enumerate() {
+        let (rank, points) = now(k);
+        *shared.entry((*part as usize, rank)).or_default() += points;
+    }
+    let mut largest: Vec<(u64, usize, usize)> = shared
+        .into_iter()
+        .map(|((part, rank), points)| (points, part, rank))
+        .collect();
+    largest.sort_unstable_by(|a, b| b.cmp(a));
+    let (mut number, mut taken) = (vec![None; ranks], vec![false; ranks]);
+    for (_, part, rank) in largest {
+        if number[part].is_none() && !taken[rank] {
+            number[part] = Some(rank);
+            taken[rank] = true;
+        }
+    }
+    let mut free = (0..ranks).filter(|rank| !taken[*rank]);
+    let number: Vec<usize> = number
+        .into_iter()
+        .map(|number| {
+            number
+                .or_else(|| free.next())
+                .expect("as many ranks as parts")
+        })
+        .collect();
+    for part in part {
+        *part = number[*part as usize] as metis::Idx;
+    }
 }
 
 /// Weights as positive integers whose sum METIS can hold.
@@ -128,7 +174,7 @@ mod tests {
         let cells = Cells::new(&comm, &points, 4000, 3.0, 4000);
         let occupation = cells.occupation(&comm, &points);
         for ranks in [2, 3, 4, 7, 64] {
-            let owner = partition(&cells, &occupation, ranks).unwrap();
+            let owner = partition(&cells, &occupation, None, ranks).unwrap();
             let mut sizes = vec![0; ranks];
             for point in &points {
                 sizes[owner[cells.of(point.position)] as usize] += 1;
@@ -140,6 +186,46 @@ mod tests {
     }
 
     #[test]
+    fn cells_that_cost_more_are_fewer_and_most_stay() {
+        let points: Vec<Point> = (0..4000)
+            .map(|k| Point::new(k, [(k % 100) as f64, (k / 100) as f64, 0.0], 1.0, 0))
+            .collect();
+        let comm = threads::alone();
+        let cells = Cells::new(&comm, &points, 4000, 3.0, 4000);
+        let occupation = cells.occupation(&comm, &points);
+        let mut present = cells.present(&comm, &points, 10);
+        let first = partition(&cells, &occupation, None, 2).unwrap();
+        for (rank, owner) in present.ranks.iter_mut().zip(&first) {
+            // Those of the other part.
+            *rank = f64::from(1 - *owner);
+        }
+        let count = |owner: &[u32]| {
+            let mut sizes = [0; 2];
+            for point in &points {
+                sizes[owner[cells.of(point.position)] as usize] += 1;
+            }
+            sizes
+        };
+        let same = partition(&cells, &occupation, Some(&present), 2).unwrap();
+        let moved = first
+            .iter()
+            .zip(&same)
+            .filter(|(a, b)| **a != 1 - **b)
+            .count();
+        assert!(
+            moved < cells.count() / 5,
+            "{moved} of {} cells",
+            cells.count()
+        );
+        for (cost, rank) in present.costs.iter_mut().zip(&present.ranks) {
+            *cost *= if *rank == 0.0 { 3 } else { 1 };
+        }
+        let [dear, cheap] = count(&partition(&cells, &occupation, Some(&present), 2).unwrap());
+        let ratio = f64::from(cheap) / f64::from(dear);
+        assert!((1.5..3.5).contains(&ratio), "{dear} {cheap}");
+    }
+
+    #[test]
     fn fewer_cells_than_ranks_leave_ranks_empty() {
         let points = [
             Point::new(0, [0.0; 3], 1.0, 0),
@@ -148,7 +234,7 @@ mod tests {
         let comm = threads::alone();
         let cells = Cells::new(&comm, &points, 2, 1.0, 100);
         let occupation = cells.occupation(&comm, &points);
-        let owner = partition(&cells, &occupation, 4).unwrap();
+        let owner = partition(&cells, &occupation, None, 4).unwrap();
         assert_ne!(owner[cells.of([0.0; 3])], owner[cells.of([9.0, 0.0, 0.0])]);
     }
 }

@@ -11,7 +11,7 @@ use crate::comm::{Communicator, agree};
 use crate::error::Result;
 use crate::points::Point;
 
-use cells::{Cells, most_cells};
+use cells::{Cells, Present, most_cells};
 
 /// Moves the pieces that the ranks made to the ranks that will own them, and finds the ghosts.
 ///
@@ -25,33 +25,73 @@ pub fn distribute(
     total: u64,
     cutoff: f64,
 ) -> Result<Domain> {
-    let most = most_cells(comm.size());
-    distribute_by_cells(comm, pieces, total, cutoff, most)
+    distribute_by_cost(comm, pieces, total, cutoff, None)
 }
 
-/// As [`distribute`], with so many cells at most.
+/// As [`distribute`]. Where the ranks know what their points cost, cells are weighted by that, and as many
+/// points as possible stay where they are.
+///
+/// # Errors
+/// As [`distribute`].
+pub fn distribute_by_cost(
+    comm: &dyn Communicator,
+    pieces: Vec<Point>,
+    total: u64,
+    cutoff: f64,
+    cost: Option<Cost>,
+) -> Result<Domain> {
+    let most = most_cells(comm.size());
+    distribute_by_cells(comm, pieces, total, cutoff, most, cost)
+}
+
+/// What the points of a rank cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cost {
+    /// Of each of them, ns.
+    each: u64,
+}
+
+impl Cost {
+    /// So many points that took so much time, ns.
+    pub fn of(time: u64, points: usize) -> Self {
+        Self {
+            each: (time / points.max(1) as u64).max(1),
+        }
+    }
+}
+
+/// As [`distribute_by_cost`], with so many cells at most.
 fn distribute_by_cells(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
     total: u64,
     cutoff: f64,
     most: usize,
+    cost: Option<Cost>,
 ) -> Result<Domain> {
     let cells = Cells::new(comm, &pieces, total, cutoff, most);
     let occupation = cells.occupation(comm, &pieces);
-    let owner = owners(comm, &cells, &occupation)?;
+    let known = cost.filter(|_| comm.size() > 1);
+    let known = known.map(|cost| cells.present(comm, &pieces, cost.each));
+    let owner = owners(comm, &cells, &occupation, known.as_ref())?;
+    drop(known);
     drop(occupation);
     let owned = migrate(comm, &cells, &owner, pieces);
     Ok(ghosts::domain(comm, &cells, &owner, owned, total, cutoff))
 }
 
 /// The rank of each cell, from rank 0 to all: 4 bytes a cell.
-fn owners(comm: &dyn Communicator, cells: &Cells, occupation: &[u64]) -> Result<Vec<u32>> {
+fn owners(
+    comm: &dyn Communicator,
+    cells: &Cells,
+    occupation: &[u64],
+    present: Option<&Present>,
+) -> Result<Vec<u32>> {
     if comm.size() == 1 {
         return Ok(vec![0; cells.count()]);
     }
     let found = match comm.rank() {
-        0 => graph::partition(cells, occupation, comm.size()),
+        0 => graph::partition(cells, occupation, present, comm.size()),
         _ => Ok(Vec::new()),
     };
     let mut bytes = bytemuck::cast_slice(&agree(comm, found)?).to_vec();
@@ -117,7 +157,7 @@ mod tests {
                 let share = |rank: usize| all.len() * rank / ranks;
                 let piece = all[share(comm.rank())..share(comm.rank() + 1)].to_vec();
                 let total = all.len() as u64;
-                let mut domain = distribute_by_cells(comm, piece, total, 1.0, most).unwrap();
+                let mut domain = distribute_by_cells(comm, piece, total, 1.0, most, None).unwrap();
                 // The halo must bring each ghost its own id.
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);

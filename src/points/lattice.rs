@@ -90,11 +90,29 @@ impl<'a> LatticeBody<'a> {
 
     /// The centre (m) of a cell, if it belongs to the body.
     fn centre_of(&self, cell: [i64; 3]) -> Option<[f64; 3]> {
-        let mut centre = [0.0; 3];
-        for k in 0..self.dimension {
-            centre[k] = self.origin[k] + (cell[k] as f64 + 0.5) * self.spacing[k];
-        }
+        let centre = self.place(cell.map(|x| x as f64));
         self.contains(centre).then_some(centre)
+    }
+
+    /// Whether a cell belongs to the body.
+    pub fn has_cell(&self, cell: [i64; 3]) -> bool {
+        self.centre_of(cell).is_some()
+    }
+
+    /// The cell whose centre is at a place (m).
+    pub fn cell_at(&self, place: [f64; 3]) -> [i64; 3] {
+        std::array::from_fn(|k| match k < self.dimension {
+            true => ((place[k] - self.origin[k]) / self.spacing[k] - 0.5).round() as i64,
+            false => 0,
+        })
+    }
+
+    /// The place (m) that lies so many edges from the centre of cell 0.
+    pub fn place(&self, edges: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|k| match k < self.dimension {
+            true => self.origin[k] + (edges[k] + 0.5) * self.spacing[k],
+            false => 0.0,
+        })
     }
 
     /// Whether a place (m) is within the shape and in no later body.

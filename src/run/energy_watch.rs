@@ -42,7 +42,7 @@ impl EnergyWatch {
         let comm: &dyn Communicator = simulation.comm;
         let mut stiffness = [ExactSum::ZERO];
         for (volume, block) in model.volume[..model.owned()].iter().zip(&model.block) {
-            let material = &plan.bodies[usize::from(*block)].material;
+            let material = &plan.block(usize::from(*block)).body.material;
             stiffness[0].add(material.elastic.youngs_modulus * volume);
         }
         let (step, stable) = (simulation.clock.step(), simulation.stable_step);

@@ -11,6 +11,7 @@ pub struct Layout<'a> {
     ids: Vec<u64>,
     blocks: Vec<u32>,
     volumes: Vec<f64>,
+    levels: Option<Vec<u32>>,
     moving: Vec<FieldDescription>,
     metadata: &'a [(&'a str, String)],
     single: bool,
@@ -28,22 +29,27 @@ impl<'a> Layout<'a> {
     ) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let owned = model.owned();
-        let first = order.first();
+        let plan = simulation.plan;
         let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
-        let blocks: Vec<u32> = model.block.iter().map(|block| u32::from(*block)).collect();
-        let output = &simulation.plan.output;
+        let body = |block: &u16| plan.body_of(usize::from(*block)) as u32;
+        let blocks: Vec<u32> = model.block.iter().map(body).collect();
+        let level = |block: &u16| plan.block(usize::from(*block)).level;
+        let levels: Option<Vec<u32>> =
+            (plan.refinement.is_some()).then(|| model.block.iter().map(level).collect());
+        let output = &plan.output;
         let describe = |field: &Field| FieldDescription {
             name: field.name(),
             unit: field.unit(),
             components: field.components(),
         };
-        let ids = pick(kept, (first..first + order.count() as u64).collect(), 1);
+        let ids = pick(kept, order.collect(comm, &model.ids[..owned], 1), 1);
         let (first, total) = comm::scan(comm, ids.len() as u64);
         Self {
             places: pick(kept, order.collect(comm, &places, 3), 3),
             blocks: pick(kept, order.collect(comm, &blocks, 1), 1),
             volumes: pick(kept, order.collect(comm, &model.volume[..owned], 1), 1),
             ids,
+            levels: levels.map(|levels| pick(kept, order.collect(comm, &levels, 1), 1)),
             moving: output.fields.iter().map(describe).collect(),
             metadata,
             single: output.single,
@@ -53,17 +59,21 @@ impl<'a> Layout<'a> {
     }
 
     /// The fields that do not change.
-    pub fn fixed(&self) -> [(FieldDescription, FieldData<'_>); 3] {
+    pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,
             unit,
             components: 1,
         };
-        [
+        let mut fixed = vec![
             (scalar("id", "1"), FieldData::U64(&self.ids)),
             (scalar("block", "1"), FieldData::U32(&self.blocks)),
             (scalar("volume", "m^3"), FieldData::F64(&self.volumes)),
-        ]
+        ];
+        if let Some(levels) = &self.levels {
+            fixed.push((scalar("level", "1"), FieldData::U32(levels)));
+        }
+        fixed
     }
 
     /// With the fields that [`Self::fixed`] gives.

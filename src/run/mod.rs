@@ -50,6 +50,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::solver::Simulation;
 use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
+use crate::solver::repartition::BalanceWatch;
 use crate::solver::steps::choose_steps;
 use crate::survey::Survey;
 
@@ -236,6 +237,7 @@ impl<'a> Job<'a> {
         let limit = self.options.wall_time.map(|limit| (started, limit));
         let mut watch = Watch::new(signals.as_ref(), self.plan.checkpoint, limit);
         let mut contact = Some(ContactWatch::new(simulation));
+        let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
@@ -280,6 +282,13 @@ impl<'a> Job<'a> {
             self.observer.step(simulation);
             if let (Some(reason), false) = (stop, complete) {
                 return Ok(Left::Stopped(reason));
+            }
+            if !complete && let Some(done) = balance.look(simulation)? {
+                recorder.follow(simulation)?;
+                self.observer.message(&Message::Repartitioned {
+                    number: clock.number(),
+                    what: done,
+                });
             }
         }
         Ok(Left::Complete)

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::solver::Simulation;
 use crate::solver::observers::{Energies, HistoryRow};
+use crate::solver::repartition::Repartition;
 use crate::survey::Survey;
 
 /// Looks on while a run goes on. Its methods are called on all ranks alike; each does nothing unless
@@ -62,12 +63,19 @@ pub enum Message {
         /// What there is of the result so far, under its new names.
         kept: Vec<PathBuf>,
     },
+    /// The points have been dealt out anew among the ranks.
+    Repartitioned {
+        /// Number of the step after which.
+        number: u64,
+        /// What was found and done.
+        what: Repartition,
+    },
     /// Something that may not be as the user thinks.
     Warning(String),
 }
 
 /// A run between two steps, in one, two or three dimensions. Points are those that this rank owns, in
-/// an order of its own; see [`View::ids`].
+/// an order of its own, which may change from step to step; see [`View::ids`].
 pub trait View {
     /// Number of steps made.
     fn number(&self) -> u64;
@@ -84,7 +92,8 @@ pub trait View {
     /// Number of dimensions: components are numbered from 0 up to it.
     fn dimension(&self) -> usize;
 
-    /// Global ids of the points: 0 up to their number over all ranks.
+    /// Global ids of the points: 0 up to the number of points of level 0 over all ranks, and more with
+    /// refinement.
     fn ids(&self) -> &[u64];
 
     /// A component of the reference positions, m.

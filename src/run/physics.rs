@@ -46,6 +46,7 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
     plan.history.cracks.clear();
     plan.history.tips.clear();
     plan.checkpoint = Default::default();
+    plan.balance = None;
     format!("{WITHOUT_DECK}{plan:#?}\n{HISTORY}{history:#?}\n")
 }
 

@@ -73,7 +73,7 @@ impl<'a> Recorder<'a> {
     ) -> Result<Self> {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
-        let order = id_order(simulation);
+        let order = simulation.id_order();
         let kept = kept(simulation, &order)?;
         let clock = &simulation.expected_clock();
         let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.history.every));
@@ -128,6 +128,15 @@ impl<'a> Recorder<'a> {
             held: Vec::new(),
             side_car,
         })
+    }
+
+    /// Follows the points after they have been dealt out anew. Collective.
+    ///
+    /// # Errors
+    /// As those of [`HistoryObserver::new`].
+    pub fn follow<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
+        self.order = simulation.id_order();
+        self.observer.follow(simulation)
     }
 
     /// Whether something is due after a step.
@@ -257,12 +266,6 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// The way between a simulation's points and the order of their ids. Collective.
-pub fn id_order<const D: usize>(simulation: &Simulation<'_, D>) -> IdOrder {
-    let model = &simulation.model;
-    IdOrder::new(simulation.comm, &model.ids[..model.owned()], model.total)
-}
-
 /// Which of this rank's block of ids the result holds; `None` for all. Collective.
 ///
 /// # Errors
@@ -299,7 +302,7 @@ pub fn why_not_continued<const D: usize>(
     let comm: &dyn Communicator = simulation.comm;
     let observer = HistoryObserver::new(simulation)?;
     let changed = agree(comm, history_differences(&header.deck, physics))?;
-    let order = id_order(simulation);
+    let order = simulation.id_order();
     let all: Vec<usize> = (0..order.count()).collect();
     let rows = kept(simulation, &order)?.unwrap_or(all);
     let own = rows.iter().map(|row| mix(order.first() + *row as u64));

@@ -1,6 +1,6 @@
 //! Going on from a checkpoint.
 
-use crate::comm::{Communicator, IdOrder, agree};
+use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::output::checkpoint::{Checkpoints, Header, read_header, read_saved};
 use crate::solver::Simulation;
@@ -9,7 +9,6 @@ use super::checkpoints::{CheckpointWriter, fingerprint};
 use super::files::Files;
 use super::observer::{Message, Observer};
 use super::physics;
-use super::recorder::id_order;
 
 /// What a restart begins with.
 pub struct Restart {
@@ -54,7 +53,7 @@ pub fn restart<const D: usize>(
         let message = "was written for other points; has a point file changed?";
         return Err(Error::input(format!("{} {message}", path.display())));
     }
-    let order: IdOrder = id_order(simulation);
+    let order = simulation.id_order();
     let saved = read_saved(comm, &path, &order)?;
     simulation.restore(&order, &saved)?;
     Ok(Restart {

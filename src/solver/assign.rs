@@ -2,7 +2,7 @@
 
 use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw};
 use crate::deck::plan::{
-    self, Body, DamageRule, InterfaceRule, Plan, PointSource, Toughness, VolumeCorrection,
+    self, Block, Body, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
 };
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
@@ -20,9 +20,9 @@ struct Constants {
     horizon: f64,
 }
 
-/// Those of the own end of the bonds from one body to another.
-fn constants(plan: &Plan, here: &Body, there: &Body) -> Constants {
-    let [own, other] = [here, there].map(|body| (body.material.elastic, body.horizon));
+/// Those of the own end of the bonds from one block to another.
+fn constants(plan: &Plan, here: &Block, there: &Block) -> Constants {
+    let [own, other] = [here, there].map(|block| (block.body.material.elastic, block.horizon));
     let combine = |of: fn(f64, f64) -> f64| Constants {
         elastic: Isotropic {
             youngs_modulus: of(own.0.youngs_modulus, other.0.youngs_modulus),
@@ -30,7 +30,7 @@ fn constants(plan: &Plan, here: &Body, there: &Body) -> Constants {
         },
         horizon: of(own.1, other.1),
     };
-    match plan.interface.between(here, there) {
+    match plan.interface.between(here.body, there.body) {
         // Where there are no bonds, these are asked for none.
         InterfaceRule::Own | InterfaceRule::None => combine(|own, _| own),
         InterfaceRule::Average => combine(|own, other| 0.5 * (own + other)),
@@ -89,7 +89,8 @@ fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
     if matches!(damage.toughness, Toughness::CriticalStretch(_)) {
         return error("a critical stretch is no measure of energy".to_owned());
     }
-    let influenced = build(plan, body, constants(plan, body, body)).influence;
+    let block = Block::unrefined(body);
+    let influenced = build(plan, body, constants(plan, &block, &block)).influence;
     if influenced.is_some() && plan.volume_correction != VolumeCorrection::None {
         return error(
             "bonds with an influence that is not constant break by their energy only with \
@@ -118,13 +119,10 @@ fn build(plan: &Plan, body: &Body, constants: Constants) -> Built {
     (body.material.law.declaration.build)(&given(plan, body, constants))
 }
 
-/// The share of a body's cells in the families of a horizon.
-fn cell_share(plan: &Plan, neighbours: &Body, horizon: f64) -> CellShare {
-    let edge = match neighbours.points {
-        // Only cells with equal edges are corrected.
-        PointSource::Lattice { spacing, .. } => spacing[0],
-        PointSource::File { .. } => 0.0,
-    };
+/// The share of a block's cells in the families of a horizon.
+fn cell_share(plan: &Plan, neighbours: &Block, horizon: f64) -> CellShare {
+    // Only cells with equal edges are corrected.
+    let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
     CellShare::new(
         plan.volume_correction,
         horizon,
@@ -135,28 +133,28 @@ fn cell_share(plan: &Plan, neighbours: &Body, horizon: f64) -> CellShare {
 
 /// The longest bond (m) of each pair of blocks, row by row.
 pub fn cutoffs(plan: &Plan) -> Vec<f64> {
-    let reach = |here: &Body, there: &Body| {
-        if here.name != there.name && plan.interface.between(here, there) == InterfaceRule::None {
+    let reach = |here: &Block, there: &Block| {
+        if plan.interface.between(here.body, there.body) == InterfaceRule::None {
             return 0.0;
         }
         let horizon = constants(plan, here, there).horizon;
         cell_share(plan, there, horizon).cutoff()
     };
-    let bodies = &plan.bodies;
-    let pairs = bodies
+    let blocks: Vec<Block> = plan.blocks().collect();
+    let pairs = blocks
         .iter()
-        .flat_map(|here| bodies.iter().map(move |there| (here, there)));
+        .flat_map(|here| blocks.iter().map(move |there| (here, there)));
     pairs
         .map(|(here, there)| reach(here, there).max(reach(there, here)))
         .collect()
 }
 
 /// What the points of a block follow.
-pub fn block_laws(plan: &Plan, body: &Body) -> BlockLaws {
-    let constants = constants(plan, body, body);
+pub fn block_laws(plan: &Plan, block: &Block) -> BlockLaws {
+    let constants = constants(plan, block, block);
     BlockLaws {
-        law: build(plan, body, constants).law,
-        damage: damage(plan, body, constants),
+        law: build(plan, block.body, constants).law,
+        damage: damage(plan, block.body, constants),
     }
 }
 
@@ -227,14 +225,14 @@ pub fn assign<const D: usize>(
     let give = |mut bonds: BlockBonds| {
         let ends = bonds.blocks();
         let criterion = criterion(blocks, ends, per_point);
-        let [here, there] = ends.map(|block| &plan.bodies[block]);
-        let ends = [(here, there), (there, here)].map(|(body, other)| {
-            let constants = constants(plan, body, other);
+        let [here, there] = ends.map(|block| plan.block(block));
+        let ends = [(here, there), (there, here)].map(|(block, other)| {
+            let constants = constants(plan, &block, &other);
             let horizon = constants.horizon;
             End {
-                built: build(plan, body, constants),
+                built: build(plan, block.body, constants),
                 horizon,
-                share: cell_share(plan, other, horizon),
+                share: cell_share(plan, &other, horizon),
             }
         });
         weigh(plan, model, &mut bonds, &ends);

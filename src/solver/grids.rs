@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::plan::{FamilyRule, Plan, PointSource, Quadrature};
+use crate::deck::plan::{FamilyRule, Kind, Plan, PointSource, Quadrature};
 use crate::error::Result;
 use crate::families::GridFrame;
 use crate::partition::Domain;
@@ -60,23 +60,37 @@ pub fn grids(
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };
-        let coincides = |frame: &&mut GridFrame| {
-            (0..dimension).all(|k| {
-                let steps = (centre[k] - frame.origin[k]) / edges[k];
-                let same = (frame.spacing[k] / edges[k] - 1.0).abs() < 1e-12;
-                same && (steps - steps.round()).abs() < ON_GRID
-            })
-        };
-        match grids.iter_mut().find(coincides) {
-            Some(frame) => frame.blocks[index] = true,
-            None => grids.push(GridFrame {
-                origin: centre,
-                spacing: edges,
-                blocks: (0..plan.bodies.len()).map(|other| other == index).collect(),
-            }),
+        // Those of the levels lie with one point on a centre.
+        let is_shape = matches!(body.points, PointSource::Lattice { .. });
+        let refinement = plan.refinement.as_ref().filter(|_| is_shape);
+        for level in 0..=refinement.map_or(0, |refinement| refinement.levels) {
+            let edges = edges.map(|edge| edge * 0.5_f64.powi(level as i32));
+            let block = plan.block_number(index, level, Kind::Whole);
+            add(&mut grids, Cells { centre, edges }, block, plan);
         }
     }
     Ok(grids)
+}
+
+/// Notes that the points of a block lie on a grid.
+fn add(grids: &mut Vec<GridFrame>, Cells { centre, edges }: Cells, block: usize, plan: &Plan) {
+    let coincides = |frame: &&mut GridFrame| {
+        (0..plan.dimension.count()).all(|k| {
+            let steps = (centre[k] - frame.origin[k]) / edges[k];
+            let same = (frame.spacing[k] / edges[k] - 1.0).abs() < 1e-12;
+            same && (steps - steps.round()).abs() < ON_GRID
+        })
+    };
+    match grids.iter_mut().find(coincides) {
+        Some(frame) => frame.blocks[block] = true,
+        None => grids.push(GridFrame {
+            origin: centre,
+            spacing: edges,
+            blocks: (0..plan.block_count())
+                .map(|other| other == block)
+                .collect(),
+        }),
+    }
 }
 
 /// The lattice of a deck, from a corner of a cell (m) and the edges (m).

@@ -21,11 +21,13 @@ pub struct Model<const D: usize> {
     pub interior: usize,
     /// Number of points over all ranks.
     pub total: u64,
+    /// Those of them of level 0; they have the lowest ids.
+    pub coarsest: u64,
 }
 
 impl<const D: usize> Model<D> {
-    /// From a distributed cloud.
-    pub fn new(plan: &Plan, domain: &Domain) -> Self {
+    /// From a distributed cloud, with so many points of level 0 over all ranks.
+    pub fn new(plan: &Plan, domain: &Domain, coarsest: u64) -> Self {
         let owned = &domain.points[..domain.owned];
         Self {
             reference: std::array::from_fn(|d| {
@@ -39,17 +41,16 @@ impl<const D: usize> Model<D> {
             block: owned.iter().map(|point| point.block as u16).collect(),
             ids: domain.points.iter().map(|point| point.id).collect(),
             density: plan
-                .bodies
-                .iter()
-                .map(|body| body.material.density)
+                .blocks()
+                .map(|block| block.body.material.density)
                 .collect(),
             damping: plan
-                .bodies
-                .iter()
-                .map(|body| body.material.damping)
+                .blocks()
+                .map(|block| block.body.material.damping)
                 .collect(),
             interior: domain.interior,
             total: domain.total,
+            coarsest,
         }
     }
 
@@ -65,6 +66,7 @@ impl<const D: usize> Model<D> {
             damping: Vec::new(),
             interior: 0,
             total: 0,
+            coarsest: 0,
         }
     }
 

@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 use crate::comm::{self, Communicator, agree};
 use crate::deck::plan::{Action, Condition, Initial, Method, Plan, Stage, Time};
 use crate::error::{Error, Result};
-use crate::partition::distribute;
+use crate::partition::{Cost, distribute_by_cost};
+use crate::points::Point;
+use crate::refine::Grids;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
@@ -116,22 +118,41 @@ impl<'a, const D: usize> Simulation<'a, D> {
         laws_are_possible(plan)?;
         let cutoffs = cutoffs(plan);
         size::is_feasible(plan, &cutoffs, comm.size())?;
-        let (pieces, total) = points::generate(plan, comm)?;
+        let (coarse, coarsest) = points::generate(plan, comm)?;
+        let mut refined = Grids::new(plan, coarsest)?;
+        refined.refine_regions(comm, &coarse)?;
+        let pieces = refined.points(coarse);
         between()?;
+        let mut simulation = Self::of_points(plan, comm, (pieces, coarsest), None, between)?;
+        simulation.times.set_up = start.elapsed();
+        Ok(simulation)
+    }
+
+    /// Distributes and bonds points, `coarsest` of them over all ranks of level 0, and evaluates the forces
+    /// at time 0. `cost` is what this rank's points cost, if that is known; see [`Self::set_up`].
+    pub(super) fn of_points(
+        plan: &'a Plan,
+        comm: &'a dyn Communicator,
+        (pieces, coarsest): (Vec<Point>, u64),
+        cost: Option<Cost>,
+        between: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<Self> {
+        let cutoffs = cutoffs(plan);
+        let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // Bonds at the limit must find their ghosts however their length is rounded.
-        let mut domain = distribute(comm, pieces, total, longest * (1.0 + SLACK))?;
+        let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
         between()?;
         let frames = grids(plan, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
-        let (bodies, dimension) = (plan.bodies.len(), plan.dimension.count());
-        let found = families::find(&domain, &frames, bodies, &cutoffs, dimension)
+        let (blocks, dimension) = (plan.block_count(), plan.dimension.count());
+        let found = families::find(&domain, &frames, blocks, &cutoffs, dimension)
             .map_err(|fault| fault.error(plan));
         let (bonds, grids) = agree(comm, found)?;
         between()?;
-        let model = Model::new(plan, &domain);
-        let bodies = plan.bodies.iter();
-        let blocks: Vec<_> = bodies.map(|body| block_laws(plan, body)).collect();
+        let model = Model::new(plan, &domain, coarsest);
+        let blocks = plan.blocks();
+        let blocks: Vec<_> = blocks.map(|block| block_laws(plan, &block)).collect();
         let halo = std::mem::take(&mut domain.halo);
         // The points are known to the model from here on.
         drop(domain);
@@ -209,10 +230,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         simulation.guide();
         simulation.fields.add_damped_energy(&simulation.model, 0.0);
         simulation.bad = simulation.first_bad();
-        simulation.times = Times {
-            set_up: start.elapsed(),
-            ..Times::default()
-        };
+        simulation.times = Times::default();
         Ok(simulation)
     }
 
@@ -349,7 +367,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             None => Ok(()),
             Some(bad) => {
                 let block = usize::from(self.model.block[bad.index]);
-                let body = &self.plan.bodies[block];
+                let body = self.plan.block(block).body;
                 let position = self.model.position(bad.index);
                 Err(if bad.step == 0 {
                     let message = format!(
@@ -432,7 +450,8 @@ fn protect<const D: usize>(
     let mut protected = vec![0.0; model.volume.len()];
     for set in sets {
         for point in members(plan, model, set) {
-            let body = &plan.bodies[usize::from(model.block[point as usize])];
+            let block = usize::from(model.block[point as usize]);
+            let body = plan.block(block).body;
             if body
                 .damage
                 .as_ref()

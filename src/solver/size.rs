@@ -6,29 +6,31 @@ use crate::families::{Fault, MOST_NEIGHBOURS, most_neighbours};
 use crate::points::{lattice, shape};
 
 /// An error if a point would have too many neighbours or a rank too many points, as far as the shapes
-/// of the plan show it; `cutoffs` has the longest bond (m) of each pair of bodies, row by row.
+/// of the plan show it; `cutoffs` has the longest bond (m) of each pair of blocks, row by row.
 ///
 /// # Errors
 /// Names the horizon or the body; the same on all ranks.
 pub fn is_feasible(plan: &Plan, cutoffs: &[f64], ranks: usize) -> Result<()> {
-    let bodies = plan.bodies.len();
-    (0..bodies).try_for_each(|body| lattice::is_feasible(plan, body, ranks))?;
-    // First each body alone: it is the one to name.
-    let alone = (0..bodies).map(|body| [body, body]);
-    let pairs = (0..bodies * bodies).map(|pair| [pair / bodies, pair % bodies]);
+    let blocks = plan.block_count();
+    (0..plan.bodies.len()).try_for_each(|body| lattice::is_feasible(plan, body, ranks))?;
+    // First each block alone: its body is the one to name.
+    let alone = (0..blocks).map(|block| [block, block]);
+    let pairs = (0..blocks * blocks).map(|pair| [pair / blocks, pair % blocks]);
     for [here, there] in alone.chain(pairs) {
-        not_too_many_neighbours(plan, [here, there], cutoffs[here * bodies + there])?;
+        not_too_many_neighbours(plan, [here, there], cutoffs[here * blocks + there])?;
     }
     Ok(())
 }
 
 fn not_too_many_neighbours(plan: &Plan, [here, there]: [usize; 2], cutoff: f64) -> Result<()> {
-    let PointSource::Lattice { shape, spacing, .. } = &plan.bodies[there].points else {
+    let [near, far] = [here, there].map(|block| plan.block(block));
+    let (PointSource::Lattice { shape, .. }, Some(spacing)) = (&far.body.points, far.spacing())
+    else {
         return Ok(());
     };
     let dimension = plan.dimension.count();
     let (lower, upper) = shape::bounds(shape);
-    if let PointSource::Lattice { shape: own, .. } = &plan.bodies[here].points {
+    if let PointSource::Lattice { shape: own, .. } = &near.body.points {
         let (own_lower, own_upper) = shape::bounds(own);
         let apart = |k: usize| (own_lower[k] - upper[k]).max(lower[k] - own_upper[k]);
         if (0..dimension).any(|k| apart(k) > cutoff) {
@@ -38,7 +40,7 @@ fn not_too_many_neighbours(plan: &Plan, [here, there]: [usize; 2], cutoff: f64) 
     let cells =
         std::array::from_fn(|k| ((upper[k] - lower[k]) / spacing[k] - 1e-9).ceil().max(1.0));
     let points = f64::from(plan.quadrature.points(dimension));
-    let neighbours = points * most_neighbours(*spacing, cutoff, cells, dimension);
+    let neighbours = points * most_neighbours(spacing, cutoff, cells, dimension);
     if neighbours <= MOST_NEIGHBOURS {
         return Ok(());
     }

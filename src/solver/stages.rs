@@ -81,8 +81,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Gives the blocks the density that they have in the present stage.
     pub(super) fn scale_density(&mut self) {
         let scale = self.time_rule().density_scale;
-        for (density, body) in self.model.density.iter_mut().zip(&self.plan.bodies) {
-            *density = scale * body.material.density;
+        for (density, block) in self.model.density.iter_mut().zip(self.plan.blocks()) {
+            *density = scale * block.body.material.density;
         }
     }
 

@@ -40,7 +40,7 @@ pub fn figures<const D: usize>(
     // Volume, its moments by direction, and the distance to the nearest neighbour.
     let mut sums = vec![ExactSum::ZERO; 5 * plan.bodies.len()];
     for point in 0..model.owned() {
-        let body = usize::from(model.block[point]);
+        let body = plan.body_of(usize::from(model.block[point]));
         let (volume, position) = (model.volume[point], model.position(point));
         let sums = &mut sums[5 * body..];
         sums[0].add(volume);

@@ -54,6 +54,7 @@ fn block(plan: &Plan, body: usize) -> Option<Plan> {
     alone.damage = None;
     let mut block = Plan {
         bodies: vec![alone],
+        refinement: None,
         interface: Interface {
             rule: InterfaceRule::Own,
             pairs: Vec::new(),

@@ -144,12 +144,12 @@ fn layer<const D: usize>(
     // Rank 0 looks at all points of the layer: body and cell of each.
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
-        let block = usize::from(model.block[*point as usize]);
-        let edges = edges(plan, block, depth);
+        let body = plan.body_of(usize::from(model.block[*point as usize]));
+        let edges = edges(plan, body, depth);
         let position = model.position(*point as usize);
         let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edges[k]).floor() as i64);
         cells[0].extend_from_slice(bytemuck::cast_slice(&[
-            block as i64,
+            body as i64,
             cell[0],
             cell[1],
             cell[2],

@@ -15,7 +15,7 @@ pub use size::{Size, size};
 
 use crate::comm::total;
 use crate::damage::DamageLaw;
-use crate::deck::plan::{Plan, PointSource, Selector};
+use crate::deck::plan::{Block, Plan, PointSource, Selector};
 use crate::deck::shown;
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
@@ -89,6 +89,7 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
     let count = simulation.plan.bodies.len();
     let mut bonds = vec![0; count * count];
     for ([here, there], own) in simulation.forces.bonds_of_blocks() {
+        let [here, there] = [here, there].map(|block| simulation.plan.body_of(block));
         bonds[here * count + there] += own;
     }
     simulation.comm.sum(&mut bonds);
@@ -123,7 +124,7 @@ fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
 
 fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
     for body in &plan.bodies {
-        let critical = match block_laws(plan, body).damage {
+        let critical = match block_laws(plan, &Block::unrefined(body)).damage {
             Some(DamageLaw::CriticalStretch(law)) => Some(law.critical),
             _ => None,
         };

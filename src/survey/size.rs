@@ -55,7 +55,7 @@ pub fn size(plan: &Plan) -> Result<Size> {
         let (points, neighbours) = match body {
             Some(lattice) => {
                 size.cells += lattice.cells() as f64;
-                let reach = &cutoffs[here * bodies.len()..][..bodies.len()];
+                let reach = &cutoffs[here * plan.block_count()..][..bodies.len()];
                 (lattice.points(), neighbours(lattice, &bodies, reach))
             }
             None => from_file(plan, here),

@@ -10,6 +10,7 @@ mod count;
 mod grid;
 mod material;
 mod outputs;
+mod refinement;
 mod time;
 
 use indexmap::IndexMap;
@@ -23,6 +24,7 @@ pub use count::Count;
 pub use grid::*;
 pub use material::*;
 pub use outputs::*;
+pub use refinement::*;
 pub use time::*;
 
 /// A string with its place in the deck.
@@ -54,6 +56,9 @@ pub struct Deck {
     /// The bonds between blocks.
     #[serde(default)]
     pub interface: Interface,
+    /// Finer grids in parts of the bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Spanned<Refinement>>,
     /// Materials by name: `[material.NAME.LAW]`.
     pub material: Tables<Material>,
     /// Damage laws by name.
@@ -87,6 +92,9 @@ pub struct Deck {
     /// How often the run can be continued from.
     #[serde(default = "nowhere")]
     pub checkpoint: Spanned<Checkpoint>,
+    /// When points are dealt out anew to the ranks; never if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub balance: Option<Spanned<Balance>>,
 }
 
 fn nowhere<T: Default>() -> Spanned<T> {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
 use super::{Count, Tables, Text};
-use crate::deck::number::{Number, Vector};
+use crate::deck::number::{Number, Vector, default_number};
 
 /// The result file.
 #[derive(Debug, Clone, Default, Deserialize, Serialize)]
@@ -85,6 +85,28 @@ pub struct Checkpoint {
     /// Simulated time between checkpoints in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_time: Option<Number>,
+}
+
+/// Points are dealt out anew to the ranks when these have become unequal: their times in the loops over
+/// bonds are compared now and then. Results do not depend on it.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Balance {
+    /// Steps between looks at the times; 500 if not given.
+    #[serde(default = "default_look")]
+    pub every_steps: Spanned<Count>,
+    /// The time of the slowest rank, as a multiple of the mean, above which points are dealt out anew;
+    /// 1.2 if not given.
+    #[serde(default = "default_imbalance")]
+    pub imbalance: Number,
+}
+
+fn default_look() -> Spanned<Count> {
+    Spanned::new(0..0, Count::new(500))
+}
+
+fn default_imbalance() -> Number {
+    default_number(1.2)
 }
 
 /// The force of the supports on a set along a direction.

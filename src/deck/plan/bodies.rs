@@ -92,8 +92,12 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// The rule of the bonds between two bodies; the same for both orders.
+    /// The rule of the bonds between two bodies; the same for both orders. Within a body each end has its
+    /// own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
+        if here.name == there.name {
+            return InterfaceRule::Own;
+        }
         let joins = |names: &[String; 2]| {
             let [a, b] = [&names[0], &names[1]];
             (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)

@@ -5,6 +5,7 @@
 mod bodies;
 mod conditions;
 mod outputs;
+mod refinement;
 mod time;
 
 use std::ops::Range;
@@ -12,11 +13,13 @@ use std::ops::Range;
 use crate::deck::source::Source;
 use crate::dimension::Dimension;
 
+pub use super::blocks::{Block, Kind};
 pub use super::law::Law;
 pub use crate::damage::Calibration;
 pub use bodies::*;
 pub use conditions::*;
 pub use outputs::*;
+pub use refinement::*;
 pub use time::*;
 
 /// Everything that a run needs to know.
@@ -42,8 +45,10 @@ pub struct Plan {
     pub family: FamilyRule,
     /// The bonds between blocks.
     pub interface: Interface,
-    /// Bodies in the order of the deck; the index is the block number.
+    /// Bodies in the order of the deck.
     pub bodies: Vec<Body>,
+    /// Finer grids in parts of the bodies.
+    pub refinement: Option<Refinement>,
     /// Sets: `all`, then the bodies, then those of the deck.
     pub sets: Vec<Set>,
     /// Pre-cracks.
@@ -63,6 +68,8 @@ pub struct Plan {
     pub history: History,
     /// When checkpoints are written.
     pub checkpoint: CheckpointRule,
+    /// When points are dealt out anew to the ranks.
+    pub balance: Option<Balance>,
 }
 
 /// Where values stand in the deck whose mistakes only the points show.

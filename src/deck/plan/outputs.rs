@@ -20,6 +20,15 @@ pub enum CheckpointRule {
     Simulation(Interval),
 }
 
+/// When points are dealt out anew to the ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Balance {
+    /// Steps between looks at the ranks' times.
+    pub every_steps: u64,
+    /// What the time of the slowest rank must exceed, as a multiple of the mean.
+    pub imbalance: f64,
+}
+
 /// The result file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {

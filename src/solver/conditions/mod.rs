@@ -30,9 +30,9 @@ pub struct Conditions<const D: usize> {
 /// Local indices of the owned points of a set, by index.
 pub fn members<const D: usize>(plan: &Plan, model: &Model<D>, set: usize) -> Vec<u32> {
     let chosen = |point: usize| {
-        let block = usize::from(model.block[point]);
+        let body = plan.body_of(usize::from(model.block[point]));
         let (id, position) = (model.ids[point], model.position(point));
-        set::contains(&plan.sets[set], plan.horizon, id, position, block)
+        set::contains(&plan.sets[set], plan.horizon, id, position, body)
     };
     (0..model.owned())
         .filter(|point| chosen(*point))

@@ -80,6 +80,7 @@ impl ContactWatch {
         }
         let mut bonds = vec![0; bodies * bodies];
         for ([here, there], count) in simulation.forces.bonds_of_blocks() {
+            let [here, there] = [here, there].map(|block| simulation.plan.body_of(block));
             bonds[here * bodies + there] += count;
         }
         comm.sum(&mut bonds);
@@ -87,7 +88,7 @@ impl ContactWatch {
         let pairs = pairs.filter(|[a, b]| bonds[a * bodies + b] == 0).collect();
         let mut spacing = vec![0.0_f64; bodies];
         for (point, block) in model.block.iter().enumerate() {
-            let largest = &mut spacing[usize::from(*block)];
+            let largest = &mut spacing[simulation.plan.body_of(usize::from(*block))];
             *largest = largest.max(spacing_of(simulation, point));
         }
         comm.max(&mut spacing);
@@ -127,7 +128,7 @@ impl ContactWatch {
         let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
-            let first = 6 * usize::from(model.block[point]);
+            let first = 6 * simulation.plan.body_of(usize::from(model.block[point]));
             for (k, x) in place_of(model, displacement, point).into_iter().enumerate() {
                 corners[first + k] = corners[first + k].min(x);
                 corners[first + 3 + k] = corners[first + 3 + k].min(-x);
@@ -199,7 +200,7 @@ fn candidates<const D: usize>(
     let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
     for (point, block) in model.block.iter().enumerate() {
         let place = place_of(model, displacement, point);
-        for (number, second) in &of_body[usize::from(*block)] {
+        for (number, second) in &of_body[simulation.plan.body_of(usize::from(*block))] {
             let meeting = &meetings[*number];
             if (0..3).any(|k| place[k] < meeting.lower[k] || place[k] > meeting.upper[k]) {
                 continue;

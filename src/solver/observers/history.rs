@@ -178,6 +178,20 @@ impl HistoryObserver {
         })
     }
 
+    /// Finds sets, probes, lines and tips anew, after points have changed their ranks. Collective.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn follow<const D: usize>(&mut self, simulation: &Simulation<'_, D>) -> Result<()> {
+        let mut new = Self::new(simulation)?;
+        new.start = self.start;
+        for (tip, old) in new.tips.iter_mut().zip(&mut self.tips) {
+            tip.take_past(old);
+        }
+        *self = new;
+        Ok(())
+    }
+
     /// Name and unit of each column.
     pub fn columns(&self) -> &[(String, &'static str)] {
         &self.columns

@@ -117,8 +117,7 @@ fn cauchy_stress<const D: usize>(
 ) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
-        let block = usize::from(simulation.model.block[point]);
-        let ratio = simulation.plan.bodies[block].material.elastic.poisson_ratio;
+        let ratio = poisson_ratio(simulation, point);
         let in_plane = determinant(gradient);
         let growth = match simulation.plan.dimension {
             Dimension::PlaneStress { .. } => in_plane.powf((1.0 - 2.0 * ratio) / (1.0 - ratio)),
@@ -143,8 +142,8 @@ fn von_mises(stress: &[f64]) -> f64 {
 /// ν of an owned point's body.
 fn poisson_ratio<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let block = usize::from(simulation.model.block[point]);
-    let elastic = simulation.plan.bodies[block].material.elastic;
-    elastic.poisson_ratio
+    let body = simulation.plan.block(block).body;
+    body.material.elastic.poisson_ratio
 }
 
 /// The trace of the strain in space by that in the setting's directions: without stress across a plate, it

@@ -58,6 +58,11 @@ impl Tip {
         row
     }
 
+    /// Takes over what an earlier observer of the same tip knows of the past.
+    pub fn take_past(&mut self, earlier: &mut Self) {
+        std::mem::swap(&mut self.growth, &mut earlier.growth);
+    }
+
     /// Takes note of a length (m) at a time (s) of the past.
     pub fn recall(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);

@@ -1,0 +1,140 @@
+"""What a refined patch does to a plane wave, beside table 3 of Dipasquale et al. (2014).
+
+Runs inputs/plane_wave_refined.toml for both rules of convergence, levels 1 to 3, with and without the
+enlarged horizon at interfaces, and the same plate without refinement, and compares energy densities in the
+patch at the moment when the crest is there, and the largest displacement of a node that only a reflected
+wave reaches afterwards.
+"""
+
+import argparse
+import pathlib
+import re
+import subprocess
+
+import h5py
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DECK = ROOT / "inputs" / "plane_wave_refined.toml"
+
+# Table 3: largest loss and gain of energy density and reflected displacement, in percent.
+PAPER = {
+    ("delta", 1): (9.83, 5.86, 0.24),
+    ("delta", 2): (11.00, 5.23, 0.31),
+    ("delta", 3): (11.63, 5.88, 0.35),
+    ("delta-m", 1): (17.10, 4.38, 0.58),
+    ("delta-m", 2): (18.96, 6.25, 0.87),
+    ("delta-m", 3): (20.81, 7.27, 1.03),
+}
+# Figure 5b.
+PAPER_UNCORRECTED = 37.4
+
+AMPLITUDE = 0.1  # of each half of the wave, m
+CENTRE = np.array([0.2005, 0.0405])
+DX = 1e-3
+SPEED = 1.125**0.5  # transverse motion is blocked, m/s
+
+
+def without_section(text, name):
+    """The deck without a section and its tables."""
+    pattern = rf"(?ms)^\[{name}[^\]]*\]\n.*?(?=^\[(?!{name})|\Z)"
+    return re.sub(pattern, "", text)
+
+
+def horizons(rule, level):
+    return {"delta": 3.0 * 0.5**level, "delta-m": (3.0 + level) * 0.5**level}[rule]
+
+
+def deck(rule, levels, factor, seen, end):
+    """The deck's text, with an output at the time `seen`; no refinement with 0 levels."""
+    text = DECK.read_text()
+    text = re.sub(r"(?m)^end = 0\.17 .*$", f"end = {end}", text)
+    text = re.sub(r'(?m)^every = "end".*$', f"every = {seen}", text)
+    text = without_section(text, "refinement")
+    if levels == 0:
+        return text
+    lines = [f'[refinement]\nlevels = {levels}\nrule = "{rule}"']
+    if factor is not None:
+        lines.append(f"interface_factor = {factor}")
+    for level in range(1, levels + 1):
+        radius = horizons(rule, level - 1) + 1e-4
+        lines.append(
+            f"[refinement.region.level_{level}]\n"
+            f'where = "(x - centre_x)^2 + (y - centre_y)^2 <= ({radius}*dx)^2"\nlevel = {level}'
+        )
+    return text + "\n" + "\n".join(lines) + "\n"
+
+
+def run(arguments, name, text):
+    """The result file of a deck."""
+    folder = arguments.folder / name
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "deck.toml"
+    path.write_text(text)
+    command = [str(arguments.fissure), "run", str(path), "--output", str(folder / "out"), "--overwrite", "--quiet"]
+    subprocess.run(command, check=True)
+    return h5py.File(folder / "out" / "result.vtkhdf")
+
+
+class Energy:
+    """Total energy density (J/m³) of the second output by place, the places, and the time."""
+
+    def __init__(self, file):
+        self.places = file["VTKHDF/Points"][:, :2]
+        rows = slice(len(self.places), 2 * len(self.places))
+        data = file["VTKHDF/PointData"]
+        kinetic = 0.5 * (data["velocity"][rows] ** 2).sum(axis=1)
+        self.density = data["strain_energy_density"][rows] + kinetic
+        self.time = file["VTKHDF/Steps/Values"][1]
+
+    def profile(self):
+        """The density along the row of nodes through the patch: it is the same in all others."""
+        row = np.abs(self.places[:, 1] - CENTRE[1]) < 1e-3 * DX
+        order = np.argsort(self.places[row, 0])
+        return self.places[row, 0][order], self.density[row][order]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
+    parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/plane_wave")
+    arguments = parser.parse_args()
+
+    # The crest of the energy is that of the velocity: it lies beside the middle of the displacement.
+    crest = CENTRE[0] - 0.03 / 2**0.5
+    seen = crest / SPEED
+    after = (2 * CENTRE[0] - 0.1) / SPEED
+    plain = run(arguments, "uniform", deck("delta", 0, None, seen, after))
+    uniform = Energy(plain)
+    at, density = uniform.profile()
+    before = plain["history/probe_reflected_displacement_x"][:]
+    times = plain["history/time"][:]
+
+    print("rule     level  factor    loss % (paper)     gain % (paper)   reflected % (paper)")
+    cases = [(rule, level, None) for rule in ("delta", "delta-m") for level in (1, 2, 3)]
+    cases += [("delta", level, 1.0) for level in (1, 2, 3)]
+    for rule, level, factor in cases:
+        name = f"{rule}_{level}_{factor}"
+        file = run(arguments, name, deck(rule, level, factor, seen, after))
+        energy = Energy(file)
+        # Steps differ, and with them the moments at which outputs are written.
+        shift = SPEED * (energy.time - uniform.time)
+        wanted = np.interp(energy.places[:, 0] - shift, at, density)
+        near = np.abs(energy.places - CENTRE).max(axis=1) < 5 * DX
+        change = 100 * (energy.density[near] / wanted[near] - 1)
+        found = np.interp(times, file["history/time"][:], file["history/probe_reflected_displacement_x"][:])
+        late = times > (CENTRE[0] - 0.1) / SPEED + 0.09
+        reflected = 100 * np.abs(found - before)[late].max() / AMPLITUDE
+        loss, gain, coming_back = PAPER[rule, level]
+        if factor is not None:
+            loss, gain, coming_back = (PAPER_UNCORRECTED if rule == "delta" and level == 3 else "-", "-", "-")
+        factor = "default" if factor is None else f"{factor:.3f}"
+        print(
+            f"{rule:8} {level:5}  {factor:7} {-change.min():8.2f} ({loss:>5})   {change.max():8.2f} ({gain:>5})"
+            f"   {reflected:8.2f} ({coming_back:>5})",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+//! The blocks of a plan: its bodies and, with refinement, the parts of them by level.
+//!
+//! A block is what has one law, one horizon and, but for parts of refined bodies, one volume for all of
+//! its points.
+
+use super::plan::{Body, HorizonRule, Plan, PointSource};
+
+/// The points of one level of a refined body fall into so many blocks.
+const KINDS: usize = 3;
+
+/// What the points of a block have in common beside the level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The volume of a cell of their level: they lie on a lattice.
+    Whole,
+    /// Another volume, next to finer points or at the edge of the body.
+    Partial,
+    /// A place within the horizon of coarser points.
+    AtCoarser,
+}
+
+/// A block of a plan.
+#[derive(Debug, Clone, Copy)]
+pub struct Block<'a> {
+    /// Its body.
+    pub body: &'a Body,
+    /// The level of its points, 0 without refinement.
+    pub level: u32,
+    /// What else they have in common.
+    pub kind: Kind,
+    /// Horizon δ, m.
+    pub horizon: f64,
+}
+
+impl<'a> Block<'a> {
+    /// A body without refinement.
+    pub fn unrefined(body: &'a Body) -> Self {
+        Self {
+            body,
+            level: 0,
+            kind: Kind::Whole,
+            horizon: body.horizon,
+        }
+    }
+
+    /// Edges of a cell (m), if the points lie in such.
+    pub fn spacing(&self) -> Option<[f64; 3]> {
+        match self.body.points {
+            PointSource::Lattice { spacing, .. } => Some(spacing.map(|edge| edge * self.scale())),
+            PointSource::File { .. } => None,
+        }
+    }
+
+    /// 2^−level.
+    fn scale(&self) -> f64 {
+        0.5_f64.powi(self.level as i32)
+    }
+}
+
+impl Plan {
+    /// Number of blocks.
+    pub fn block_count(&self) -> usize {
+        let levels = self.refinement.as_ref().map(|refinement| refinement.levels);
+        let parts = levels.map_or(1, |finest| KINDS * (finest as usize + 1));
+        parts * self.bodies.len()
+    }
+
+    /// The number of the block of some points of a body.
+    pub fn block_number(&self, body: usize, level: u32, kind: Kind) -> usize {
+        body + self.bodies.len() * (KINDS * level as usize + kind as usize)
+    }
+
+    /// The index of the body that a block belongs to.
+    pub fn body_of(&self, block: usize) -> usize {
+        block % self.bodies.len()
+    }
+
+    /// A block, by its number.
+    pub fn block(&self, number: usize) -> Block<'_> {
+        let body = &self.bodies[self.body_of(number)];
+        let part = number / self.bodies.len();
+        let level = (part / KINDS) as u32;
+        let kind = [Kind::Whole, Kind::Partial, Kind::AtCoarser][part % KINDS];
+        Block {
+            level,
+            kind,
+            horizon: self.horizon_of(body, level, kind),
+            ..Block::unrefined(body)
+        }
+    }
+
+    /// All blocks in the order of their numbers.
+    pub fn blocks(&self) -> impl Iterator<Item = Block<'_>> + Clone {
+        (0..self.block_count()).map(|number| self.block(number))
+    }
+
+    fn horizon_of(&self, body: &Body, level: u32, kind: Kind) -> f64 {
+        let (Some(refinement), true) = (&self.refinement, level > 0) else {
+            return body.horizon;
+        };
+        let scale = 0.5_f64.powi(level as i32);
+        let horizon = match (&refinement.rule, &body.points) {
+            (HorizonRule::DeltaM(ratios), PointSource::Lattice { spacing, .. }) => {
+                ratios[level as usize - 1] * spacing[0] * scale
+            }
+            _ => body.horizon * scale,
+        };
+        match kind {
+            Kind::AtCoarser => horizon * refinement.interface_factor,
+            Kind::Whole | Kind::Partial => horizon,
+        }
+    }
+}

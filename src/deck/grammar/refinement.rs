@@ -1,0 +1,52 @@
+//! Finer grids in parts of the bodies.
+
+use serde::{Deserialize, Serialize};
+use serde_spanned::Spanned;
+
+use super::Tables;
+use crate::deck::number::Number;
+
+/// Refinement: points of bodies given as shapes get new ones around them at half the spacing, level by
+/// level; neighbours differ by one level at most.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// The finest level: the spacing there is that of the grid divided by 2^levels.
+    pub levels: Spanned<u64>,
+    /// How horizons go with the spacing: `"delta"`, m = δ/dx stays, or `"delta-m"`, m rises.
+    #[serde(default)]
+    pub rule: HorizonRule,
+    /// With `"delta-m"`: m of the levels from 1 on; by 1 more from level to level if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub m: Option<Spanned<Vec<Number>>>,
+    /// What the horizon of points is multiplied by that have a coarser level within it, so that their
+    /// families do not lose volume; √2 with `"delta"` and 1 with `"delta-m"` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interface_factor: Option<Number>,
+    /// What is refined from the start, by any name.
+    #[serde(default)]
+    pub region: Tables<RefinedRegion>,
+}
+
+/// How the horizon goes with the spacing from level to level.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HorizonRule {
+    /// δ/dx stays.
+    #[default]
+    Delta,
+    /// δ/dx rises with the level.
+    DeltaM,
+}
+
+/// Points that are refined from the start.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct RefinedRegion {
+    /// A condition on the reference position.
+    #[serde(rename = "where")]
+    pub condition: Number,
+    /// The level that points there get at least; the finest if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<Spanned<u64>>,
+}

@@ -1,0 +1,42 @@
+//! Finer grids in parts of the bodies.
+
+use std::ops::Range;
+
+use crate::deck::expression::Expression;
+
+/// Refinement of the grid (Dipasquale et al. 2014, §2).
+#[derive(Debug, Clone)]
+pub struct Refinement {
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// The finest level: the spacing there is that of the grid divided by 2^levels.
+    pub levels: u32,
+    /// The horizons of the levels.
+    pub rule: HorizonRule,
+    /// What the horizon of points is multiplied by that have a coarser level within it.
+    pub interface_factor: f64,
+    /// What is refined from the start.
+    pub regions: Vec<RefinedRegion>,
+}
+
+/// How the horizon goes with the spacing from level to level.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HorizonRule {
+    /// δ convergence: m = δ/dx is the same.
+    Delta,
+    /// δm convergence: m of each level from 1 on.
+    DeltaM(Vec<f64>),
+}
+
+/// Points that are refined from the start.
+#[derive(Debug, Clone)]
+pub struct RefinedRegion {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Points of lower levels are refined until they have this level.
+    pub level: u32,
+    /// Which points, by reference position.
+    pub condition: Expression,
+}

@@ -1,0 +1,217 @@
+//! The refined grids of a run's bodies, and their points.
+
+use crate::comm::{Communicator, agree};
+use crate::deck::plan::{Block, Kind, Plan};
+use crate::error::Result;
+use crate::families::cutoff;
+use crate::points::{LatticeBody, Point};
+
+use super::pattern::{Node, Pattern};
+use super::place::Place;
+
+/// The grids of all bodies, by body; the same on all ranks.
+pub struct Grids<'a> {
+    plan: &'a Plan,
+    /// Number of points of level 0 over all ranks.
+    coarsest: u64,
+    finest: u32,
+    bodies: Vec<Option<BodyGrid<'a>>>,
+}
+
+/// The grid of a body that is given as a shape.
+struct BodyGrid<'a> {
+    cells: LatticeBody<'a>,
+    pattern: Pattern,
+}
+
+/// A node that is to be refined: body, level, and place in steps of the level.
+type Pick = [i64; 5];
+
+impl<'a> Grids<'a> {
+    /// Grids in which nothing is refined, of a plan with so many points of level 0 over all ranks; without
+    /// refinement there is none.
+    ///
+    /// # Errors
+    /// When the cells of a body are too far away to be numbered.
+    pub fn new(plan: &'a Plan, coarsest: u64) -> Result<Self> {
+        let finest = plan.refinement.as_ref().map_or(0, |r| r.levels);
+        let dimension = plan.dimension.count();
+        let grid = |body| {
+            let cells = LatticeBody::new(plan, body)?;
+            let pattern = Pattern::new(dimension, finest);
+            Ok(cells.map(|cells| BodyGrid { cells, pattern }))
+        };
+        let bodies = if finest == 0 {
+            Vec::new()
+        } else {
+            (0..plan.bodies.len()).map(grid).collect::<Result<_>>()?
+        };
+        Ok(Self {
+            plan,
+            coarsest,
+            finest,
+            bodies,
+        })
+    }
+
+    /// Refines what the plan wants from the start; `coarse` are this rank's points of level 0. Collective.
+    ///
+    /// # Errors
+    /// When there is no point in a region; the same on all ranks.
+    pub fn refine_regions(&mut self, comm: &dyn Communicator, coarse: &[Point]) -> Result<()> {
+        let plan = self.plan;
+        let Some(refinement) = &plan.refinement else {
+            return Ok(());
+        };
+        for region in &refinement.regions {
+            for level in 0..region.level {
+                let mut picks: Vec<Pick> = Vec::new();
+                for point in coarse {
+                    let Some(grid) = &self.bodies[point.block as usize] else {
+                        continue;
+                    };
+                    grid.for_each_node(point.position, level, &mut |place, position| {
+                        if region.condition.is_true(position, 0.0) {
+                            let [x, y, z] = place;
+                            picks.push([i64::from(point.block), i64::from(level), x, y, z]);
+                        }
+                    });
+                }
+                let all = gather(comm, &picks);
+                if all.is_empty() {
+                    let message = format!(
+                        "[refinement.region.{}] where: there is no point of a body given as a shape",
+                        region.name
+                    );
+                    let error = plan.source.error(region.span.clone(), message);
+                    return agree(comm, Err(error));
+                }
+                self.refine(&all);
+            }
+        }
+        Ok(())
+    }
+
+    /// Refines nodes, and what must be refined with them.
+    fn refine(&mut self, picks: &[Pick]) {
+        for [body, level, x, y, z] in picks {
+            let Some(BodyGrid { cells, pattern }) = &mut self.bodies[*body as usize] else {
+                continue;
+            };
+            pattern.refine(&|cell| cells.has_cell(cell), *level as u32, [*x, *y, *z]);
+        }
+    }
+
+    /// The points in the cells of `coarse`, points of level 0 as they are without refinement: those with
+    /// the volume and the block that they have with it, and those of finer levels.
+    pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
+        if self.bodies.is_empty() {
+            return coarse;
+        }
+        let mut finer = Vec::new();
+        for point in &mut coarse {
+            let body = point.block as usize;
+            let Some(grid) = &self.bodies[body] else {
+                continue;
+            };
+            let cell = grid.cells.cell_at(point.position);
+            let origin = cell.map(|x| x << self.finest);
+            let cell_volume = point.volume;
+            if grid.pattern.touches(cell) {
+                for part in 1..1_u64 << (self.finest as usize * self.plan.dimension.count()) {
+                    let place = self.place(origin, part);
+                    if let Some(node) = grid.node(place) {
+                        let id = point.id + self.coarsest * part;
+                        let block = self.block(body, grid, place, &node);
+                        let place = grid.position(self.finest, place);
+                        finer.push(Point::new(id, place, cell_volume * node.share, block));
+                    }
+                }
+            }
+            if grid.pattern.changes(cell)
+                && let Some(node) = grid.node(origin)
+            {
+                point.volume = cell_volume * node.share;
+                point.block = self.block(body, grid, origin, &node) as u32;
+            }
+        }
+        coarse.extend(finer);
+        coarse
+    }
+
+    /// The place in steps of the finest level with this number in a cell, from 0: x fastest.
+    fn place(&self, origin: Place, part: u64) -> Place {
+        let mask = (1 << self.finest) - 1;
+        std::array::from_fn(|k| origin[k] + (part >> (k as u32 * self.finest) & mask) as i64)
+    }
+
+    /// The block of a node of a body.
+    fn block(&self, body: usize, grid: &BodyGrid, place: Place, node: &Node) -> usize {
+        let number = |kind| self.plan.block_number(body, node.level, kind);
+        let kind = if grid.is_at_coarser(self.plan.block(number(Kind::Whole)), place) {
+            Kind::AtCoarser
+        } else if node.whole {
+            Kind::Whole
+        } else {
+            Kind::Partial
+        };
+        number(kind)
+    }
+}
+
+impl BodyGrid<'_> {
+    fn node(&self, place: Place) -> Option<Node> {
+        let cells = &self.cells;
+        self.pattern.node(&|cell| cells.has_cell(cell), place)
+    }
+
+    /// Whether a node, given in steps of the finest level, is within the horizon of coarser ones; `block` is
+    /// that of its level.
+    fn is_at_coarser(&self, block: Block, place: Place) -> bool {
+        let (Some(edges), cells) = (block.spacing(), &self.cells) else {
+            return false;
+        };
+        let body = |cell| cells.has_cell(cell);
+        let reach = cutoff(block.horizon);
+        let node = (block.level, place);
+        self.pattern.is_at_coarser(&body, node, edges, reach)
+    }
+
+    /// Reference position (m) of a place in steps of a level.
+    fn position(&self, level: u32, place: Place) -> [f64; 3] {
+        let scale = 0.5_f64.powi(level as i32);
+        self.cells.place(place.map(|x| x as f64 * scale))
+    }
+
+    /// Calls `found` with the place, in steps of a level, and the reference position (m) of each node of
+    /// the level's grid in the cell whose centre is at a position (m).
+    fn for_each_node(&self, centre: [f64; 3], level: u32, found: &mut impl FnMut(Place, [f64; 3])) {
+        let cells = &self.cells;
+        let cell = cells.cell_at(centre);
+        let origin = cell.map(|x| x << level);
+        let dimension = self.pattern.dimension();
+        let parts = if level > 0 && self.pattern.touches(cell) {
+            1_u64 << (level as usize * dimension)
+        } else {
+            1
+        };
+        let mask = (1_u64 << level) - 1;
+        for part in 0..parts {
+            let place =
+                std::array::from_fn(|k| origin[k] + (part >> (k as u32 * level) & mask) as i64);
+            if self
+                .pattern
+                .exists(&|cell| cells.has_cell(cell), level, place)
+            {
+                found(place, self.position(level, place));
+            }
+        }
+    }
+}
+
+/// The picks of all ranks.
+fn gather(comm: &dyn Communicator, own: &[Pick]) -> Vec<Pick> {
+    let bytes: &[u8] = bytemuck::cast_slice(own);
+    let all = comm.all_to_all(vec![bytes.to_vec(); comm.size()]).concat();
+    bytemuck::pod_collect_to_vec(&all)
+}

@@ -1,0 +1,290 @@
+//! Which nodes of a body are refined, and the nodes that follow.
+
+use std::collections::HashSet;
+
+use super::place::{Place, around, between, born, halves, parents};
+
+/// A node of a refined grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Node {
+    /// The level at whose spacing it lies among its neighbours.
+    pub level: u32,
+    /// Volume as a share of that of a cell of level 0.
+    pub share: f64,
+    /// Whether this is just the volume of a cell of its level.
+    pub whole: bool,
+}
+
+/// The refined nodes of a body, by level, in steps of their level's spacing.
+///
+/// `body` says of a cell, by its numbers, whether it is one of the body's. If a node is refined, its
+/// parents are; so neighbouring nodes differ by one level at most.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pattern {
+    dimension: usize,
+    /// One set a level but the finest.
+    refined: Vec<HashSet<Place>>,
+}
+
+impl Pattern {
+    /// Nothing is refined; `finest` is the finest level there can be.
+    pub fn new(dimension: usize, finest: u32) -> Self {
+        Self {
+            dimension,
+            refined: vec![HashSet::new(); finest as usize],
+        }
+    }
+
+    /// The finest level that there can be.
+    pub fn finest(&self) -> u32 {
+        self.refined.len() as u32
+    }
+
+    /// Number of dimensions.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// Refines a node of a level, given in steps of it; its parents first. A place outside of the body
+    /// stays as it is.
+    pub fn refine(&mut self, body: &impl Fn(Place) -> bool, level: u32, place: Place) {
+        if !possible(body, level, place) || !self.refined[level as usize].insert(place) {
+            return;
+        }
+        if level > 0 {
+            for parent in parents(place) {
+                self.refine(body, level - 1, parent);
+            }
+        }
+    }
+
+    /// The refined nodes with their levels, in no order.
+    pub fn refined(&self) -> impl Iterator<Item = (u32, Place)> {
+        let by_level = (0..).zip(&self.refined);
+        by_level.flat_map(|(level, places)| places.iter().map(move |place| (level, *place)))
+    }
+
+    /// Whether there is a node at a place, in steps of a level's spacing.
+    pub fn exists(&self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
+        let (level, place) = born(level, place);
+        if level == 0 {
+            return body(place);
+        }
+        let refined = &self.refined[level as usize - 1];
+        parents(place).any(|parent| refined.contains(&parent)) && possible(body, level, place)
+    }
+
+    /// Whether there can be nodes within a cell, its lower sides included, beside the one at its centre
+    /// from which it is numbered.
+    pub fn touches(&self, cell: Place) -> bool {
+        let Some(refined) = self.refined.first() else {
+            return false;
+        };
+        let high = std::array::from_fn(|k| cell[k] + i64::from(k < self.dimension));
+        !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
+    }
+
+    /// Whether a node of level 0 may be other than without refinement.
+    pub fn changes(&self, cell: Place) -> bool {
+        let Some(refined) = self.refined.first() else {
+            return false;
+        };
+        let step = |k: usize| i64::from(k < self.dimension);
+        let low = std::array::from_fn(|k| cell[k] - step(k));
+        let high = std::array::from_fn(|k| cell[k] + step(k));
+        !refined.is_empty() && between(low, high).any(|other| refined.contains(&other))
+    }
+
+    /// What the node at a place is, in steps of the finest level; none if there is no node.
+    pub fn node(&self, body: &impl Fn(Place) -> bool, place: Place) -> Option<Node> {
+        let finest = self.finest();
+        if !self.exists(body, finest, place) {
+            return None;
+        }
+        let (birth, at_birth) = born(finest, place);
+        let dimension = self.dimension as u32;
+        // Volume in units of which the finest cell has 2^dimension: all of this is exact.
+        let cell = |level: u32| 1_u64 << (dimension * (finest + 1 - level));
+        let (mut level, mut volume) = (birth, cell(birth));
+        let mut complete = true;
+        let mut here = at_birth;
+        for coarse in birth..finest {
+            let (mut taken, mut all) = (0, 0);
+            for other in around(here, self.dimension) {
+                if !possible(body, coarse + 1, other) {
+                    continue;
+                }
+                all += 1;
+                if self.exists(body, coarse + 1, other) {
+                    taken += 1;
+                    // Eq. 12: half of the finer volume on an axis, a quarter on a diagonal.
+                    volume -= cell(coarse + 1) >> halves(other);
+                }
+            }
+            complete &= taken == all && all > 0;
+            if complete {
+                level = coarse + 1;
+            }
+            if taken == 0 {
+                break;
+            }
+            here = here.map(|x| 2 * x);
+        }
+        let scale = cell(0) as f64;
+        Some(Node {
+            level,
+            share: volume as f64 / scale,
+            whole: volume == cell(level),
+        })
+    }
+
+    /// Whether a node lies next to coarser ones: whether there is no node, but could be one, at any place of
+    /// its level's grid that is at most `reach` away. The node is given in steps of the finest level, `edges`
+    /// and `reach` in the same unit of length.
+    pub fn is_at_coarser(
+        &self,
+        body: &impl Fn(Place) -> bool,
+        (level, place): (u32, Place),
+        edges: [f64; 3],
+        reach: f64,
+    ) -> bool {
+        if level == 0 {
+            return false;
+        }
+        let here = place.map(|x| x >> (self.finest() - level));
+        let steps = |k: usize| match k < self.dimension {
+            true => (reach / edges[k]).floor() as i64,
+            false => 0,
+        };
+        let low = std::array::from_fn(|k| -steps(k));
+        let high = std::array::from_fn(steps);
+        between(low, high).any(|offset| {
+            let square: f64 = (0..3).map(|k| (offset[k] as f64 * edges[k]).powi(2)).sum();
+            let other = std::array::from_fn(|k| here[k] + offset[k]);
+            square <= reach * reach
+                && possible(body, level, other)
+                && !self.exists(body, level, other)
+        })
+    }
+}
+
+/// Whether there could be a node at a place, in steps of a level's spacing: whether the nodes of level 0
+/// around it are the body's.
+fn possible(body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
+    let low = place.map(|x| x >> level);
+    let high = place.map(|x| (x + (1 << level) - 1) >> level);
+    between(low, high).all(body)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// All nodes of the body by place, in steps of the finest level.
+    fn nodes(pattern: &Pattern, body: &impl Fn(Place) -> bool, edge: i64) -> Vec<(Place, Node)> {
+        let end = edge << pattern.finest();
+        let high = std::array::from_fn(|k| if k < pattern.dimension { end } else { 0 });
+        between([0; 3], high)
+            .filter_map(|place| Some((place, pattern.node(body, place)?)))
+            .collect()
+    }
+
+    #[test]
+    fn volumes_at_interfaces_are_those_of_the_paper() {
+        // What is taken from the node (0, 0), in volumes of the finer level.
+        let taken = |bottom: i64, refined: &[[i64; 2]]| {
+            let body = |cell: Place| cell[1] >= bottom;
+            let mut pattern = Pattern::new(2, 1);
+            for [x, y] in refined {
+                pattern.refine(&body, 0, [*x, *y, 0]);
+            }
+            let node = pattern.node(&body, [0; 3]).unwrap();
+            4.0 * (1.0 - node.share)
+        };
+        assert_eq!(taken(-9, &[]), 0.0);
+        assert_eq!(taken(-9, &[[1, 1]]), 0.25);
+        // Two finer nodes and four are there along the edge of a body.
+        assert_eq!(taken(0, &[[1, 0]]), 0.75);
+        assert_eq!(taken(-9, &[[1, 0]]), 1.0);
+        assert_eq!(taken(0, &[[1, 0], [0, 1]]), 1.5);
+        assert_eq!(taken(-9, &[[1, 0], [0, 1]]), 1.75);
+        // All eight: what is left is a cell of the finer level.
+        assert_eq!(taken(-9, &[[0, 0]]), 3.0);
+    }
+
+    #[test]
+    fn a_refined_node_is_of_the_finer_level_at_an_edge_too() {
+        let body = |cell: Place| cell[..2].iter().all(|x| (0..5).contains(x));
+        let mut pattern = Pattern::new(2, 2);
+        pattern.refine(&body, 0, [0, 2, 0]);
+        let node = pattern.node(&body, [0, 8, 0]).unwrap();
+        assert_eq!((node.level, node.whole), (1, false));
+        let inner = pattern.node(&body, [4, 8, 0]).unwrap();
+        assert_eq!((inner.level, inner.whole), (0, false));
+        let at_coarser = |x, reach| pattern.is_at_coarser(&body, (1, [x, 8, 0]), [0.5; 3], reach);
+        assert!(!at_coarser(0, 0.5) && at_coarser(0, 1.2));
+        assert!(!at_coarser(2, 0.5) && at_coarser(2, 0.75));
+    }
+
+    /// Refined at random, some nodes twice or three times over.
+    fn check(dimension: usize, edge: i64, finest: u32, holes: &[Place], picks: &[(u32, Place)]) {
+        let within = |cell: Place| (0..dimension).all(|k| (0..edge).contains(&cell[k]));
+        let body = |cell: Place| within(cell) && !holes.contains(&cell);
+        let mut pattern = Pattern::new(dimension, finest);
+        for (level, place) in picks {
+            let place = std::array::from_fn(|k| if k < dimension { place[k] } else { 0 });
+            let level = level % finest;
+            if pattern.exists(&body, level, place) {
+                pattern.refine(&body, level, place);
+            }
+        }
+        let nodes = nodes(&pattern, &body, edge);
+        let high = std::array::from_fn(|k| if k < dimension { edge } else { 0 });
+        let cells = between([0; 3], high).filter(|cell| body(*cell)).count() as f64;
+        let volume: f64 = nodes.iter().map(|(_, node)| node.share).sum();
+        assert!((volume / cells - 1.0).abs() < 1e-13, "{volume} for {cells}");
+        for (place, node) in &nodes {
+            assert!(node.share > 0.0, "{place:?}: {node:?}");
+        }
+        for (level, place) in pattern.refined() {
+            assert!(pattern.exists(&body, level, place));
+            for parent in parents(place).filter(|_| level > 0) {
+                assert!(pattern.refined[level as usize - 1].contains(&parent));
+            }
+        }
+        // A node and the next one in a row differ by one level at most.
+        for (place, node) in &nodes {
+            for k in 0..dimension {
+                let next = (1..=1 << finest).find_map(|step| {
+                    let mut other = *place;
+                    other[k] += step;
+                    pattern.node(&body, other)
+                });
+                if let Some(next) = next {
+                    assert!(node.level.abs_diff(next.level) <= 1, "{place:?} {k}");
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn volume_is_kept_in_the_plane(
+            holes in prop::collection::vec([0_i64..7, 0_i64..7, 0_i64..1], 0..6),
+            picks in prop::collection::vec((0_u32..3, [0_i64..28, 0_i64..28, 0_i64..1]), 0..40),
+        ) {
+            check(2, 7, 3, &holes, &picks);
+        }
+
+        #[test]
+        fn volume_is_kept_in_space(
+            holes in prop::collection::vec([0_i64..4, 0_i64..4, 0_i64..4], 0..6),
+            picks in prop::collection::vec((0_u32..2, [0_i64..8, 0_i64..8, 0_i64..8]), 0..12),
+        ) {
+            check(3, 4, 2, &holes, &picks);
+        }
+    }
+}

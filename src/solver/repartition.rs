@@ -1,0 +1,128 @@
+//! Dealing the points out anew during a run, when ranks have become unequal.
+//!
+//! Points go to their new ranks as a restart on other ranks would bring them there: the state by id, bonds
+//! found anew, and what is kept of them put back. So nothing of the result depends on it.
+
+use std::time::{Duration, Instant};
+
+use crate::comm::{self, IdOrder, all_gather};
+use crate::deck::plan::Balance;
+use crate::error::Result;
+use crate::partition::Cost;
+use crate::points::Point;
+
+use super::Simulation;
+
+/// A repartition; the same on all ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repartition {
+    /// Time for bonds of the slowest rank, as a multiple of the mean, before it.
+    pub imbalance: f64,
+    /// Number of points that changed their rank.
+    pub moved: u64,
+    /// Wall-clock time of the slowest rank, s.
+    pub seconds: f64,
+}
+
+/// When ranks are looked at, and what they were when they were.
+pub struct BalanceWatch {
+    rule: Option<Balance>,
+    seen: Duration,
+}
+
+impl BalanceWatch {
+    /// For a run that begins or goes on.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
+        // One rank is always balanced.
+        let rule = simulation
+            .plan
+            .balance
+            .filter(|_| simulation.comm.size() > 1);
+        Self {
+            rule,
+            seen: simulation.times.forces.bonds,
+        }
+    }
+
+    /// Deals the points out anew, if it is time to look and the ranks have become too unequal. Collective.
+    ///
+    /// # Errors
+    /// When METIS fails; the same on all ranks.
+    pub fn look<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+    ) -> Result<Option<Repartition>> {
+        let Some(rule) = self.rule else {
+            return Ok(None);
+        };
+        if !simulation.clock.number().is_multiple_of(rule.every_steps) {
+            return Ok(None);
+        }
+        let now = simulation.times.forces.bonds;
+        let own = (now - self.seen).as_nanos() as u64;
+        self.seen = now;
+        let all = all_gather(simulation.comm, own);
+        let most = all.iter().copied().max().unwrap_or(0) as f64;
+        let mean = all.iter().sum::<u64>() as f64 / all.len() as f64;
+        if most <= rule.imbalance * mean {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let moved = simulation.repartition(own)?;
+        self.seen = simulation.times.forces.bonds;
+        let mut seconds = [start.elapsed().as_secs_f64()];
+        simulation.comm.max(&mut seconds);
+        Ok(Some(Repartition {
+            imbalance: most / mean,
+            moved,
+            seconds: seconds[0],
+        }))
+    }
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// The owned points, as they travel between ranks.
+    fn pieces(&self) -> Vec<Point> {
+        let model = &self.model;
+        let point = |k: usize| {
+            let block = usize::from(model.block[k]);
+            Point::new(model.ids[k], model.position(k), model.volume[k], block)
+        };
+        (0..model.owned()).map(point).collect()
+    }
+
+    /// The way from the owned points to the order of ids. Collective.
+    pub fn id_order(&self) -> IdOrder {
+        let model = &self.model;
+        IdOrder::new(self.comm, &model.ids[..model.owned()], model.coarsest)
+    }
+
+    /// Deals the points out anew, this rank's having taken so much time (ns) lately. Returns how many have
+    /// changed their rank over all ranks. Collective.
+    ///
+    /// # Errors
+    /// When METIS fails; the same on all ranks.
+    pub fn repartition(&mut self, time: u64) -> Result<u64> {
+        let saved = self.save(&self.id_order());
+        let pieces = self.pieces();
+        let mut before: Vec<u64> = pieces.iter().map(|point| point.id).collect();
+        before.sort_unstable();
+        let cost = Cost::of(time, pieces.len());
+        let mut other = Self::of_points(
+            self.plan,
+            self.comm,
+            (pieces, self.model.coarsest),
+            Some(cost),
+            &mut || Ok(()),
+        )?;
+        let order = other.id_order();
+        other.steps.clone_from(&self.steps);
+        other.restore(&order, &saved)?;
+        other.clock = self.clock;
+        other.times = self.times;
+        *self = other;
+        let ids = &self.model.ids[..self.model.owned()];
+        let came = ids.iter().filter(|id| before.binary_search(id).is_err());
+        Ok(comm::total(self.comm, came.count() as u64))
+    }
+}
