@@ -20,7 +20,7 @@ const RAYLEIGH_SPEED: f64 = 3100.0;
 fn cracked(reader: &ResultReader, output: usize) -> Vec<Vec<bool>> {
     let damage = reader.field("damage", output).unwrap();
     let mut cracked = vec![vec![false; ROWS]; COLUMNS];
-    for (id, damage) in reader.ids().unwrap().iter().zip(damage) {
+    for (id, damage) in reader.ids(0).unwrap().iter().zip(damage) {
         let id = *id as usize;
         cracked[id % COLUMNS][id / COLUMNS] = damage > CRACKED;
     }

@@ -232,6 +232,10 @@ fn same_everywhere(name: &str, text: &str, must_break: bool) {
                 };
                 let broken = last("broken_bonds");
                 assert_eq!(broken > 0.0, must_break, "{broken} bonds broke");
+                if text.contains("[refinement.trigger]") {
+                    let points = &found["history points"];
+                    assert!(points.last() > points.first(), "no point was born");
+                }
                 if text.contains("yield_stretch") {
                     assert!(last("dissipated_energy") > 0.0, "no bond has yielded");
                 }
@@ -271,6 +275,33 @@ fn bonds_as_long_as_the_volume_correction_reaches() {
 #[test]
 fn a_plate_with_refined_parts() {
     same_everywhere("refined", &refined("delta"), true);
+}
+
+/// A plate that gets finer where it is strained and torn, up to twice.
+fn growing() -> String {
+    let plate = PLATE.replace("end = 12e-6", "end = 3e-6");
+    let plate = plate.replace("fracture_energy = 20", "fracture_energy = 0.5");
+    format!(
+        "{plate}
+        [refinement]
+        levels = 2
+        [refinement.region.side]
+        where = 'x > 36*dx'
+        level = 1
+        [refinement.trigger]
+        energy = 0.4
+        damage = 0.3
+        where = 't > 1e-6 && x < 3*dx && y > 0'
+        every_steps = 5
+        [checkpoint]
+        every_steps = 9
+        {RESTLESS}"
+    )
+}
+
+#[test]
+fn a_plate_that_is_refined_while_it_is_torn_and_dealt_out_anew() {
+    same_everywhere("growing", &growing(), true);
 }
 
 /// One rank is always slower than the mean.

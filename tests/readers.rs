@@ -86,9 +86,9 @@ fn a_result_of_some_points_in_single_precision() {
         run(&name, &shorter, ranks, &[]);
         let path = run(&name, &small, 4 - ranks, &["--restart"]);
         let reader = ResultReader::open(&path).unwrap();
-        let ids = reader.ids().unwrap();
-        let expected = whole.ids().unwrap();
-        let positions = whole.positions().unwrap();
+        let ids = reader.ids(0).unwrap();
+        let expected = whole.ids(0).unwrap();
+        let positions = whole.positions(0).unwrap();
         let is_in = |id: &u64| (3.0..7.2).contains(&positions[*id as usize][0]);
         let expected: Vec<u64> = expected.into_iter().filter(is_in).collect();
         assert_eq!(ids, expected);

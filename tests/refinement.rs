@@ -1,6 +1,7 @@
 //! Refined grids: volumes, forces between levels, energies under a uniform strain.
 
 use fissure::comm::sum::{ExactSum, reduce};
+use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 
 use crate::support::{displace, plan, simulate, simulate_on};
@@ -200,4 +201,230 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     assert!(least < 0.5, "{least}");
     let [least, most] = energies("", patch);
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
+}
+
+/// A notched plate that is torn and refined where it is strained most, in three places by the end.
+const TORN: &str = "dimension = 'plane-stress'
+    thickness = 1e-3
+    parameters.dx = 1e-3
+    grid = { spacing = 'dx', horizon = '3*dx' }
+    material.glass.pmb = { density = 2440, youngs_modulus = 72e9 }
+    damage.brittle.critical_stretch = { fracture_energy = 5, alpha = 0.25 }
+    body.plate = { material = 'glass', damage = 'brittle', shape.box = { lower = [0, -8e-3], upper = [24e-3, 8e-3] } }
+    crack.notch.segment = { from = [0, 0], to = ['12*dx', 0] }
+    initial.pull.velocity = ['40*sin(200*x)', '2000*y*(1 + 10*x)']
+    refinement.levels = 2
+    refinement.trigger = { energy = 0.6, damage = 0.5, every_steps = 6 }
+    refinement.region.side = { where = 'x > 22*dx', level = 1 }
+    time.end = 1e-5
+    ";
+
+/// Makes steps and refines as a run does; deals the points out anew now and then.
+fn go_on(simulation: &mut Simulation<'_, 2>, steps: u64) {
+    for step in 1..=steps {
+        simulation.advance();
+        if simulation.is_refinement_due() {
+            simulation.refine().unwrap();
+        }
+        if step.is_multiple_of(5) && simulation.comm.size() > 1 {
+            let unequal = 1000 * (1 + simulation.comm.rank() as u64);
+            simulation.repartition(unequal).unwrap();
+        }
+        simulation.check().unwrap();
+    }
+}
+
+#[test]
+fn refined_runs_are_the_same_on_any_number_of_ranks() {
+    let states = |ranks: usize| {
+        let found = simulate_on::<2, _>(ranks, TORN, |mut simulation| {
+            let before = simulation.model.total;
+            go_on(&mut simulation, 30);
+            assert!(
+                simulation.model.total > before + 100,
+                "{}",
+                simulation.model.total
+            );
+            let snapshot = Snapshot::new(&mut simulation);
+            let (model, fields) = (&simulation.model, &simulation.fields);
+            let freed = fields.freed_energy.as_ref().expect("bonds break");
+            let state = |k: usize| {
+                let numbers = [
+                    fields.displacement[0][k],
+                    fields.displacement[1][k],
+                    fields.velocity[0][k],
+                    fields.velocity[1][k],
+                    freed[k],
+                    snapshot.stored.energy[k],
+                    snapshot.damage(&simulation.family_volume, k),
+                    model.volume[k],
+                    simulation.clock.time(),
+                    simulation.refined.energy,
+                ];
+                (model.ids[k], numbers.map(f64::to_bits))
+            };
+            (0..model.owned()).map(state).collect::<Vec<_>>()
+        });
+        let mut all = found.concat();
+        all.sort_unstable();
+        all
+    };
+    let expected = states(1);
+    let broken = |state: &&(u64, [u64; 10])| f64::from_bits(state.1[4]) > 0.0;
+    assert!(expected.iter().filter(broken).count() > 10, "no bond broke");
+    for ranks in 2..=4 {
+        assert!(states(ranks) == expected, "on {ranks} ranks");
+    }
+}
+
+/// Mass, momentum by component, energy set free, and volume.
+fn sums(simulation: &Simulation<'_, 2>) -> Vec<f64> {
+    let (model, fields) = (&simulation.model, &simulation.fields);
+    let freed = fields.freed_energy.as_ref().expect("bonds break");
+    let mut sums = [const { ExactSum::ZERO }; 4];
+    for point in 0..model.owned() {
+        let mass = model.density_of(point) * model.volume[point];
+        sums[0].add(mass);
+        sums[1].add(mass * fields.velocity[0][point]);
+        sums[2].add(mass * fields.velocity[1][point]);
+        sums[3].add(freed[point]);
+    }
+    reduce(simulation.comm, &mut sums)
+}
+
+#[test]
+fn births_keep_mass_momentum_and_the_energy_set_free() {
+    // Not symmetric, so that there is momentum both ways.
+    let text = TORN.replace("2000*y*(1 + 10*x)", "2000*y*(1 + 10*x) + 3");
+    for ranks in [1, 3] {
+        simulate_on::<2, _>(ranks, &text, |mut simulation| {
+            let mut births = 0;
+            for _ in 0..30 {
+                simulation.advance();
+                if !simulation.is_refinement_due() {
+                    continue;
+                }
+                let before = sums(&simulation);
+                births += simulation.refine().unwrap();
+                let after = sums(&simulation);
+                for (before, after) in before.iter().zip(&after) {
+                    assert!(
+                        (after - before).abs() <= 1e-12 * before.abs(),
+                        "{before} {after}"
+                    );
+                }
+            }
+            assert!(births > 100, "{births}");
+        });
+    }
+}
+
+#[test]
+fn new_bonds_do_not_join_what_a_crack_has_parted() {
+    let text = TORN.replace(
+        "energy = 0.6, damage = 0.5, every_steps = 6",
+        "where = 'x > 12*dx', every_steps = 1",
+    );
+    simulate::<2, _>(&text, |mut simulation| {
+        // A crack from the tip of the notch to the right, along a row of faces.
+        let y: Vec<f64> = simulation.model.reference[1].clone();
+        let (x, limit) = (simulation.model.reference[0].clone(), 18e-3);
+        simulation
+            .forces
+            .cut(|a, b| y[a] * y[b] < 0.0 && 0.5 * (x[a] + x[b]) < limit);
+        simulation.advance();
+        assert!(simulation.refine().unwrap() > 100);
+        let model = &simulation.model;
+        let (x, y) = (&model.reference[0], &model.reference[1]);
+        let on_the_crack = |k: usize| y[k].abs() < 1e-9 && x[k] < limit - 1e-3;
+        assert!(!(0..model.owned()).any(on_the_crack), "born in the crack");
+        let mut joined = 0;
+        simulation.forces.for_each_intact(|a, b| {
+            let above = |point: usize| y[point] > -1e-9;
+            let crossing = x[a] + (x[b] - x[a]) * y[a] / (y[a] - y[b]);
+            if above(a) != above(b) {
+                assert!(
+                    crossing > limit - 1e-3,
+                    "{} {} {} {}",
+                    x[a],
+                    y[a],
+                    x[b],
+                    y[b]
+                );
+                joined += 1;
+            }
+        });
+        assert!(joined > 0, "nothing joins the halves ahead of the crack");
+    });
+}
+
+/// The sum of the loads by component, N.
+fn loads<const D: usize>(text: &str) -> [f64; D] {
+    simulate::<D, _>(text, |simulation| {
+        let external = simulation.fields.external_force.as_ref().expect("loads");
+        let volume = &simulation.model.volume;
+        let sum = |d: usize| external[d].iter().zip(volume).map(|(f, v)| f * v).sum();
+        std::array::from_fn(sum)
+    })
+}
+
+#[test]
+fn a_load_keeps_its_sum_on_a_refined_layer() {
+    let pulled = plate(
+        "set.top.where = 'y > 15'
+        condition.pull = { set = 'top', traction = [3, 'if(x < 10, 7, -2)'] }
+        condition.side = { set = 'side', force = [0, 11] }
+        set.side.where = 'x < 2'",
+    );
+    for layer in ["y > 12 && x < 9", "x < 9", "y > 15 && x > 3"] {
+        let text = pulled.replace("(x - 13)^2 + (y - 8)^2 < 9", layer);
+        let [x, y] = loads::<2>(&text);
+        // Area 20 m × 0.5 m; the load changes its sign midway.
+        assert!((x - 30.0).abs() < 1e-12, "{layer}: {x}");
+        assert!((y - 36.0).abs() < 1.0, "{layer}: {y}");
+    }
+    let block = format!(
+        "{BLOCK}
+        set.floor.where = 'z < 2'
+        condition.press = {{ set = 'floor', traction = [1, 2, -4], depth = 2 }}"
+    );
+    let expected = [72.0, 144.0, -288.0];
+    for (found, expected) in loads::<3>(&block).into_iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-11, "{found} {expected}");
+    }
+}
+
+#[test]
+fn points_are_triggers_only_where_they_may_be() {
+    let text = TORN.replace(
+        "every_steps = 6",
+        "every_steps = 1, only = 'x < 6*dx && t > 1e-7'",
+    );
+    let text = text
+        .replace("energy = 0.6, damage = 0.5", "where = 'true'")
+        .replace("'true'", "'y < 0'");
+    simulate::<2, _>(&text, |mut simulation| {
+        assert!(simulation.is_refinement_due());
+        assert_eq!(simulation.refine().unwrap(), 0, "at the start");
+        go_on(&mut simulation, 8);
+        assert!(simulation.clock.time() > 1e-7);
+        let model = &simulation.model;
+        let fine = |point: &usize| {
+            simulation
+                .plan
+                .block(usize::from(model.block[*point]))
+                .level
+                > 0
+        };
+        let born = (0..model.owned())
+            .filter(fine)
+            .filter(|k| model.reference[0][*k] < 15e-3);
+        let (mut number, mut farthest) = (0, 0.0_f64);
+        for point in born {
+            number += 1;
+            farthest = farthest.max(model.reference[0][point]);
+        }
+        // Two levels, each seen from a horizon away.
+        assert!(number > 50 && farthest < 12e-3, "{number} {farthest}");
+    });
 }

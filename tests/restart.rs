@@ -120,12 +120,26 @@ fn kill_after(mut command: Command, ranks: usize, delay: Duration) -> bool {
 
 #[test]
 fn killed_at_any_moment_and_continued_on_any_number_of_ranks() {
-    // A checkpoint every 15 steps, so that kills hit their writing as well. The long form of this
-    // test is scripts/kill_test.
+    survives_kills("kills", &plate("3e-5", "checkpoint.every_steps = 15"));
+}
+
+#[test]
+fn killed_while_the_grid_grows_and_continued_on_any_number_of_ranks() {
+    let more = "checkpoint.every_steps = 15
+        refinement = { levels = 1, trigger = { damage = 0.2, energy = 0.5, every_steps = 25 } }
+        balance = { every_steps = 70, imbalance = 1 }";
+    survives_kills(
+        "kills-growing",
+        &plate("6e-6", more).replace("step = 1e-8", "step = 5e-9"),
+    );
+}
+
+/// A run of a deck, with a checkpoint every 15 steps so that kills hit their writing as well. The long
+/// form is scripts/kill_test.
+fn survives_kills(name: &str, text: &str) {
     let kills: usize = std::env::var("FISSURE_KILLS").map_or(6, |text| text.parse().unwrap());
-    let folder = Folder::new("kills");
-    let text = plate("3e-5", "checkpoint.every_steps = 15");
-    let deck = folder.write("deck.toml", &text);
+    let folder = Folder::new(name);
+    let deck = folder.write("deck.toml", text);
     let whole = folder.join("whole");
     let begin = Instant::now();
     succeed(&mut run(2, &deck, &whole, &[]));

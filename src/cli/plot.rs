@@ -86,8 +86,7 @@ struct Look<'a> {
     unit: String,
     components: usize,
     has_displacement: bool,
-    positions: Vec<[f64; 3]>,
-    sizes: Vec<f64>,
+    section: f64,
     range: Option<(f64, f64)>,
     view: View,
     /// Lines over the picture, file by file.
@@ -117,18 +116,12 @@ impl<'a> Look<'a> {
             return Err(Error::input("--path is for results of plane problems"));
         }
         let paths = arguments.path.iter().map(|path| plot_paths::read(path));
-        let power = 1.0 / dimension as f64;
-        let volumes = result.field("volume", 0)?;
         Ok(Self {
             title: attribute("title"),
             unit: field.unit.clone(),
             components: field.components,
             has_displacement: fields.iter().any(|field| field.name == "displacement"),
-            positions: result.positions()?,
-            sizes: volumes
-                .iter()
-                .map(|volume| (volume / section).powf(power))
-                .collect(),
+            section,
             range: arguments.range.as_deref().map(range).transpose()?,
             view: view(arguments.slice.as_deref(), dimension)?,
             paths: paths.collect::<Result<_>>()?,
@@ -142,12 +135,13 @@ impl<'a> Look<'a> {
         if self.has_displacement {
             self.result.field("displacement", index)
         } else {
-            Ok(vec![0.0; 3 * self.positions.len()])
+            Ok(vec![0.0; 3 * self.result.points(index)])
         }
     }
 
     /// A factor of 1, 2 or 5 times a power of ten that makes displacements visible.
     fn automatic_factor(&self, index: usize) -> Result<f64> {
+        let positions = self.result.positions(index)?;
         let values = self.displacements(index)?;
         let largest = values
             .iter()
@@ -155,7 +149,7 @@ impl<'a> Look<'a> {
             .fold(0.0_f64, |a, u| a.max(u.abs()));
         let extent = (0..3)
             .map(|d| {
-                let along = || self.positions.iter().map(|position| position[d]);
+                let along = || positions.iter().map(|position| position[d]);
                 along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
             })
             .fold(0.0, f64::max);
@@ -180,13 +174,17 @@ impl<'a> Look<'a> {
                 .collect(),
         };
         let displacements = self.displacements(index)?;
-        let positions: Vec<[f64; 3]> = self
-            .positions
+        let power = 1.0 / self.dimension as f64;
+        let volumes = self.result.field("volume", index)?;
+        let edge = |volume: &f64| (volume / self.section).powf(power);
+        let sizes: Vec<f64> = volumes.iter().map(edge).collect();
+        let places = self.result.positions(index)?;
+        let positions: Vec<[f64; 3]> = places
             .iter()
             .zip(displacements.chunks_exact(3))
             .map(|(x, u)| std::array::from_fn(|d| x[d] + factor * u[d]))
             .collect();
-        let lines = self.moved_paths(&displacements, factor);
+        let lines = self.moved_paths(&places, &displacements, factor);
         let title = format!(
             "{}   t = {}   deformation × {factor}",
             self.title,
@@ -195,7 +193,7 @@ impl<'a> Look<'a> {
         let image = render(&Scene {
             dimension: self.dimension,
             positions: &positions,
-            sizes: &self.sizes,
+            sizes: &sizes,
             values: &values,
             field: &self.arguments.field,
             unit: match self.unit.as_str() {
@@ -217,10 +215,15 @@ impl<'a> Look<'a> {
 impl Look<'_> {
     /// The lines to draw, each with the number of its file: every vertex moves with the point that is
     /// nearest to it.
-    fn moved_paths(&self, displacements: &[f64], factor: f64) -> Vec<(usize, Vec<[f64; 3]>)> {
+    fn moved_paths(
+        &self,
+        positions: &[[f64; 3]],
+        displacements: &[f64],
+        factor: f64,
+    ) -> Vec<(usize, Vec<[f64; 3]>)> {
         let moved = |place: &[f64; 2]| {
             let distance = |point: &[f64; 3]| (point[0] - place[0]).hypot(point[1] - place[1]);
-            let points = self.positions.iter().zip(displacements.chunks_exact(3));
+            let points = positions.iter().zip(displacements.chunks_exact(3));
             let nearest = points.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
             let [x, y] = nearest.map_or([0.0; 2], |(_, u)| [u[0], u[1]]);
             [place[0] + factor * x, place[1] + factor * y, 0.0]

@@ -146,6 +146,15 @@ impl Observer for Log {
                     say!("  {name:<17}{what}");
                 }
             }
+            Message::Refined {
+                number,
+                born,
+                points,
+            } if self.speaks && self.verbose => {
+                let (born, points) = (count(*born), count(*points));
+                let aside = || say!("after step {number}: {born} new points, {points} in all");
+                self.progress.aside(aside);
+            }
             Message::Repartitioned { number, what } if self.speaks && self.verbose => {
                 let Repartition {
                     imbalance,

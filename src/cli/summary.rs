@@ -29,9 +29,14 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    line("bond updates", si(bond_updates(summary), "/s"));
+    // With other points it would be that of the last ones.
+    let regrids = summary.seconds.regridding > 0.0;
+    if !regrids {
+        line("bond updates", si(bond_updates(summary), "/s"));
+    }
     say!("time by phase");
-    for (name, seconds) in phases(&summary.seconds) {
+    let phases = phases(&summary.seconds).into_iter();
+    for (name, seconds) in phases.filter(|(name, _)| regrids || *name != REGRIDDING) {
         let share = 100.0 * seconds / summary.seconds.whole;
         say!("  {name:<17}{seconds:8.3} s {share:5.1} %");
     }
@@ -56,13 +61,17 @@ pub fn print(outcome: &Outcome, threads: usize) {
     );
 }
 
+/// The phase that most runs have not.
+const REGRIDDING: &str = "other points";
+
 /// Names and times (s) of the phases.
-fn phases(seconds: &Phases) -> [(&'static str, f64); 7] {
+fn phases(seconds: &Phases) -> [(&'static str, f64); 8] {
     [
         ("set-up", seconds.set_up),
         ("bonds", seconds.bonds),
         ("halo", seconds.halo),
         ("motion", seconds.motion),
+        (REGRIDDING, seconds.regridding),
         ("output", seconds.output),
         ("checkpoints", seconds.checkpoints),
         ("whole run", seconds.whole),

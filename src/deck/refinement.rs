@@ -3,13 +3,16 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, HorizonRule};
-use super::number::Number;
+use super::number::{Number, shown};
 use super::plan::{self, PointSource};
-use super::resolve::{POSITION, Scope};
+use super::resolve::{ALL_VARIABLES, POSITION, Scope};
 use crate::error::Result;
 
 /// The finest level; there the spacing is a 64th.
 const FINEST: u64 = 6;
+
+/// Shares of the largest energy, and damage.
+const SHARE: std::ops::Range<f64> = f64::MIN_POSITIVE..1.0 + f64::EPSILON;
 
 /// By how much m = δ/dx grows from level to level if nothing is said (Dipasquale et al. 2014, table 2).
 const RISE: f64 = 1.0;
@@ -75,6 +78,60 @@ pub fn refinement(
         rule,
         interface_factor,
         regions: regions.collect::<Result<_>>()?,
+        trigger: trigger(scope, refinement, bodies)?,
+    }))
+}
+
+fn trigger(
+    scope: &Scope,
+    refinement: &grammar::Refinement,
+    bodies: &[plan::Body],
+) -> Result<Option<plan::Trigger>> {
+    let Some(table) = &refinement.trigger else {
+        return Ok(None);
+    };
+    let (key, trigger) = ("[refinement.trigger]", table.get_ref());
+    if trigger.energy.is_none() && trigger.damage.is_none() && trigger.condition.is_none() {
+        let message = format!("{key}: give at least one of `energy`, `damage` and `where`");
+        return Err(scope.error(table.span(), message));
+    }
+    // Those that a new point lies between must be in reach of its rank.
+    for body in bodies {
+        if let PointSource::Lattice { spacing, .. } = body.points {
+            let edges = spacing[..scope.dimension].iter();
+            let diagonal = edges.map(|edge| edge * edge).sum::<f64>().sqrt();
+            if body.horizon < diagonal {
+                let message = format!(
+                    "{key}: the horizon of [body.{}] must reach across a cell's diagonal, {} m",
+                    body.name,
+                    shown(diagonal)
+                );
+                return Err(scope.error(table.span(), message));
+            }
+        }
+    }
+    let share = |number: &Option<Number>, name: &str| {
+        let within = |number| {
+            scope.within(
+                number,
+                &format!("{key} {name}"),
+                SHARE,
+                "above 0 and at most 1",
+            )
+        };
+        number.as_ref().map(within).transpose()
+    };
+    let parse = |number: &Option<Number>, name: &str| {
+        let parse = |number| scope.expression(number, &format!("{key} {name}"), &ALL_VARIABLES);
+        number.as_ref().map(parse).transpose()
+    };
+    Ok(Some(plan::Trigger {
+        span: table.span(),
+        every_steps: trigger.every_steps.get_ref().get(),
+        energy: share(&trigger.energy, "energy")?,
+        damage: share(&trigger.damage, "damage")?,
+        condition: parse(&trigger.condition, "where")?,
+        only: parse(&trigger.only, "only")?,
     }))
 }
 

@@ -222,18 +222,23 @@ impl BondLattice {
     /// of both ends.
     fn for_each(&self, mut found: impl FnMut(usize, usize, [usize; 2])) {
         for k in 0..self.vectors.len() {
-            self.for_each_of(k, &mut found);
+            self.for_each_of(&self.store.intact, k, &mut found);
         }
     }
 
-    /// As [`Self::for_each`], of one vector.
-    fn for_each_of(&self, vector: usize, found: &mut impl FnMut(usize, usize, [usize; 2])) {
+    /// As [`Self::for_each`], of the bonds of one vector whose bits are given.
+    fn for_each_of(
+        &self,
+        bits: &[u8],
+        vector: usize,
+        found: &mut impl FnMut(usize, usize, [usize; 2]),
+    ) {
         let first = vector * self.offsets.len();
         let vector = &self.vectors[vector];
         let shifts = &self.shifts[vector.line as usize * self.around.len()..];
         for (o, offset) in self.offsets.iter().enumerate() {
             let byte = first + o;
-            let mut bits = self.store.intact[byte];
+            let mut bits = bits[byte];
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
@@ -267,7 +272,7 @@ impl BondLattice {
     /// See [`super::BlockBonds::for_each_neighbour`].
     pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
         if let Some(vector) = self.vector_of(point) {
-            self.for_each_of(vector, &mut |_, _, [here, there]| {
+            self.for_each_of(&self.store.intact, vector, &mut |_, _, [here, there]| {
                 if here == point {
                     found(there);
                 }
@@ -300,6 +305,17 @@ impl BondLattice {
     /// Calls `found` with the local indices of both ends of every intact bond.
     pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
         self.for_each(|_, _, [here, there]| found(here, there));
+    }
+
+    /// Calls `found` with the local indices of both ends of every broken bond.
+    pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
+        let mut broken = self.whole();
+        for (bits, intact) in broken.iter_mut().zip(&self.store.intact) {
+            *bits &= !intact;
+        }
+        for k in 0..self.vectors.len() {
+            self.for_each_of(&broken, k, &mut |_, _, [here, there]| found(here, there));
+        }
     }
 
     /// Bytes of a checkpoint that the bonds of a point take.

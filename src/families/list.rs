@@ -179,6 +179,20 @@ impl BondList {
         }
     }
 
+    /// Calls `found` with the local indices of both ends of every broken bond.
+    pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
+        for row in 0..self.points.len() {
+            let own = self.points[row];
+            for group in self.starts[row]..self.starts[row + 1] {
+                for (k, there) in self.neighbours[group].iter().enumerate() {
+                    if *there != own && self.store.intact[group] >> k & 1 == 0 {
+                        found(own as usize, *there as usize);
+                    }
+                }
+            }
+        }
+    }
+
     /// Calls `found` with the number of each row, its point and the bytes of a checkpoint that its
     /// bonds take, which are the same on any number of ranks.
     pub fn for_each_row(&self, mut found: impl FnMut(usize, usize, usize)) {

@@ -95,6 +95,11 @@ impl BlockBonds {
         }
     }
 
+    /// Calls `found` with the local indices of both ends of every broken bond.
+    pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
+        with!(self, bonds => bonds.for_each_broken(found));
+    }
+
     /// Gives every bond so many numbers, which are 0.
     pub fn remember(&mut self, numbers: usize) {
         with!(self, bonds => bonds.store.remember(numbers));

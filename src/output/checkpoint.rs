@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::comm::{Communicator, IdOrder, agree};
 use crate::error::{Error, Result};
+use crate::refine::Pick;
 use crate::solver::motion::Saved;
 
 use super::access::Creation;
@@ -22,7 +23,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 4;
+const VERSION: i64 = 5;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +32,8 @@ pub struct Header {
     pub number: u64,
     /// Time step, s.
     pub step: f64,
+    /// How the grids are refined, see [`crate::refine::Grids::state`].
+    pub grids: [Vec<Pick>; 2],
     /// Number of points over all ranks.
     pub points: u64,
     /// A sum over the points that is the same only for the same points.
@@ -46,6 +49,9 @@ pub struct Header {
     /// How the run rounded a product and a sum, see [`crate::lanes::Instructions::rounding`].
     pub rounding: String,
 }
+
+/// The datasets of the state of the grids, which are there where it is not empty.
+const GRIDS: [&str; 2] = ["/refined", "/parted"];
 
 /// The two checkpoints of a folder.
 pub struct Checkpoints {
@@ -171,6 +177,16 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
         Some(&VERSION) => file.text_attribute("/", "rounding")?,
         _ => String::new(),
     };
+    let mut grids = [const { Vec::new() }; 2];
+    if let [VERSION, .., refined, parted] = numbers[..] {
+        for ((picks, name), count) in grids.iter_mut().zip(GRIDS).zip([refined, parted]) {
+            if count > 0 {
+                let dataset = file.open_dataset(name)?;
+                let rows: Vec<i64> = file.read_rows(&dataset, 0, count as usize)?;
+                *picks = rows.as_chunks().0.to_vec();
+            }
+        }
+    }
     file.close()?;
     match numbers[..] {
         [
@@ -183,9 +199,12 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             rows,
             energy,
             intact,
+            _,
+            _,
         ] => Ok(Header {
             number: number as u64,
             step: f64::from_bits(step as u64),
+            grids,
             points: points as u64,
             fingerprint: fingerprint as u64,
             outputs: outputs as u64,
@@ -246,12 +265,26 @@ fn write_file(
         header.rows as i64,
         header.start.0.to_bits() as i64,
         header.start.1 as i64,
+        header.grids[0].len() as i64,
+        header.grids[1].len() as i64,
     ];
     file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
     let progress: Vec<i64> = saved.progress.iter().map(|word| *word as i64).collect();
     file.set_attribute("/", "progress", Attribute::Integers(&progress))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
     file.set_attribute("/", "rounding", Attribute::Text(&header.rounding))?;
+    for (picks, name) in header.grids.iter().zip(GRIDS) {
+        if !picks.is_empty() {
+            let rows = Rows::Fixed(picks.len() as u64);
+            let dataset = file.create_dataset::<i64>(name, rows, Some(5))?;
+            let own = if comm.rank() == 0 {
+                picks.as_flattened()
+            } else {
+                &[]
+            };
+            file.write_rows(&dataset, 0, own)?;
+        }
+    }
     let points = Rows::Fixed(header.points);
     let (start, total) = crate::comm::scan(comm, saved.bonds.len() as u64);
     let values = file.create_dataset::<f64>("/values", points, Some(saved.width))?;

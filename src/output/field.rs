@@ -49,6 +49,17 @@ impl FieldData<'_> {
         }
     }
 
+    /// No values of the same kind.
+    pub(super) fn none(&self) -> FieldData<'static> {
+        match self {
+            FieldData::F64(_) => FieldData::F64(&[]),
+            FieldData::F32(_) => FieldData::F32(&[]),
+            FieldData::U64(_) => FieldData::U64(&[]),
+            FieldData::U32(_) => FieldData::U32(&[]),
+            FieldData::U8(_) => FieldData::U8(&[]),
+        }
+    }
+
     fn len(&self) -> usize {
         match self {
             FieldData::F64(values) => values.len(),

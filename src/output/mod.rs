@@ -3,6 +3,7 @@
 
 mod access;
 mod attribute;
+mod changing;
 pub mod checkpoint;
 mod collective;
 mod dataset;

@@ -54,7 +54,8 @@ pub struct StoredColumn {
 pub struct ResultReader {
     file: hdf5::File,
     path: PathBuf,
-    points: usize,
+    /// Number of points: one for all steps, or one for each.
+    counts: Vec<usize>,
     steps: usize,
 }
 
@@ -89,20 +90,29 @@ impl ResultReader {
             .and_then(|dataset| dataset.read_raw::<u64>())
             .as_deref()
         {
-            Ok([points]) => *points as usize,
-            _ => return problem("this VTKHDF file is not a result of Fissure: it has many parts"),
+            Ok(points) if !points.is_empty() => points
+                .iter()
+                .map(|count| *count as usize)
+                .collect::<Vec<_>>(),
+            _ => return problem("this VTKHDF file is not a result of Fissure: it has no points"),
         };
         Ok(Self {
             file,
             path: path.to_path_buf(),
-            points,
+            counts: points,
             steps: steps as usize,
         })
     }
 
-    /// The number of points.
-    pub fn points(&self) -> usize {
-        self.points
+    /// The number of points at one of the [times](Self::times).
+    pub fn points(&self, time_index: usize) -> usize {
+        self.counts[time_index.min(self.counts.len() - 1)]
+    }
+
+    /// Whether each step has its own points.
+    pub fn is_changing(&self) -> bool {
+        let id = self.file.dataset(&format!("{POINT_DATA}/id"));
+        id.is_ok_and(|dataset| dataset.is_resizable())
     }
 
     /// The times of the complete steps, in s.
@@ -121,30 +131,39 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// The reference positions, in m.
+    /// The rows of point data that are those of a time.
+    fn rows(&self, offsets: &str, time_index: usize) -> Result<std::ops::Range<usize>> {
+        let offsets: Vec<u64> = self.table(offsets)?;
+        let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);
+        Ok(first..first + self.points(time_index))
+    }
+
+    /// The reference positions at one of the [times](Self::times), in m.
     ///
     /// # Errors
     /// The file is damaged.
-    pub fn positions(&self) -> Result<Vec<[f64; 3]>> {
+    pub fn positions(&self, time_index: usize) -> Result<Vec<[f64; 3]>> {
         let path = "/VTKHDF/Points";
-        let read = self
-            .file
-            .dataset(path)
-            .and_then(|dataset| dataset.read_raw::<f64>());
+        let rows = self.rows(&format!("{STEPS}/PointOffsets"), time_index)?;
+        let read = self.file.dataset(path).and_then(|dataset| {
+            let values = dataset.read_slice_2d::<f64, _>((rows, ..))?;
+            Ok(values.into_iter().collect::<Vec<f64>>())
+        });
         let values = read.map_err(|error| self.damaged(path, &error))?;
         Ok(values.as_chunks::<3>().0.to_vec())
     }
 
-    /// The points' global ids, in the order of all other point data.
+    /// The points' global ids at one of the [times](Self::times), in the order of all other point data.
     ///
     /// # Errors
     /// The file is damaged or has no ids.
-    pub fn ids(&self) -> Result<Vec<u64>> {
+    pub fn ids(&self, time_index: usize) -> Result<Vec<u64>> {
         let path = format!("{POINT_DATA}/id");
-        let read = self
-            .file
-            .dataset(&path)
-            .and_then(|dataset| dataset.read_raw::<u64>());
+        let rows = self.rows(&format!("{STEPS}/PointDataOffsets/id"), time_index)?;
+        let read = self.file.dataset(&path).and_then(|dataset| {
+            let values = dataset.read_slice_1d::<u64, _>(rows)?;
+            Ok(values.into_iter().collect())
+        });
         read.map_err(|error| self.damaged(&path, &error))
     }
 
@@ -184,9 +203,7 @@ impl ResultReader {
                 "{file}: no time {time_index}; there are {steps}"
             )));
         }
-        let offsets: Vec<u64> = self.table(&format!("{STEPS}/PointDataOffsets/{name}"))?;
-        let first = offsets[time_index] as usize;
-        let rows = first..first + self.points;
+        let rows = self.rows(&format!("{STEPS}/PointDataOffsets/{name}"), time_index)?;
         let read = self.file.dataset(&path).and_then(|dataset| {
             Ok(if dataset.ndim() == 1 {
                 dataset.read_slice_1d::<f64, _>(rows)?.into_iter().collect()

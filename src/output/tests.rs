@@ -29,6 +29,7 @@ fn what_is_written_reads_back() -> Result<()> {
     let metadata = [("deck", "ω = 1".to_owned())];
     let contents = Contents {
         piece,
+        changing: false,
         positions: &positions,
         fixed: &fixed,
         moving: &moving,
@@ -67,8 +68,8 @@ fn what_is_written_reads_back() -> Result<()> {
     let reader = ResultReader::open(&path)?;
     assert_eq!(reader.times()?, [0.0, 0.5]);
     assert_eq!(reader.steps()?, [0, 100]);
-    assert_eq!(reader.positions()?, positions);
-    assert_eq!(reader.ids()?, [7, 3]);
+    assert_eq!(reader.positions(0)?, positions);
+    assert_eq!(reader.ids(0)?, [7, 3]);
     assert_eq!(
         reader.field("velocity", 1)?,
         [11.0, 12.0, 0.0, 13.0, 14.0, 0.0]

@@ -9,11 +9,15 @@
 //! /history/c             one number per history row and column
 //! ```
 //!
+//! Where points may be born during a run, each step has its own points and static fields, one after the
+//! other, and is a part of its own.
+//!
 //! The points are one part whatever the number of ranks, in the order of their ids. A step's data are flushed
 //! before its row of the tables: a file whose writer was killed holds all its complete steps.
 
 use super::access::Creation;
 use super::attribute::Attribute;
+use super::changing::{self, ChangingPoints};
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
 use super::field::{FieldData, FieldDescription, POINT_DATA, check, create_field, write_field};
@@ -24,19 +28,28 @@ use hdf5_metno::H5Type;
 use std::path::Path;
 
 /// VTK's number of a cell that is one point.
-const VTK_VERTEX: u8 = 1;
+pub(super) const VTK_VERTEX: u8 = 1;
 
 /// The group of the time steps.
 pub(super) const STEPS: &str = "/VTKHDF/Steps";
 
-/// What each step has one number of besides its time and number: the same in every step.
-const STEP_TABLES: [(&str, Option<usize>, i64); 5] = [
-    ("PartOffsets", None, 0),
-    ("NumberOfParts", None, 1),
-    ("PointOffsets", None, 0),
-    ("CellOffsets", Some(1), 0),
-    ("ConnectivityIdOffsets", Some(1), 0),
+/// What each step has one number of besides its time and number: the same in every step, or what is
+/// counted.
+const STEP_TABLES: [(&str, Option<usize>, i64, Counted); 5] = [
+    ("PartOffsets", None, 0, Counted::Steps),
+    ("NumberOfParts", None, 1, Counted::Nothing),
+    ("PointOffsets", None, 0, Counted::Points),
+    ("CellOffsets", Some(1), 0, Counted::Points),
+    ("ConnectivityIdOffsets", Some(1), 0, Counted::Points),
 ];
+
+/// What a number of a step counts where each step has its own points: those of the steps before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Counted {
+    Nothing,
+    Steps,
+    Points,
+}
 
 /// Which rows of the point data are this rank's; ranks follow each other without gaps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,8 +71,12 @@ pub struct ResultFile<'a> {
     points: usize,
     single: bool,
     steps: u64,
-    /// Times of the steps that were taken over from an earlier file, s.
-    past_times: Vec<f64>,
+    /// Time (s) and points of the steps that were taken over from an earlier file.
+    past: Vec<(f64, usize)>,
+    /// Points of all steps so far.
+    rows: u64,
+    /// What holds the points, if each step has its own.
+    changing: Option<ChangingPoints>,
     /// Steps that there is room for.
     capacity: u64,
     tables: Vec<Table>,
@@ -74,6 +91,7 @@ struct Table {
     dataset: Dataset,
     start: i64,
     stride: i64,
+    counted: Counted,
 }
 
 /// What a result file holds from the start.
@@ -81,6 +99,8 @@ struct Table {
 pub struct Contents<'a> {
     /// Which points are this rank's.
     pub piece: Piece,
+    /// Whether each step has its own points, given by [`ResultFile::set_points`].
+    pub changing: bool,
     /// Their reference positions, m.
     pub positions: &'a [[f64; 3]],
     /// Fields that do not change with time, with their values.
@@ -109,6 +129,7 @@ impl<'a> ResultFile<'a> {
     ) -> Result<Self> {
         let Contents {
             piece,
+            changing,
             positions,
             fixed,
             moving,
@@ -143,7 +164,12 @@ impl<'a> ResultFile<'a> {
         file.set_attribute("/VTKHDF", "Version", Attribute::Integers(&[2, 0]))?;
         file.set_attribute("/VTKHDF", "Type", Attribute::Ascii("UnstructuredGrid"))?;
         file.set_attribute(STEPS, "NSteps", Attribute::Integer(0))?;
-        write_geometry(&mut file, piece, positions)?;
+        let geometry = if changing {
+            Some(ChangingPoints::create(&mut file, piece.total, fixed)?)
+        } else {
+            write_geometry(&mut file, piece, positions)?;
+            None
+        };
 
         let mut result = Self {
             times: growing::<f64>(&mut file, "Values", steps)?,
@@ -152,18 +178,23 @@ impl<'a> ResultFile<'a> {
             piece,
             points,
             single,
-            past_times: Vec::new(),
+            past: Vec::new(),
             steps: 0,
+            rows: 0,
+            changing: geometry,
             capacity: 0,
             tables: Vec::new(),
             fields: Vec::new(),
             history: None,
         };
         for (field, data) in fixed {
-            let rows = Rows::Fixed(piece.total);
-            let dataset = create_field(&mut result.file, field, data, rows)?;
-            write_field(&mut result.file, &dataset, piece.first, field, data)?;
-            result.create_table(&offsets_path(field), None, steps, (0, 0))?;
+            if !changing {
+                let rows = Rows::Fixed(piece.total);
+                let dataset = create_field(&mut result.file, field, data, rows)?;
+                write_field(&mut result.file, &dataset, piece.first, field, data)?;
+            }
+            let rule = (0, 0, Counted::Points);
+            result.create_table(&offsets_path(field), None, steps, rule)?;
         }
         for field in moving {
             let per_append = piece.total;
@@ -175,11 +206,12 @@ impl<'a> ResultFile<'a> {
             };
             let dataset = create_field(&mut result.file, field, &empty, rows)?;
             result.fields.push((*field, dataset));
-            let offsets = (0, piece.total as i64);
-            result.create_table(&offsets_path(field), None, steps, offsets)?;
+            let rule = (0, piece.total as i64, Counted::Points);
+            result.create_table(&offsets_path(field), None, steps, rule)?;
         }
-        for (name, columns, value) in STEP_TABLES {
-            result.create_table(&format!("{STEPS}/{name}"), columns, steps, (value, 0))?;
+        for (name, columns, value, counted) in STEP_TABLES {
+            let rule = (value, 0, counted);
+            result.create_table(&format!("{STEPS}/{name}"), columns, steps, rule)?;
         }
         let file = &mut result.file;
         file.set_dataset_attribute(&result.times, "unit", Attribute::Text("s"))?;
@@ -207,7 +239,7 @@ impl<'a> ResultFile<'a> {
         let numbers = old.open_dataset(&format!("{STEPS}/Step"))?;
         let points = old.open_dataset("/VTKHDF/Points")?;
         let found = times.rows().min(numbers.rows());
-        let fits = if points.rows() != piece.total {
+        let fits = if !contents.changing && points.rows() != piece.total {
             Err(Error::run(format!("{}: has other points", path.display())))
         } else if found < kept {
             let text = format!("has {found} of the first {kept} outputs");
@@ -247,6 +279,10 @@ impl<'a> ResultFile<'a> {
     ) -> Result<Self> {
         let piece = contents.piece;
         let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
+        if contents.changing {
+            let counts = result.copy_changing(old, kept)?;
+            return result.note_steps(&times, &numbers, &counts);
+        }
         result.make_room(kept)?;
         for (field, values) in &result.fields {
             let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
@@ -261,16 +297,88 @@ impl<'a> ResultFile<'a> {
                 }
             }
         }
-        for (time, number) in times.into_iter().zip(numbers) {
-            append_one(&mut result.file, &mut result.numbers, number)?;
-            append_one(&mut result.file, &mut result.times, time)?;
-            result.past_times.push(time);
+        result.rows = kept * piece.total;
+        result.note_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
+    }
+
+    /// Takes note of the first steps, with so many points each.
+    fn note_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
+        for ((time, number), points) in times.iter().zip(numbers).zip(points) {
+            append_one(&mut self.file, &mut self.numbers, *number)?;
+            append_one(&mut self.file, &mut self.times, *time)?;
+            self.past.push((*time, *points as usize));
         }
-        result.steps = kept;
-        result
-            .file
-            .set_attribute(STEPS, "NSteps", Attribute::Integer(kept as i64))?;
-        Ok(result)
+        self.steps = times.len() as u64;
+        let steps = Attribute::Integer(self.steps as i64);
+        self.file.set_attribute(STEPS, "NSteps", steps)?;
+        Ok(self)
+    }
+
+    /// Copies the first steps of an old file, each with its own points; gives their numbers.
+    fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, kept: u64) -> Result<Vec<i64>> {
+        let Some(changing) = &mut self.changing else {
+            return Ok(Vec::new());
+        };
+        let counts = old.open_dataset("/VTKHDF/NumberOfPoints")?;
+        let counts: Vec<i64> = old.read_rows(&counts, 0, kept as usize)?;
+        self.rows = counts.iter().sum::<i64>() as u64;
+        changing.copy(old, &mut self.file, self.rows, kept)?;
+        for (_, dataset) in &mut self.fields {
+            if self.single {
+                changing::copy::<f32>(old, &mut self.file, dataset, self.rows)?;
+            } else {
+                changing::copy::<f64>(old, &mut self.file, dataset, self.rows)?;
+            }
+        }
+        for table in &mut self.tables {
+            changing::copy::<i64>(old, &mut self.file, &mut table.dataset, kept)?;
+        }
+        Ok(counts)
+    }
+
+    /// Gives the next step its points, with the fields that do not change while they are there: the same
+    /// fields as at the creation of the file.
+    ///
+    /// # Errors
+    /// The length of a field does not match the positions, or the disc is full.
+    pub fn set_points(&mut self, contents: &Contents) -> Result<()> {
+        let Contents {
+            piece,
+            positions,
+            fixed,
+            ..
+        } = *contents;
+        let mut pairs = fixed.iter();
+        let checked = pairs.try_for_each(|(field, data)| check(field, data, positions.len()));
+        agree(self.file.communicator(), checked)?;
+        let Some(changing) = &mut self.changing else {
+            let text = "the points of this result do not change";
+            return agree(self.file.communicator(), Err(Error::run(text)));
+        };
+        (self.piece, self.points) = (piece, positions.len());
+        changing.write(
+            &mut self.file,
+            piece,
+            (self.rows, self.steps),
+            positions,
+            fixed,
+        )?;
+        let root = self.file.communicator().rank() == 0;
+        for table in &mut self.tables {
+            let value = table.start
+                + match table.counted {
+                    Counted::Nothing => 0,
+                    Counted::Steps => self.steps as i64,
+                    Counted::Points => self.rows as i64,
+                };
+            self.file.resize(&mut table.dataset, self.steps + 1)?;
+            let own: &[i64] = if root { &[value] } else { &[] };
+            self.file.write_rows(&table.dataset, self.steps, own)?;
+        }
+        for (_, dataset) in &mut self.fields {
+            self.file.resize(dataset, self.rows + piece.total)?;
+        }
+        Ok(())
     }
 
     /// Adds one step: its time in s, its number and this rank's values of the moving fields, in the
@@ -289,10 +397,10 @@ impl<'a> ResultFile<'a> {
             Err(Error::run(text))
         };
         agree(self.file.communicator(), checked)?;
-        if self.steps == self.capacity {
+        if self.changing.is_none() && self.steps == self.capacity {
             self.make_room(self.capacity + 1)?;
         }
-        let first = self.steps * self.piece.total + self.piece.first;
+        let first = self.rows + self.piece.first;
         for ((description, dataset), data) in self.fields.iter().zip(fields) {
             let halves: Vec<f32>;
             let data = if self.single {
@@ -308,14 +416,20 @@ impl<'a> ResultFile<'a> {
         append_one(&mut self.file, &mut self.numbers, step)?;
         append_one(&mut self.file, &mut self.times, time)?;
         self.steps += 1;
+        self.rows += self.piece.total;
         let steps = Attribute::Integer(self.steps as i64);
         self.file.set_attribute(STEPS, "NSteps", steps)?;
         self.file.flush()
     }
 
-    /// Times of the steps that were taken over from an earlier file, s.
-    pub fn past_times(&self) -> &[f64] {
-        &self.past_times
+    /// Time (s) and points of the steps that were taken over from an earlier file.
+    pub fn past(&self) -> &[(f64, usize)] {
+        &self.past
+    }
+
+    /// Number of points of the last step, over all ranks.
+    pub fn points(&self) -> u64 {
+        self.piece.total
     }
 
     /// The ranks that write the file.
@@ -341,7 +455,7 @@ impl<'a> ResultFile<'a> {
         path: &str,
         columns: Option<usize>,
         steps: u64,
-        (start, stride): (i64, i64),
+        (start, stride, counted): (i64, i64, Counted),
     ) -> Result<()> {
         let rows = Rows::Extensible {
             per_append: steps.max(LEAST_ROWS),
@@ -351,13 +465,14 @@ impl<'a> ResultFile<'a> {
             dataset,
             start,
             stride,
+            counted,
         });
         Ok(())
     }
 
     /// Makes room for so many steps in all, and fills in the tables.
     fn make_room(&mut self, steps: u64) -> Result<()> {
-        if steps <= self.capacity {
+        if steps <= self.capacity || self.changing.is_some() {
             return Ok(());
         }
         let file = &mut self.file;
@@ -414,7 +529,7 @@ impl<'a> ResultFile<'a> {
     pub fn close(mut self) -> Result<()> {
         let file = &mut self.file;
         for (_, dataset) in &mut self.fields {
-            file.resize(dataset, self.steps * self.piece.total)?;
+            file.resize(dataset, self.rows)?;
         }
         for table in &mut self.tables {
             file.resize(&mut table.dataset, self.steps)?;

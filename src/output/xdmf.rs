@@ -16,11 +16,16 @@ const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
 /// Renders the side-car of a result file.
 ///
-/// `file_name` is the result's name without its folder, `points` the number of points, `times` the
-/// steps' times in s.
-pub fn render(file_name: &str, points: usize, fields: &[StoredField], times: &[f64]) -> String {
+/// `file_name` is the result's name without its folder, `points` the number of points at each of the
+/// steps' `times` (s); where they are `changing`, each step has its own.
+pub fn render(
+    file_name: &str,
+    (points, changing): (&[usize], bool),
+    fields: &[StoredField],
+    times: &[f64],
+) -> String {
     let mut text = String::new();
-    let written = write_document(&mut text, file_name, points, fields, times);
+    let written = write_document(&mut text, file_name, (points, changing), fields, times);
     debug_assert!(written.is_ok(), "writing to a string cannot fail");
     text
 }
@@ -30,16 +35,20 @@ pub fn render(file_name: &str, points: usize, fields: &[StoredField], times: &[f
 pub struct SideCar {
     path: PathBuf,
     file_name: String,
-    points: usize,
+    /// Whether each step has its own points.
+    changing: bool,
     fields: Vec<StoredField>,
+    /// Of the steps so far, s, and how many points they have.
     times: Vec<f64>,
+    points: Vec<usize>,
     /// When it was written last, and how long that took.
     written: Option<(Instant, Duration)>,
 }
 
 impl SideCar {
-    /// The side-car of a result, `name.xdmf` for `name.vtkhdf`, that has steps at these times (s) so far.
-    pub fn new(result: &Path, contents: &Contents, times: Vec<f64>) -> Self {
+    /// The side-car of a result, `name.xdmf` for `name.vtkhdf`, that has steps so far at these times (s) with
+    /// so many points.
+    pub fn new(result: &Path, contents: &Contents, past: &[(f64, usize)]) -> Self {
         let stored = |field: &FieldDescription, number, dynamic| StoredField {
             name: field.name.to_owned(),
             unit: field.unit.to_owned(),
@@ -56,7 +65,7 @@ impl SideCar {
             Number::F64
         };
         let fixed = contents.fixed.iter();
-        let fixed = fixed.map(|(field, data)| stored(field, data.number(), false));
+        let fixed = fixed.map(|(field, data)| stored(field, data.number(), contents.changing));
         let moving = contents.moving.iter();
         let moving = moving.map(|field| stored(field, real, true));
         let mut fields: Vec<StoredField> = fixed.chain(moving).collect();
@@ -65,19 +74,21 @@ impl SideCar {
         Self {
             path: result.with_extension("xdmf"),
             file_name: name.to_string_lossy().into_owned(),
-            points: contents.piece.total as usize,
+            changing: contents.changing,
             fields,
-            times,
+            times: past.iter().map(|(time, _)| *time).collect(),
+            points: past.iter().map(|(_, points)| *points).collect(),
             written: None,
         }
     }
 
-    /// Takes note of one step more, at a time (s), and writes the side-car if that is cheap.
+    /// Takes note of one step more, at a time (s) with so many points, and writes the side-car if that is cheap.
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn add(&mut self, time: f64) -> Result<()> {
+    pub fn add(&mut self, time: f64, points: u64) -> Result<()> {
         self.times.push(time);
+        self.points.push(points as usize);
         let is_cheap = |(when, cost): &(Instant, Duration)| when.elapsed() >= *cost * LEISURE;
         if self.written.as_ref().is_none_or(is_cheap) {
             self.write()?;
@@ -95,7 +106,8 @@ impl SideCar {
 
     fn write(&mut self) -> Result<()> {
         let start = Instant::now();
-        let text = render(&self.file_name, self.points, &self.fields, &self.times);
+        let points = (&self.points[..], self.changing);
+        let text = render(&self.file_name, points, &self.fields, &self.times);
         write(&self.path, &text)?;
         self.written = Some((Instant::now(), start.elapsed()));
         Ok(())
@@ -120,7 +132,7 @@ fn write(path: &Path, text: &str) -> Result<()> {
 fn write_document(
     text: &mut String,
     file_name: &str,
-    points: usize,
+    (points, changing): (&[usize], bool),
     fields: &[StoredField],
     times: &[f64],
 ) -> fmt::Result {
@@ -132,21 +144,51 @@ fn write_document(
         text,
         r#"<Grid Name="points" GridType="Collection" CollectionType="Temporal">"#
     )?;
-    for (step, time) in times.iter().enumerate() {
+    let all: usize = points.iter().sum();
+    let mut first = 0;
+    for ((step, time), points) in times.iter().enumerate().zip(points) {
+        let rows = StepRows {
+            first,
+            points: *points,
+            all,
+        };
         writeln!(text, r#"<Grid Name="step {step}" GridType="Uniform">"#)?;
         writeln!(text, r#"<Time Value="{time:?}"/>"#)?;
         let kind = r#"TopologyType="Polyvertex" NodesPerElement="1""#;
         writeln!(text, r#"<Topology {kind} NumberOfElements="{points}"/>"#)?;
         writeln!(text, r#"<Geometry GeometryType="XYZ">"#)?;
         let place = format!("{file}:/VTKHDF/Points");
-        write_item(text, Number::F64, &format!("{points} 3"), &place)?;
+        if changing {
+            writeln!(
+                text,
+                r#"<DataItem ItemType="HyperSlab" Dimensions="{points} 3">"#
+            )?;
+            let slab = format!("{first} 0 1 1 {points} 3");
+            writeln!(
+                text,
+                r#"<DataItem Dimensions="3 2" Format="XML">{slab}</DataItem>"#
+            )?;
+            write_item(text, Number::F64, &format!("{all} 3"), &place)?;
+            writeln!(text, "</DataItem>")?;
+        } else {
+            write_item(text, Number::F64, &format!("{points} 3"), &place)?;
+        }
         writeln!(text, "</Geometry>")?;
         for field in fields {
-            write_attribute(text, &file, points, field, step, times.len())?;
+            write_attribute(text, &file, field, rows)?;
         }
         writeln!(text, "</Grid>")?;
+        first += points;
     }
     writeln!(text, "</Grid>\n</Domain>\n</Xdmf>")
+}
+
+/// Where the rows of a step lie in what all steps have.
+#[derive(Clone, Copy)]
+struct StepRows {
+    first: usize,
+    points: usize,
+    all: usize,
 }
 
 /// Writes one field of one step. Symmetric tensors become six scalars: XDMF orders their components
@@ -154,15 +196,13 @@ fn write_document(
 fn write_attribute(
     text: &mut String,
     file: &str,
-    points: usize,
     field: &StoredField,
-    step: usize,
-    steps: usize,
+    StepRows { first, points, all }: StepRows,
 ) -> fmt::Result {
     let (name, components) = (escaped(&field.name), field.components);
     let place = format!("{file}:/VTKHDF/PointData/{name}");
     let (first, rows) = if field.dynamic {
-        (step * points, steps * points)
+        (first, all)
     } else {
         (0, points)
     };
@@ -249,7 +289,7 @@ mod tests {
             field("damage", 1, true),
             field("stress", 6, true),
         ];
-        let text = render("a&b.h5", 7, &fields, &[0.0, 1e-6, 2e-6]);
+        let text = render("a&b.h5", (&[7; 3], false), &fields, &[0.0, 1e-6, 2e-6]);
         assert!(text.contains(">14 0 1 1 7 3</DataItem>"));
         assert!(text.contains(">14 1 7</DataItem>"));
         assert!(text.contains(">14 4 1 1 7 1</DataItem>"));
@@ -261,6 +301,11 @@ mod tests {
         );
         assert!(text.contains(r#"NumberType="Int" Precision="8" Dimensions="7" Format="HDF""#));
         assert!(text.contains(r#"<Time Value="1e-6"/>"#));
+        // That of the velocity: the points are there once.
+        assert_eq!(text.matches(">7 0 1 1 7 3</DataItem>").count(), 1);
+        let text = render("a.h5", (&[7, 9], true), &fields[1..2], &[0.0, 1e-6]);
+        assert_eq!(text.matches(">7 0 1 1 9 3</DataItem>").count(), 2);
+        assert!(text.contains(r#"Dimensions="16 3" Format="HDF">a.h5:/VTKHDF/Points<"#));
         assert_eq!(
             text.matches("<Grid").count(),
             text.matches("</Grid>").count()

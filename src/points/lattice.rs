@@ -101,8 +101,13 @@ impl<'a> LatticeBody<'a> {
 
     /// The cell whose centre is at a place (m).
     pub fn cell_at(&self, place: [f64; 3]) -> [i64; 3] {
+        self.place_at(place, 1.0)
+    }
+
+    /// A place (m) in steps, so many an edge, from the centre of cell 0.
+    pub fn place_at(&self, place: [f64; 3], steps: f64) -> [i64; 3] {
         std::array::from_fn(|k| match k < self.dimension {
-            true => ((place[k] - self.origin[k]) / self.spacing[k] - 0.5).round() as i64,
+            true => (steps * ((place[k] - self.origin[k]) / self.spacing[k] - 0.5)).round() as i64,
             false => 0,
         })
     }

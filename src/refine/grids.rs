@@ -1,5 +1,7 @@
 //! The refined grids of a run's bodies, and their points.
 
+use std::sync::Arc;
+
 use crate::comm::{Communicator, agree};
 use crate::deck::plan::{Block, Kind, Plan};
 use crate::error::Result;
@@ -7,9 +9,10 @@ use crate::families::cutoff;
 use crate::points::{LatticeBody, Point};
 
 use super::pattern::{Node, Pattern};
-use super::place::Place;
+use super::place::{Place, born, parents};
 
 /// The grids of all bodies, by body; the same on all ranks.
+#[derive(Clone)]
 pub struct Grids<'a> {
     plan: &'a Plan,
     /// Number of points of level 0 over all ranks.
@@ -19,13 +22,14 @@ pub struct Grids<'a> {
 }
 
 /// The grid of a body that is given as a shape.
+#[derive(Clone)]
 struct BodyGrid<'a> {
-    cells: LatticeBody<'a>,
+    cells: Arc<LatticeBody<'a>>,
     pattern: Pattern,
 }
 
 /// A node that is to be refined: body, level, and place in steps of the level.
-type Pick = [i64; 5];
+pub type Pick = [i64; 5];
 
 impl<'a> Grids<'a> {
     /// Grids in which nothing is refined, of a plan with so many points of level 0 over all ranks; without
@@ -39,7 +43,10 @@ impl<'a> Grids<'a> {
         let grid = |body| {
             let cells = LatticeBody::new(plan, body)?;
             let pattern = Pattern::new(dimension, finest);
-            Ok(cells.map(|cells| BodyGrid { cells, pattern }))
+            Ok(cells.map(|cells| BodyGrid {
+                cells: Arc::new(cells),
+                pattern,
+            }))
         };
         let bodies = if finest == 0 {
             Vec::new()
@@ -52,6 +59,11 @@ impl<'a> Grids<'a> {
             finest,
             bodies,
         })
+    }
+
+    /// Number of points of level 0 over all ranks; those of finer levels have ids from this on.
+    pub fn coarsest(&self) -> u64 {
+        self.coarsest
     }
 
     /// Refines what the plan wants from the start; `coarse` are this rank's points of level 0. Collective.
@@ -92,14 +104,112 @@ impl<'a> Grids<'a> {
         Ok(())
     }
 
-    /// Refines nodes, and what must be refined with them.
-    fn refine(&mut self, picks: &[Pick]) {
+    /// Refines nodes, and what must be refined with them. Returns whether any were not yet.
+    pub fn refine(&mut self, picks: &[Pick]) -> bool {
+        let mut changed = false;
         for [body, level, x, y, z] in picks {
             let Some(BodyGrid { cells, pattern }) = &mut self.bodies[*body as usize] else {
                 continue;
             };
-            pattern.refine(&|cell| cells.has_cell(cell), *level as u32, [*x, *y, *z]);
+            changed |= pattern.refine(&|cell| cells.has_cell(cell), *level as u32, [*x, *y, *z]);
         }
+        changed
+    }
+
+    /// Of the nodes that have come since an earlier state, takes back those that lie between places (m) which
+    /// are `parted`, and leaves their places without nodes.
+    pub fn part(&mut self, earlier: &Self, parted: &impl Fn([f64; 3], [f64; 3]) -> bool) {
+        for (grid, earlier) in self.bodies.iter_mut().zip(&earlier.bodies) {
+            let (Some(grid), Some(earlier)) = (grid, earlier) else {
+                continue;
+            };
+            for level in 1..=self.finest {
+                let cells = &grid.cells;
+                let body = |cell| cells.has_cell(cell);
+                for place in grid.pattern.born_since(&earlier.pattern, &body, level) {
+                    let parents = parents(place).map(|parent| grid.position(level - 1, parent));
+                    let parents: Vec<[f64; 3]> = parents.collect();
+                    let mut pairs = (1..parents.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+                    if pairs.any(|(a, b)| parted(parents[a], parents[b])) {
+                        grid.pattern.part(level, place);
+                    }
+                }
+            }
+        }
+    }
+
+    /// All nodes that are refined, and all places without nodes with the level that they would be born at.
+    pub fn state(&self) -> [Vec<Pick>; 2] {
+        let mut state = [Vec::new(), Vec::new()];
+        for (body, grid) in (0..).zip(&self.bodies) {
+            let pick = |(level, [x, y, z]): (u32, Place)| [body, i64::from(level), x, y, z];
+            let [refined, parted] = &mut state;
+            refined.extend(
+                grid.iter()
+                    .flat_map(|grid| grid.pattern.refined())
+                    .map(pick),
+            );
+            parted.extend(grid.iter().flat_map(|grid| grid.pattern.parted()).map(pick));
+        }
+        state.iter_mut().for_each(|picks| picks.sort_unstable());
+        state
+    }
+
+    /// Refines to what [`Self::state`] gave. Returns whether anything was not yet.
+    pub fn refine_to(&mut self, [refined, parted]: &[Vec<Pick>; 2]) -> bool {
+        for [body, level, x, y, z] in parted {
+            if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
+                grid.pattern.part(*level as u32, [*x, *y, *z]);
+            }
+        }
+        self.refine(refined)
+    }
+
+    /// What refining the point of a block at a position (m) means; none if it is of the finest level.
+    pub fn pick(&self, block: usize, position: [f64; 3]) -> Option<Pick> {
+        let level = self.plan.block(block).level;
+        if level == self.finest {
+            return None;
+        }
+        let body = self.plan.body_of(block);
+        let [x, y, z] = self
+            .place_at(body, position)?
+            .map(|x| x >> (self.finest - level));
+        Some([body as i64, i64::from(level), x, y, z])
+    }
+
+    /// The place of a point of a body at a position (m), in steps of the finest level.
+    pub fn place_at(&self, body: usize, position: [f64; 3]) -> Option<Place> {
+        let grid = self.bodies.get(body)?.as_ref()?;
+        Some(grid.cells.place_at(position, f64::from(1 << self.finest)))
+    }
+
+    /// Reference position (m) of a place of a body in steps of the finest level, if it is one of level 0.
+    pub fn coarse_position(&self, body: usize, place: Place) -> Option<[f64; 3]> {
+        let grid = self.bodies.get(body)?.as_ref()?;
+        (born(self.finest, place).0 == 0).then(|| grid.position(self.finest, place))
+    }
+
+    /// The places, in steps of the finest level, of the points that one lies between.
+    pub fn parents(&self, place: Place) -> Vec<Place> {
+        let (level, place) = born(self.finest, place);
+        let steps = 1 << (self.finest + 1 - level);
+        parents(place)
+            .map(|parent| parent.map(|x| x * steps))
+            .collect()
+    }
+
+    /// Points of level 0 as they are without refinement.
+    pub fn unrefined(&self, points: impl Iterator<Item = Point>) -> Vec<Point> {
+        let unrefined = |mut point: Point| {
+            let body = self.plan.body_of(point.block as usize);
+            point.block = body as u32;
+            if let Some(grid) = &self.bodies[body] {
+                point.volume = grid.cells.cell_volume();
+            }
+            point
+        };
+        points.map(unrefined).collect()
     }
 
     /// The points in the cells of `coarse`, points of level 0 as they are without refinement: those with
@@ -209,8 +319,8 @@ impl BodyGrid<'_> {
     }
 }
 
-/// The picks of all ranks.
-fn gather(comm: &dyn Communicator, own: &[Pick]) -> Vec<Pick> {
+/// What all ranks have, rank by rank.
+pub fn gather<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
     let bytes: &[u8] = bytemuck::cast_slice(own);
     let all = comm.all_to_all(vec![bytes.to_vec(); comm.size()]).concat();
     bytemuck::pod_collect_to_vec(&all)

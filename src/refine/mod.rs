@@ -9,7 +9,9 @@
 mod grids;
 mod pattern;
 mod place;
+mod shares;
 
-pub use grids::Grids;
+pub use grids::{Grids, Pick, gather};
 pub use pattern::{Node, Pattern};
-pub use place::{Place, parents};
+pub use place::Place;
+pub use shares::Shares;

@@ -18,12 +18,15 @@ pub struct Node {
 /// The refined nodes of a body, by level, in steps of their level's spacing.
 ///
 /// `body` says of a cell, by its numbers, whether it is one of the body's. If a node is refined, its
-/// parents are; so neighbouring nodes differ by one level at most.
+/// parents are; so neighbouring nodes differ by one level at most. Where a crack has parted the nodes
+/// that a new one would lie between, none is born: its faces are like the sides of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pattern {
     dimension: usize,
     /// One set a level but the finest.
     refined: Vec<HashSet<Place>>,
+    /// Places where no node is born, with the level that it would be born at.
+    parted: HashSet<(u32, Place)>,
 }
 
 impl Pattern {
@@ -32,6 +35,7 @@ impl Pattern {
         Self {
             dimension,
             refined: vec![HashSet::new(); finest as usize],
+            parted: HashSet::new(),
         }
     }
 
@@ -46,16 +50,17 @@ impl Pattern {
     }
 
     /// Refines a node of a level, given in steps of it; its parents first. A place outside of the body
-    /// stays as it is.
-    pub fn refine(&mut self, body: &impl Fn(Place) -> bool, level: u32, place: Place) {
-        if !possible(body, level, place) || !self.refined[level as usize].insert(place) {
-            return;
+    /// stays as it is. Returns whether it was not refined yet.
+    pub fn refine(&mut self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
+        if !self.is_possible(body, level, place) || !self.refined[level as usize].insert(place) {
+            return false;
         }
         if level > 0 {
             for parent in parents(place) {
                 self.refine(body, level - 1, parent);
             }
         }
+        true
     }
 
     /// The refined nodes with their levels, in no order.
@@ -71,7 +76,8 @@ impl Pattern {
             return body(place);
         }
         let refined = &self.refined[level as usize - 1];
-        parents(place).any(|parent| refined.contains(&parent)) && possible(body, level, place)
+        parents(place).any(|parent| refined.contains(&parent))
+            && self.is_possible(body, level, place)
     }
 
     /// Whether there can be nodes within a cell, its lower sides included, beside the one at its centre
@@ -111,7 +117,7 @@ impl Pattern {
         for coarse in birth..finest {
             let (mut taken, mut all) = (0, 0);
             for other in around(here, self.dimension) {
-                if !possible(body, coarse + 1, other) {
+                if !self.is_possible(body, coarse + 1, other) {
                     continue;
                 }
                 all += 1;
@@ -162,18 +168,56 @@ impl Pattern {
             let square: f64 = (0..3).map(|k| (offset[k] as f64 * edges[k]).powi(2)).sum();
             let other = std::array::from_fn(|k| here[k] + offset[k]);
             square <= reach * reach
-                && possible(body, level, other)
+                && self.is_possible(body, level, other)
                 && !self.exists(body, level, other)
         })
     }
-}
 
-/// Whether there could be a node at a place, in steps of a level's spacing: whether the nodes of level 0
-/// around it are the body's.
-fn possible(body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
-    let low = place.map(|x| x >> level);
-    let high = place.map(|x| (x + (1 << level) - 1) >> level);
-    between(low, high).all(body)
+    /// Whether there could be a node at a place, in steps of a level's spacing: whether the nodes of level 0
+    /// around it are the body's, and no crack has parted those between which it would be born, or these.
+    fn is_possible(&self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
+        if self.parted.is_empty() {
+            let low = place.map(|x| x >> level);
+            let high = place.map(|x| (x + (1 << level) - 1) >> level);
+            return between(low, high).all(body);
+        }
+        let (level, place) = born(level, place);
+        if level == 0 {
+            return body(place);
+        }
+        !self.parted.contains(&(level, place))
+            && parents(place).all(|parent| self.is_possible(body, level - 1, parent))
+    }
+
+    /// Leaves a place, in steps of the level that a node there would be born at, without one for ever.
+    pub fn part(&mut self, level: u32, place: Place) {
+        self.parted.insert((level, place));
+    }
+
+    /// The places where no node is born, with the level that it would be born at; in no order.
+    pub fn parted(&self) -> impl Iterator<Item = (u32, Place)> {
+        self.parted.iter().copied()
+    }
+
+    /// The places, in steps of the level of their birth, of the nodes that have come since an earlier state of
+    /// the pattern, for one such level.
+    pub fn born_since(
+        &self,
+        earlier: &Self,
+        body: &impl Fn(Place) -> bool,
+        level: u32,
+    ) -> Vec<Place> {
+        let coarse = level as usize - 1;
+        let newly = self.refined[coarse].difference(&earlier.refined[coarse]);
+        let places: HashSet<Place> = newly
+            .flat_map(|place| around(*place, self.dimension))
+            .filter(|place| born(level, *place).0 == level)
+            .filter(|place| {
+                self.exists(body, level, *place) && !earlier.exists(body, level, *place)
+            })
+            .collect();
+        places.into_iter().collect()
+    }
 }
 
 #[cfg(test)]
@@ -227,11 +271,22 @@ mod tests {
         assert!(!at_coarser(2, 0.5) && at_coarser(2, 0.75));
     }
 
-    /// Refined at random, some nodes twice or three times over.
-    fn check(dimension: usize, edge: i64, finest: u32, holes: &[Place], picks: &[(u32, Place)]) {
+    /// Refined at random, some nodes twice or three times over, with places where nothing is born.
+    fn check(
+        (dimension, edge, finest): (usize, i64, u32),
+        holes: &[Place],
+        picks: &[(u32, Place)],
+        parted: &[(u32, Place)],
+    ) {
         let within = |cell: Place| (0..dimension).all(|k| (0..edge).contains(&cell[k]));
         let body = |cell: Place| within(cell) && !holes.contains(&cell);
         let mut pattern = Pattern::new(dimension, finest);
+        for (level, place) in parted {
+            let place = std::array::from_fn(|k| if k < dimension { place[k] } else { 0 });
+            if let (level @ 1.., place) = born(level % (finest + 1), place) {
+                pattern.part(level, place);
+            }
+        }
         for (level, place) in picks {
             let place = std::array::from_fn(|k| if k < dimension { place[k] } else { 0 });
             let level = level % finest;
@@ -253,9 +308,9 @@ mod tests {
                 assert!(pattern.refined[level as usize - 1].contains(&parent));
             }
         }
-        // A node and the next one in a row differ by one level at most.
+        // A node and the next one in a row differ by one level at most, if no crack lies between them.
         for (place, node) in &nodes {
-            for k in 0..dimension {
+            for k in (0..dimension).filter(|_| parted.is_empty()) {
                 let next = (1..=1 << finest).find_map(|step| {
                     let mut other = *place;
                     other[k] += step;
@@ -275,16 +330,20 @@ mod tests {
         fn volume_is_kept_in_the_plane(
             holes in prop::collection::vec([0_i64..7, 0_i64..7, 0_i64..1], 0..6),
             picks in prop::collection::vec((0_u32..3, [0_i64..28, 0_i64..28, 0_i64..1]), 0..40),
+            parted in prop::collection::vec((1_u32..4, [0_i64..28, 0_i64..28, 0_i64..1]), 1..20),
         ) {
-            check(2, 7, 3, &holes, &picks);
+            check((2, 7, 3), &holes, &picks, &[]);
+            check((2, 7, 3), &holes, &picks, &parted);
         }
 
         #[test]
         fn volume_is_kept_in_space(
             holes in prop::collection::vec([0_i64..4, 0_i64..4, 0_i64..4], 0..6),
             picks in prop::collection::vec((0_u32..2, [0_i64..8, 0_i64..8, 0_i64..8]), 0..12),
+            parted in prop::collection::vec((1_u32..3, [0_i64..8, 0_i64..8, 0_i64..8]), 1..12),
         ) {
-            check(3, 4, 2, &holes, &picks);
+            check((3, 4, 2), &holes, &picks, &[]);
+            check((3, 4, 2), &holes, &picks, &parted);
         }
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn between(low: Place, high: Place) -> impl Iterator<Item = Place> {
 
 /// The nodes of the next coarser level between which a place lies, in steps of that level: itself, or 2,
 /// 4 or 8 by the number of directions in which it lies half-way.
-pub fn parents(place: Place) -> impl Iterator<Item = Place> {
+pub(super) fn parents(place: Place) -> impl Iterator<Item = Place> {
     let low = place.map(|x| x.div_euclid(2));
     let high = place.map(|x| (x + 1).div_euclid(2));
     between(low, high)

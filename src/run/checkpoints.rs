@@ -67,8 +67,13 @@ impl CheckpointWriter {
         let header = Header {
             number: simulation.clock.number(),
             step: simulation.clock.step(),
+            grids: simulation.grids.state(),
             points: simulation.model.total,
-            fingerprint: self.fingerprint,
+            fingerprint: if simulation.may_refine() {
+                fingerprint(simulation)
+            } else {
+                self.fingerprint
+            },
             outputs: recorder.file.steps(),
             rows: recorder.file.history_rows(),
             start: recorder.observer.start().unwrap_or_default(),

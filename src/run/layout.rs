@@ -5,6 +5,9 @@ use crate::deck::plan::Field;
 use crate::output::{Contents, FieldData, FieldDescription, Piece};
 use crate::solver::Simulation;
 
+/// The fields that do not change while the points are the same.
+pub const FIXED: [&str; 4] = ["id", "block", "volume", "level"];
+
 /// What a result consists of, whether it is new or continued.
 pub struct Layout<'a> {
     places: Vec<f64>,
@@ -12,6 +15,7 @@ pub struct Layout<'a> {
     blocks: Vec<u32>,
     volumes: Vec<f64>,
     levels: Option<Vec<u32>>,
+    changing: bool,
     moving: Vec<FieldDescription>,
     metadata: &'a [(&'a str, String)],
     single: bool,
@@ -50,6 +54,7 @@ impl<'a> Layout<'a> {
             volumes: pick(kept, order.collect(comm, &model.volume[..owned], 1), 1),
             ids,
             levels: levels.map(|levels| pick(kept, order.collect(comm, &levels, 1), 1)),
+            changing: simulation.may_refine(),
             moving: output.fields.iter().map(describe).collect(),
             metadata,
             single: output.single,
@@ -58,20 +63,21 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The fields that do not change.
+    /// The fields that do not change while the points are the same.
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,
             unit,
             components: 1,
         };
+        let [id, block, volume, level] = FIXED;
         let mut fixed = vec![
-            (scalar("id", "1"), FieldData::U64(&self.ids)),
-            (scalar("block", "1"), FieldData::U32(&self.blocks)),
-            (scalar("volume", "m^3"), FieldData::F64(&self.volumes)),
+            (scalar(id, "1"), FieldData::U64(&self.ids)),
+            (scalar(block, "1"), FieldData::U32(&self.blocks)),
+            (scalar(volume, "m^3"), FieldData::F64(&self.volumes)),
         ];
         if let Some(levels) = &self.levels {
-            fixed.push((scalar("level", "1"), FieldData::U32(levels)));
+            fixed.push((scalar(level, "1"), FieldData::U32(levels)));
         }
         fixed
     }
@@ -80,6 +86,7 @@ impl<'a> Layout<'a> {
     pub fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
         Contents {
             piece: self.piece,
+            changing: self.changing,
             positions: bytemuck::cast_slice(&self.places),
             fixed,
             moving: &self.moving,

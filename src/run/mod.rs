@@ -239,8 +239,21 @@ impl<'a> Job<'a> {
         let mut contact = Some(ContactWatch::new(simulation));
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
+        let mut stable = simulation.scaled_stable_step();
         let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
+            if simulation.is_refinement_due() {
+                let born = simulation.refine()?;
+                if born > 0 {
+                    recorder.follow(simulation)?;
+                    stable = self.warn_of_step(simulation, stable);
+                    self.observer.message(&Message::Refined {
+                        number: simulation.clock.number(),
+                        born,
+                        points: simulation.model.total,
+                    });
+                }
+            }
             simulation.advance();
             let clock = simulation.clock;
             let complete = simulation.is_over();
@@ -305,6 +318,21 @@ impl<'a> Job<'a> {
             place.join(", ")
         );
         self.observer.message(&Message::Warning(text));
+    }
+
+    /// Says of a step (s) that was stable until points were born that it no longer is. Returns the step that
+    /// is known to be stable now, s.
+    fn warn_of_step<const D: usize>(&mut self, simulation: &Simulation<'a, D>, before: f64) -> f64 {
+        let (step, stable) = (simulation.clock.step(), simulation.scaled_stable_step());
+        if step > stable && step <= before {
+            let text = format!(
+                "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s, since the grid has \
+                 been refined after step {}; an automatic step follows the grid",
+                simulation.clock.number()
+            );
+            self.observer.message(&Message::Warning(text));
+        }
+        stable
     }
 
     /// Says, of a run with another density, that it is not slow; returns whether it was said.

@@ -63,6 +63,15 @@ pub enum Message {
         /// What there is of the result so far, under its new names.
         kept: Vec<PathBuf>,
     },
+    /// The grid has been refined.
+    Refined {
+        /// Number of the step after which.
+        number: u64,
+        /// Number of new points.
+        born: u64,
+        /// Number of points that there are now.
+        points: u64,
+    },
     /// The points have been dealt out anew among the ranks.
     Repartitioned {
         /// Number of the step after which.

@@ -19,7 +19,7 @@ use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 
 use super::crack_files;
 use super::files::Files;
-use super::layout::{Layout, pick};
+use super::layout::{FIXED, Layout, pick};
 use super::observer::{Observer, Row};
 use super::physics::history_differences;
 
@@ -112,8 +112,8 @@ impl<'a> Recorder<'a> {
                 file
             }
         };
-        let side_car = (comm.rank() == 0)
-            .then(|| SideCar::new(&files.result, &contents, file.past_times().to_vec()));
+        let side_car =
+            (comm.rank() == 0).then(|| SideCar::new(&files.result, &contents, file.past()));
         Ok(Self {
             file,
             observer,
@@ -130,12 +130,13 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Follows the points after they have been dealt out anew. Collective.
+    /// Follows the points after they have been dealt out anew, or others have come. Collective.
     ///
     /// # Errors
     /// As those of [`HistoryObserver::new`].
     pub fn follow<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
+        self.kept = kept(simulation, &self.order)?;
         self.observer.follow(simulation)
     }
 
@@ -203,12 +204,17 @@ impl<'a> Recorder<'a> {
                 })
                 .collect();
             let data: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+            if simulation.may_refine() {
+                let layout = Layout::new(simulation, (&self.order, &self.kept), 0, &[]);
+                let fixed = layout.fixed();
+                self.file.set_points(&layout.contents(&fixed))?;
+            }
             self.file
                 .write_step(simulation.clock.time(), simulation.clock.number(), &data)?;
             let cracks = self.observer.crack_paths(simulation, &snapshot);
             crack_files::write(simulation.comm, &self.folder, &cracks)?;
             let told = match &mut self.side_car {
-                Some(side_car) => side_car.add(simulation.clock.time()),
+                Some(side_car) => side_car.add(simulation.clock.time(), self.file.points()),
                 None => Ok(()),
             };
             agree(simulation.comm, told)?;
@@ -323,15 +329,21 @@ pub fn why_not_continued<const D: usize>(
             return Ok(Some(text.to_owned()));
         }
         let fields = reader.fields()?;
-        let moving = fields.iter().filter(|field| field.dynamic);
+        let moving = fields
+            .iter()
+            .filter(|field| field.dynamic && !FIXED.contains(&&field.name[..]));
         let found: Vec<&str> = moving.map(|field| &field.name[..]).collect();
         let mut wanted: Vec<&str> = wanted_fields(simulation.plan);
         wanted.sort_unstable();
         let names = columns.iter().map(|column| &column.name);
         let expected = observer.columns().iter().map(|(name, _)| name);
         let single = |field: &StoredField| field.number == Number::F32;
-        let found_points = reader.ids()?.into_iter().map(mix);
-        if found_points.fold(0, u64::wrapping_add) != points {
+        let changing = simulation.may_refine();
+        if reader.is_changing() != changing {
+            return Ok(Some("points are born now or were then".to_owned()));
+        }
+        let found_points = reader.ids(0)?.into_iter().map(mix);
+        if !changing && found_points.fold(0, u64::wrapping_add) != points {
             return Ok(Some("other points are asked for".to_owned()));
         } else if fields.iter().any(single) != (simulation.plan.output.single && !wanted.is_empty())
         {

@@ -48,6 +48,7 @@ pub fn restart<const D: usize>(
             header.rounding
         ));
     }
+    simulation.refine_to(&header.grids)?;
     let fingerprint = fingerprint(simulation);
     if header.points != simulation.model.total || header.fingerprint != fingerprint {
         let message = "was written for other points; has a point file changed?";

@@ -41,6 +41,8 @@ pub struct Phases {
     pub halo: f64,
     /// Integration and conditions.
     pub motion: f64,
+    /// Refinements of the grid, and points that were dealt out anew.
+    pub regridding: f64,
     /// Result and history.
     pub output: f64,
     /// Checkpoints.
@@ -64,13 +66,23 @@ impl Summary {
             times.forces.bonds,
             times.forces.halo,
             times.motion,
+            times.regridding,
             spent.0,
             spent.1,
             spent.2,
         ];
         let mut seconds = phases.map(|phase| phase.as_secs_f64());
         simulation.comm.max(&mut seconds);
-        let [set_up, bonds, halo, motion, output, checkpointing, whole] = seconds;
+        let [
+            set_up,
+            bonds,
+            halo,
+            motion,
+            regridding,
+            output,
+            checkpointing,
+            whole,
+        ] = seconds;
         Self {
             points: simulation.model.total,
             bonds: comm::total(simulation.comm, simulation.forces.directed_bonds()) / 2,
@@ -86,6 +98,7 @@ impl Summary {
                 bonds,
                 halo,
                 motion,
+                regridding,
                 output,
                 checkpoints: checkpointing,
                 whole,

@@ -7,6 +7,7 @@ mod grids;
 pub mod model;
 pub mod motion;
 pub mod observers;
+pub mod refinement;
 pub mod repartition;
 pub mod simulation;
 pub mod size;

@@ -69,6 +69,7 @@ impl BalanceWatch {
         }
         let start = Instant::now();
         let moved = simulation.repartition(own)?;
+        simulation.times.regridding += start.elapsed();
         self.seen = simulation.times.forces.bonds;
         let mut seconds = [start.elapsed().as_secs_f64()];
         simulation.comm.max(&mut seconds);
@@ -82,7 +83,7 @@ impl BalanceWatch {
 
 impl<const D: usize> Simulation<'_, D> {
     /// The owned points, as they travel between ranks.
-    fn pieces(&self) -> Vec<Point> {
+    pub(super) fn pieces(&self) -> Vec<Point> {
         let model = &self.model;
         let point = |k: usize| {
             let block = usize::from(model.block[k]);
@@ -111,7 +112,7 @@ impl<const D: usize> Simulation<'_, D> {
         let mut other = Self::of_points(
             self.plan,
             self.comm,
-            (pieces, self.model.coarsest),
+            (pieces, self.grids.clone()),
             Some(cost),
             &mut || Ok(()),
         )?;

@@ -21,6 +21,7 @@ use super::motion::fields::Needs;
 use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::{Clock, Fields, Kept, verlet};
+use super::refinement::{self, Refined};
 use super::size;
 use super::steps::choose_steps;
 
@@ -67,6 +68,10 @@ pub struct Simulation<'a, const D: usize> {
     pub step_control: StepControl,
     /// What the run was before the present step; empty where steps are not undone.
     pub(super) kept: Kept,
+    /// The refined grids of the bodies.
+    pub grids: Grids<'a>,
+    /// What refinements during the run have done.
+    pub refined: Refined,
     /// Where the time went.
     pub times: Times,
     bad: Option<BadPoint>,
@@ -83,6 +88,8 @@ pub struct Times {
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
+    /// Refinements of the grid, and points that were dealt out anew.
+    pub regridding: Duration,
 }
 
 /// The first point of a rank whose velocity was not finite.
@@ -116,6 +123,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ) -> Result<Self> {
         let start = Instant::now();
         laws_are_possible(plan)?;
+        refinement::is_possible(plan)?;
         let cutoffs = cutoffs(plan);
         size::is_feasible(plan, &cutoffs, comm.size())?;
         let (coarse, coarsest) = points::generate(plan, comm)?;
@@ -123,17 +131,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
         refined.refine_regions(comm, &coarse)?;
         let pieces = refined.points(coarse);
         between()?;
-        let mut simulation = Self::of_points(plan, comm, (pieces, coarsest), None, between)?;
+        let mut simulation = Self::of_points(plan, comm, (pieces, refined), None, between)?;
+        simulation.can_bond_new_points()?;
         simulation.times.set_up = start.elapsed();
         Ok(simulation)
     }
 
-    /// Distributes and bonds points, `coarsest` of them over all ranks of level 0, and evaluates the forces
-    /// at time 0. `cost` is what this rank's points cost, if that is known; see [`Self::set_up`].
+    /// Distributes and bonds the points of grids, and evaluates the forces at time 0. `cost` is what this rank's points cost, if that is known; see [`Self::set_up`].
     pub(super) fn of_points(
         plan: &'a Plan,
         comm: &'a dyn Communicator,
-        (pieces, coarsest): (Vec<Point>, u64),
+        (pieces, refined): (Vec<Point>, Grids<'a>),
         cost: Option<Cost>,
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
@@ -150,7 +158,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .map_err(|fault| fault.error(plan));
         let (bonds, grids) = agree(comm, found)?;
         between()?;
-        let model = Model::new(plan, &domain, coarsest);
+        let model = Model::new(plan, &domain, refined.coarsest());
         let blocks = plan.blocks();
         let blocks: Vec<_> = blocks.map(|block| block_laws(plan, &block)).collect();
         let halo = std::mem::take(&mut domain.halo);
@@ -169,7 +177,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         protect(plan, &model, comm, &mut forces);
 
         let each = stages.iter().map(|stage| &stage.acting);
-        let each = each.map(|acting| Conditions::new(plan, comm, &model, acting));
+        let each = each.map(|acting| Conditions::new(plan, comm, (&model, &refined), acting));
         let mut waiting = each
             .map(|conditions| conditions.map(Some))
             .collect::<Result<Vec<_>>>()?;
@@ -211,6 +219,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
             load_step: LoadStep::default(),
             step_control: StepControl::default(),
             kept: Kept::default(),
+            grids: refined,
+            refined: Refined::default(),
             times: Times::default(),
             bad: None,
         };

@@ -8,22 +8,24 @@ use fissure::output::ResultReader;
 /// Every dataset of a result, rows sorted by id, as bits, by name.
 pub fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
     let reader = ResultReader::open(result).unwrap_or_else(|error| panic!("{error}"));
-    let ids = reader.ids().unwrap();
-    let mut order: Vec<usize> = (0..ids.len()).collect();
-    order.sort_by_key(|k| ids[*k]);
     let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect();
-    let sorted = |values: &[f64]| {
-        let width = values.len() / ids.len();
-        let row = |k: &usize| values[k * width..(k + 1) * width].to_vec();
-        bits(&order.iter().flat_map(row).collect::<Vec<f64>>())
-    };
     let mut all = BTreeMap::new();
-    all.insert("times".to_owned(), bits(&reader.times().unwrap()));
+    let times = reader.times().unwrap();
+    all.insert("times".to_owned(), bits(&times));
     all.insert("steps".to_owned(), reader.steps().unwrap());
-    let positions = reader.positions().unwrap();
-    all.insert("positions".to_owned(), sorted(positions.as_flattened()));
-    for field in reader.fields().unwrap() {
-        for step in 0..reader.times().unwrap().len() {
+    for step in 0..times.len() {
+        let ids = reader.ids(step).unwrap();
+        let mut order: Vec<usize> = (0..ids.len()).collect();
+        order.sort_by_key(|k| ids[*k]);
+        let sorted = |values: &[f64]| {
+            let width = values.len() / ids.len();
+            let row = |k: &usize| values[k * width..(k + 1) * width].to_vec();
+            bits(&order.iter().flat_map(row).collect::<Vec<f64>>())
+        };
+        let positions = reader.positions(step).unwrap();
+        let name = format!("positions {step}");
+        all.insert(name, sorted(positions.as_flattened()));
+        for field in reader.fields().unwrap() {
             let values = reader.field(&field.name, step).unwrap();
             all.insert(format!("{} {step}", field.name), sorted(&values));
         }

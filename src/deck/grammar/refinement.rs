@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
-use super::Tables;
+use super::{Count, Tables};
 use crate::deck::number::Number;
 
 /// Refinement: points of bodies given as shapes get new ones around them at half the spacing, level by
@@ -26,6 +26,35 @@ pub struct Refinement {
     /// What is refined from the start, by any name.
     #[serde(default)]
     pub region: Tables<RefinedRegion>,
+    /// What is refined during the run; nothing if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trigger: Option<Spanned<Trigger>>,
+}
+
+/// Points that make all within their horizon be refined, one level at a time; at least one of `energy`,
+/// `damage` and `where`, any of which is enough.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trigger {
+    /// Steps between looks; 20 if not given.
+    #[serde(default = "default_look")]
+    pub every_steps: Spanned<Count>,
+    /// The strain energy density, as a share of the largest of all points at that moment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<Number>,
+    /// The damage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Number>,
+    /// A condition on the reference position and t.
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
+    pub condition: Option<Number>,
+    /// A condition on the reference position and t without which a point is no trigger.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub only: Option<Number>,
+}
+
+fn default_look() -> Spanned<Count> {
+    Spanned::new(0..0, Count::new(20))
 }
 
 /// How the horizon goes with the spacing from level to level.

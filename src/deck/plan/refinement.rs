@@ -17,6 +17,25 @@ pub struct Refinement {
     pub interface_factor: f64,
     /// What is refined from the start.
     pub regions: Vec<RefinedRegion>,
+    /// What is refined during the run, if anything.
+    pub trigger: Option<Trigger>,
+}
+
+/// What makes the points within the horizon of a point be refined, one level at a time; any of them.
+#[derive(Debug, Clone)]
+pub struct Trigger {
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Steps between looks.
+    pub every_steps: u64,
+    /// Least strain energy density, as a share of the largest of all points.
+    pub energy: Option<f64>,
+    /// Least damage.
+    pub damage: Option<f64>,
+    /// A condition on reference position and time.
+    pub condition: Option<Expression>,
+    /// Which points can be triggers at all, by reference position and time.
+    pub only: Option<Expression>,
 }
 
 /// How the horizon goes with the spacing from level to level.

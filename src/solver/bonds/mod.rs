@@ -239,6 +239,26 @@ impl<const D: usize> Forces<D> {
         }
     }
 
+    /// Whether bonds keep numbers from step to step; the same on all ranks if they have such bonds.
+    pub fn remember(&self) -> bool {
+        let mut stores = self.interactions.iter().map(|it| it.bonds.store());
+        stores.any(|store| store.number_bytes() > 0)
+    }
+
+    /// Calls `found` with the local indices of both ends of every broken bond of the owned points.
+    pub fn for_each_broken(&self, mut found: impl FnMut(usize, usize)) {
+        for interaction in &self.interactions {
+            interaction.bonds.for_each_broken(&mut found);
+        }
+    }
+
+    /// Brings the entries of ghosts from their owners.
+    pub fn bring(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
+        self.halo.pack([&*values].into_iter());
+        self.halo.exchange(comm, &mut |_| {});
+        self.halo.unpack([&mut *values].into_iter());
+    }
+
     /// Brings the ghosts' displacements up to date.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         self.halo.pack(displacement.iter().map(Vec::as_slice));
@@ -250,9 +270,7 @@ impl<const D: usize> Forces<D> {
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
     /// brought from their owners.
     pub fn protect(&mut self, comm: &dyn Communicator, protected: &mut [f64]) {
-        self.halo.pack([&*protected].into_iter());
-        self.halo.exchange(comm, &mut |_| {});
-        self.halo.unpack([&mut *protected].into_iter());
+        self.bring(comm, protected);
         for interaction in &mut self.interactions {
             interaction.bonds.protect(|point| protected[point] == 1.0);
         }

@@ -12,6 +12,8 @@ pub struct Load<const D: usize> {
     positions: Vec<[f64; 3]>,
     values: [Values; D],
     factors: [f64; D],
+    /// With which share points take part; wholly if there is none.
+    shares: Option<Vec<f64>>,
     /// Force density now, N/m³.
     force: Vec<[f64; D]>,
     /// Force density and place (m) before the step.
@@ -20,10 +22,11 @@ pub struct Load<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// On some of the owned points: each component is its expression times its factor, N/m³.
+    /// On some of the owned points: each component is its expression times its factor, N/m³, times the
+    /// point's share if there are shares.
     pub fn new(
         model: &Model<D>,
-        points: Vec<u32>,
+        (points, shares): (Vec<u32>, Option<Vec<f64>>),
         values: &[Expression],
         factors: [f64; D],
     ) -> Self {
@@ -32,6 +35,7 @@ impl<const D: usize> Load<D> {
             positions: points.iter().map(position).collect(),
             values: std::array::from_fn(|d| Values::new(&values[d])),
             factors,
+            shares,
             force: vec![[0.0; D]; points.len()],
             before: vec![[0.0; D]; points.len()],
             moved_from: vec![[0.0; D]; points.len()],
@@ -51,6 +55,9 @@ impl<const D: usize> Load<D> {
             self.values[d].at(&self.positions, time, |k, value| {
                 force[k][d] = factor * value;
             });
+        }
+        for (force, share) in self.force.iter_mut().zip(self.shares.iter().flatten()) {
+            *force = force.map(|component| share * component);
         }
     }
 

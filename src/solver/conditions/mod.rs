@@ -12,6 +12,7 @@ use crate::deck::expression::Expression;
 use crate::deck::plan::{Action, Plan};
 use crate::error::Result;
 use crate::points::set;
+use crate::refine::{Grids, Shares};
 
 use super::model::Model;
 use super::motion::Fields;
@@ -38,6 +39,31 @@ pub fn members<const D: usize>(plan: &Plan, model: &Model<D>, set: usize) -> Vec
         .filter(|point| chosen(*point))
         .map(|point| point as u32)
         .collect()
+}
+
+/// Local indices of the owned points that a load on a set acts on, and with which share where that can be less
+/// than all: so the sum of the load stays the same when the grid is refined.
+fn loaded<const D: usize>(
+    plan: &Plan,
+    model: &Model<D>,
+    grids: &Grids<'_>,
+    set: usize,
+) -> (Vec<u32>, Option<Vec<f64>>) {
+    if plan.refinement.is_none() {
+        return (members(plan, model, set), None);
+    }
+    let mut shares = Shares::new(grids);
+    // Sets of a load are not given by ids here, see `is_possible`.
+    let chosen = |body: usize, position: [f64; 3]| {
+        set::contains(&plan.sets[set], plan.horizon, 0, position, body)
+    };
+    let found = (0..model.owned()).map(|point| {
+        let body = plan.body_of(usize::from(model.block[point]));
+        let share = shares.of((body, model.ids[point], model.position(point)), &chosen);
+        (point as u32, share)
+    });
+    let (points, shares) = found.filter(|(_, share)| *share > 0.0).unzip();
+    (points, Some(shares))
 }
 
 /// An input error if a set that something acts on has no points on any rank.
@@ -67,7 +93,7 @@ impl<const D: usize> Conditions<D> {
     pub fn new(
         plan: &Plan,
         comm: &dyn Communicator,
-        model: &Model<D>,
+        (model, grids): (&Model<D>, &Grids<'_>),
         acting: &[bool],
     ) -> Result<Self> {
         let mut loads = Vec::new();
@@ -93,12 +119,15 @@ impl<const D: usize> Conditions<D> {
                 Action::Velocity(values) => prescribe(Motion::Velocity, values),
                 Action::BodyForce(values, factors) => {
                     let factors = std::array::from_fn(|d| factors[d]);
+                    let points = loaded(plan, model, grids, condition.set);
                     loads.push(Load::new(model, points, values, factors));
                 }
                 Action::Force(values) => {
                     let mut volume = [ExactSum::default()];
-                    for point in &points {
-                        volume[0].add(model.volume[*point as usize]);
+                    let points = loaded(plan, model, grids, condition.set);
+                    for (k, point) in points.0.iter().enumerate() {
+                        let share = points.1.as_ref().map_or(1.0, |shares| shares[k]);
+                        volume[0].add(share * model.volume[*point as usize]);
                     }
                     let volume = reduce(comm, &mut volume)[0];
                     loads.push(Load::new(model, points, values, [1.0 / volume; D]));

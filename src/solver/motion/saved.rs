@@ -5,6 +5,7 @@
 use crate::comm::{IdOrder, agree};
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
+use crate::solver::refinement::Refined;
 
 use super::Clock;
 use super::adaptive::StepControl;
@@ -21,7 +22,7 @@ pub struct Saved {
     pub lengths: Vec<u32>,
     /// What is kept of the bonds of the points, one after the other.
     pub bonds: Vec<u8>,
-    /// Stage, clock, step and load step, the same on all ranks.
+    /// What the run has come to, but for its points: the same on all ranks.
     pub progress: Vec<u64>,
 }
 
@@ -31,25 +32,31 @@ const CLOCK: usize = 5;
 /// Words of what an adaptive step follows.
 const STEP_CONTROL: usize = 6;
 
+/// Words of what refinements have done.
+const REFINED: usize = 2;
+
 impl<const D: usize> Simulation<'_, D> {
-    /// Stage, clock and load step.
-    fn progress(&self) -> Vec<u64> {
+    /// What the run has come to, but for its points.
+    pub(in crate::solver) fn progress(&self) -> Vec<u64> {
         let clock = self.clock.words().into_iter();
         let stage = [self.stage as u64].into_iter();
         let steps = self.step_control.words().into_iter();
         let times = stage.chain(clock).chain(steps);
-        times.chain(self.load_step.words()).collect()
+        let refined = self.refined.words().into_iter();
+        times.chain(refined).chain(self.load_step.words()).collect()
     }
 
     /// Goes back to what [`Self::progress`] gave.
-    fn continue_from(&mut self, progress: &[u64]) {
+    pub(in crate::solver) fn continue_from(&mut self, progress: &[u64]) {
         let (stage, rest) = progress.split_at(1);
         let (clock, rest) = rest.split_at(CLOCK);
-        let (steps, load_step) = rest.split_at(STEP_CONTROL);
+        let (steps, rest) = rest.split_at(STEP_CONTROL);
+        let (refined, load_step) = rest.split_at(REFINED);
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
         self.step_control = StepControl::of_words(std::array::from_fn(|k| steps[k]));
+        self.refined = Refined::of_words(std::array::from_fn(|k| refined[k]));
         self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
     }
 

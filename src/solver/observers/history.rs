@@ -38,6 +38,8 @@ pub struct HistoryObserver {
     fronts: Vec<Front>,
     cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
+    /// Whether points may be born.
+    refines: bool,
     /// Energy (J) in the first row, and intact bonds before.
     start: Option<(f64, u64)>,
 }
@@ -57,7 +59,8 @@ pub struct Energies {
     pub work: f64,
     /// Taken by viscous damping and by bonds that yield.
     pub dissipated: f64,
-    /// Kinetic + strain + fracture + dissipated − work, less its value at the start: 0 for an exact integrator.
+    /// Kinetic + strain + fracture + dissipated − work, less its value at the start and what refinements
+    /// have added: 0 for an exact integrator.
     pub error: f64,
 }
 
@@ -109,6 +112,10 @@ impl HistoryObserver {
         }
         if plan.scales_density() {
             columns.push(("kinetic_ratio".to_owned(), "1"));
+        }
+        if simulation.may_refine() {
+            columns.push(("points".to_owned(), "1"));
+            columns.push(("refinement_energy".to_owned(), "J"));
         }
         let vector = |columns: &mut Vec<_>, name: String, unit| {
             columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), unit)));
@@ -174,6 +181,7 @@ impl HistoryObserver {
             fronts,
             cracks,
             tips,
+            refines: simulation.may_refine(),
             start: None,
         })
     }
@@ -281,9 +289,11 @@ impl HistoryObserver {
             overshoot,
             work,
             dissipated,
-            error: energy - first_energy,
+            error: energy - first_energy - simulation.refined.energy,
         };
-        let broken = (first_intact - intact) / 2;
+        // Refinements add intact bonds, and take some away where horizons become shorter.
+        let there_were = first_intact as i64 + simulation.refined.bonds;
+        let broken = (there_were - intact as i64) as u64 / 2;
         let mut values = vec![
             simulation.clock.time(),
             simulation.clock.number() as f64,
@@ -309,6 +319,9 @@ impl HistoryObserver {
         }
         if simulation.plan.scales_density() {
             values.push(energies.kinetic / energies.strain);
+        }
+        if self.refines {
+            values.extend([simulation.model.total as f64, simulation.refined.energy]);
         }
         values.extend(&own[3..]);
         values.extend(&lower[..D]);

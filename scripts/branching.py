@@ -1,0 +1,132 @@
+"""A crack that branches on a grid that is refined where it runs, beside uniform grids (Dipasquale et al. 2014, §4).
+
+Runs inputs/crack_branching_adaptive.toml with horizons of 3 and 6 of its finer spacings, and with two levels, and
+the same plate on the coarse grid and on grids that are fine everywhere, one after the other on one core. Prints for
+each the points, the time of the run, the fracture energy, the length of the crack and, for a refined grid, the largest
+distance of its crack from that of the uniform fine grid; draws the cracks into the output folder.
+"""
+
+import argparse
+import csv
+import pathlib
+import re
+import subprocess
+import time
+
+import h5py
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DECK = ROOT / "inputs" / "crack_branching_adaptive.toml"
+COARSE = 1e-3  # spacing of the deck, m
+BEYOND_THE_NOTCH = 0.055  # m
+
+
+def without_refinement(text):
+    return re.sub(r"(?ms)^\[refinement[^\]]*\]\n.*?(?=^\[(?!refinement)|\Z)", "", text)
+
+
+def uniform(spacing, horizon):
+    """The plate on a grid of one spacing; spacing and horizon in m."""
+    text = without_refinement(DECK.read_text())
+    text = re.sub(r"(?m)^dx = \S+", f"dx = {spacing}", text)
+    return re.sub(r'(?m)^horizon = "3\*dx"', f"horizon = {horizon}", text)
+
+
+def refined(ratio):
+    """The plate on a grid that is refined once, with so many finer spacings a horizon there."""
+    return re.sub(r"(?m)^m = \S+", f"m = {ratio}", DECK.read_text(), count=1)
+
+
+def refined_twice():
+    """The plate on a grid that is refined twice, with the same ratio on all levels."""
+    text = re.sub(r"(?m)^levels = 1", "levels = 2", DECK.read_text())
+    text = re.sub(r'(?m)^rule = .*\n^m = \["m"\]\n', 'rule = "delta"\n', text)
+    return re.sub(r"(?m)^interface_factor = .*\n", "", text)
+
+
+# Name, deck, and the uniform grid that it is compared with.
+CASES = [
+    ("coarse", uniform(COARSE, 3 * COARSE), None),
+    ("fine, m = 3", uniform(COARSE / 2, 1.5 * COARSE), None),
+    ("refined, m = 3", refined(3), "fine, m = 3"),
+    ("fine, m = 6", uniform(COARSE / 2, 3 * COARSE), None),
+    ("refined, m = 6", refined(6), "fine, m = 6"),
+    ("finer, m = 3", uniform(COARSE / 4, 0.75 * COARSE), None),
+    ("refined twice, m = 3", refined_twice(), "finer, m = 3"),
+]
+
+
+def run(arguments, name, text):
+    """The folder with the result, and the time that the run took, s."""
+    folder = arguments.folder / re.sub(r"\W+", "_", name)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "deck.toml").write_text(text)
+    out = folder / "out"
+    command = [arguments.fissure, "run", folder / "deck.toml", "--output", out, "--overwrite", "--quiet"]
+    seconds = []
+    for _ in range(arguments.repeat):
+        begin = time.monotonic()
+        subprocess.run([str(part) for part in [*command, "--threads", "1"]], check=True)
+        seconds.append(time.monotonic() - begin)
+    return out, min(seconds)
+
+
+def lines(out):
+    """The branches of the crack at the end, each an array of places in m."""
+    branches = {}
+    with open(out / "crack_notch.csv", newline="") as file:
+        for row in csv.DictReader(file):
+            branches.setdefault(row["branch"], []).append([float(row["x [m]"]), float(row["y [m]"])])
+    return [numpy.array(branch) for branch in branches.values()]
+
+
+def distance(places, branches):
+    """The largest distance of places that the notch has not from the nearest of all lines, m."""
+    places = places[places[:, 0] > BEYOND_THE_NOTCH]
+    nearest = numpy.full(len(places), numpy.inf)
+    for branch in branches:
+        for start, end in zip(branch[:-1], branch[1:]):
+            along = end - start
+            share = numpy.clip((places - start) @ along / max(along @ along, 1e-30), 0, 1)
+            gaps = places - start - share[:, None] * along
+            nearest = numpy.minimum(nearest, numpy.hypot(*gaps.T))
+    return nearest.max()
+
+
+def apart(one, other):
+    """The largest distance between two cracks, seen from either, m; not a number where there is none."""
+    if not one or not other:
+        return numpy.nan
+    return max(distance(numpy.concatenate(one), other), distance(numpy.concatenate(other), one))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
+    parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/branching")
+    parser.add_argument("--repeat", type=int, default=1, help="runs of each case, of which the fastest counts [1]")
+    arguments = parser.parse_args()
+    found = {}
+    print("grid                   points at start, end    time, s   fracture, mJ   length, mm   branches   apart, mm")
+    for name, text, reference in CASES:
+        out, seconds = run(arguments, name, text)
+        with h5py.File(out / "result.vtkhdf") as file:
+            history = file["history"]
+            counts = file["VTKHDF/NumberOfPoints"][:]
+            energy = 1e3 * history["fracture_energy"][-1]
+            length = 1e3 * history["crack_notch_length"][-1]
+        branches = lines(out)
+        found[name] = branches
+        gap = f"{1e3 * apart(branches, found[reference]):9.2f}" if reference else "        -"
+        print(
+            f"{name:20} {counts[0]:8} {counts[-1]:8} {seconds:15.2f} {energy:14.2f} {length:12.1f} {len(branches):10} {gap}",
+            flush=True,
+        )
+        picture = arguments.folder / f"{re.sub(r'[^0-9a-z]+', '_', name)}.png"
+        plot = [arguments.fissure, "plot", out / "result.vtkhdf", "--field", "damage", "--output", picture]
+        subprocess.run([str(part) for part in [*plot, "--path", out / "crack_notch.csv"]], check=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+//! Points of a result that are others from step to step.
+
+use hdf5_metno::H5Type;
+
+use super::collective::CollectiveFile;
+use super::dataset::{Dataset, Rows};
+use super::field::{FieldData, FieldDescription, create_field, write_field};
+use super::vtkhdf::{LEAST_ROWS, Piece, VTK_VERTEX};
+use crate::error::Result;
+
+/// What VTKHDF wants to know the number of, a row a part.
+const COUNTS: [&str; 3] = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
+
+/// The datasets that hold the points of all steps one after the other.
+pub struct ChangingPoints {
+    counts: Vec<Dataset>,
+    positions: Dataset,
+    types: Dataset,
+    connectivity: Dataset,
+    offsets: Dataset,
+    fixed: Vec<Fixed>,
+}
+
+/// A field that does not change while the points are the same.
+struct Fixed {
+    field: FieldDescription,
+    kind: FieldData<'static>,
+    dataset: Dataset,
+}
+
+impl ChangingPoints {
+    /// Without points; so many are expected in a step.
+    pub fn create(
+        file: &mut CollectiveFile<'_>,
+        total: u64,
+        fixed: &[(FieldDescription, FieldData<'_>)],
+    ) -> Result<Self> {
+        let rows = Rows::Extensible { per_append: total };
+        let parts = Rows::Extensible {
+            per_append: LEAST_ROWS,
+        };
+        let counts = COUNTS
+            .iter()
+            .map(|name| file.create_dataset::<i64>(&format!("/VTKHDF/{name}"), parts, None));
+        let counts = counts.collect::<Result<_>>()?;
+        let make = |(field, data): &(FieldDescription, FieldData)| {
+            let kind = data.none();
+            let dataset = create_field(file, field, &kind, rows)?;
+            Ok(Fixed {
+                field: *field,
+                kind,
+                dataset,
+            })
+        };
+        let fixed = fixed.iter().map(make).collect::<Result<_>>()?;
+        Ok(Self {
+            counts,
+            positions: file.create_dataset::<f64>("/VTKHDF/Points", rows, Some(3))?,
+            types: file.create_dataset::<u8>("/VTKHDF/Types", rows, None)?,
+            connectivity: file.create_dataset::<i64>("/VTKHDF/Connectivity", rows, None)?,
+            offsets: file.create_dataset::<i64>("/VTKHDF/Offsets", rows, None)?,
+            fixed,
+        })
+    }
+
+    /// Adds the points of a step, after so many points and steps.
+    pub fn write(
+        &mut self,
+        file: &mut CollectiveFile<'_>,
+        piece: Piece,
+        (rows, steps): (u64, u64),
+        positions: &[[f64; 3]],
+        fixed: &[(FieldDescription, FieldData<'_>)],
+    ) -> Result<()> {
+        let count = positions.len();
+        let root = file.communicator().rank() == 0;
+        let total: &[i64] = &[piece.total as i64];
+        for dataset in &mut self.counts {
+            file.resize(dataset, steps + 1)?;
+            file.write_rows(dataset, steps, if root { total } else { &[] })?;
+        }
+        let (first, end) = (rows + piece.first, rows + piece.total);
+        for dataset in [&mut self.positions, &mut self.types, &mut self.connectivity] {
+            file.resize(dataset, end)?;
+        }
+        file.write_rows(&self.positions, first, positions.as_flattened())?;
+        file.write_rows(&self.types, first, &vec![VTK_VERTEX; count])?;
+        let own = piece.first as i64..(piece.first as usize + count) as i64;
+        let own: Vec<i64> = own.collect();
+        file.write_rows(&self.connectivity, first, &own)?;
+        // One row more than cells in each step: each rank writes where its cells end, the first one also
+        // where they begin.
+        file.resize(&mut self.offsets, end + steps + 1)?;
+        let begin = piece.first + u64::from(!root);
+        let ends: Vec<i64> = (begin..piece.first + count as u64 + 1)
+            .map(|k| k as i64)
+            .collect();
+        file.write_rows(&self.offsets, rows + steps + begin, &ends)?;
+        for (known, (_, data)) in self.fixed.iter_mut().zip(fixed) {
+            file.resize(&mut known.dataset, end)?;
+            write_field(file, &known.dataset, first, &known.field, data)?;
+        }
+        Ok(())
+    }
+
+    /// Copies the first rows, of so many steps, of another file.
+    pub fn copy(
+        &mut self,
+        old: &mut CollectiveFile<'_>,
+        file: &mut CollectiveFile<'_>,
+        rows: u64,
+        steps: u64,
+    ) -> Result<()> {
+        for dataset in &mut self.counts {
+            copy::<i64>(old, file, dataset, steps)?;
+        }
+        copy::<f64>(old, file, &mut self.positions, rows)?;
+        copy::<u8>(old, file, &mut self.types, rows)?;
+        copy::<i64>(old, file, &mut self.connectivity, rows)?;
+        copy::<i64>(old, file, &mut self.offsets, rows + steps)?;
+        for Fixed { kind, dataset, .. } in &mut self.fixed {
+            match kind {
+                FieldData::F64(_) => copy::<f64>(old, file, dataset, rows)?,
+                FieldData::F32(_) => copy::<f32>(old, file, dataset, rows)?,
+                FieldData::U64(_) => copy::<u64>(old, file, dataset, rows)?,
+                FieldData::U32(_) => copy::<u32>(old, file, dataset, rows)?,
+                FieldData::U8(_) => copy::<u8>(old, file, dataset, rows)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Copies the first rows of the dataset of the same name in another file, each rank a share of them.
+pub fn copy<T: H5Type + bytemuck::Pod>(
+    old: &mut CollectiveFile<'_>,
+    file: &mut CollectiveFile<'_>,
+    dataset: &mut Dataset,
+    rows: u64,
+) -> Result<()> {
+    let (rank, size) = {
+        let comm = file.communicator();
+        (comm.rank() as u64, comm.size() as u64)
+    };
+    let share = |rank: u64| (u128::from(rows) * u128::from(rank) / u128::from(size)) as u64;
+    let (first, end) = (share(rank), share(rank + 1));
+    let source = old.open_dataset(&dataset.path)?;
+    let values: Vec<T> = old.read_rows(&source, first, (end - first) as usize)?;
+    file.resize(dataset, rows)?;
+    file.write_rows(dataset, first, &values)
+}

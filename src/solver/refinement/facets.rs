@@ -1,0 +1,94 @@
+//! The faces along which cracks have parted the points of a grid.
+
+use crate::points::bins::Bins;
+use crate::refine::gather;
+use crate::solver::Simulation;
+use crate::solver::assign::cutoffs;
+
+/// How much larger than a cell's side a face is, so that rounding opens no gap.
+const OVERLAP: f64 = 1.0 + 1e-6;
+
+/// The faces between points next to one another whose bond is broken, of all ranks.
+pub struct Facets {
+    all: Vec<Facet>,
+    bins: Bins,
+}
+
+impl Facets {
+    /// Of the present bonds. Collective.
+    pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
+        let (plan, comm) = (simulation.plan, simulation.comm);
+        let model = &simulation.model;
+        let mut blocks: Vec<f64> = model.block.iter().map(|block| f64::from(*block)).collect();
+        blocks.resize(model.volume.len(), 0.0);
+        simulation.forces.bring(comm, &mut blocks);
+        let mut own: Vec<Facet> = Vec::new();
+        simulation.forces.for_each_broken(|here, there| {
+            if model.ids[here] > model.ids[there] {
+                return;
+            }
+            let [a, b] = [here, there].map(|point| model.position(point));
+            let edges = [here, there].map(|point| plan.block(blocks[point] as usize).spacing());
+            let [Some(first), Some(second)] = edges else {
+                return;
+            };
+            let edges: [f64; 3] = std::array::from_fn(|k| first[k].min(second[k]));
+            let apart = |k: usize| (b[k] - a[k]).abs() > 1e-3 * edges[k];
+            let next = |k: usize| (b[k] - a[k]).abs() < (1.0 + 1e-3) * edges[k];
+            let mut along = (0..D).filter(|k| apart(*k));
+            if let (Some(axis), None) = (along.next(), along.next())
+                && next(axis)
+            {
+                own.push(Facet {
+                    centre: std::array::from_fn(|k| 0.5 * (a[k] + b[k])),
+                    edges,
+                    axis: axis as u64,
+                });
+            }
+        });
+        let all: Vec<Facet> = gather(comm, &own);
+        let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
+        let centres: Vec<[f64; 3]> = all.iter().map(|facet| facet.centre).collect();
+        let widest = all.iter().flat_map(|facet| facet.edges[..D].iter());
+        let widest = widest.copied().fold(0.0, f64::max);
+        Self {
+            bins: Bins::new(&centres, 0.5 * longest + widest),
+            all,
+        }
+    }
+
+    /// Whether one of them lies between two positions (m) that are not farther apart than points with a bond.
+    pub fn lie_between(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+        let middle = std::array::from_fn(|k| 0.5 * (from[k] + to[k]));
+        let mut crossed = false;
+        self.bins.within(middle, |facet, _| {
+            crossed = crossed || self.all[facet as usize].is_crossed(from, to);
+        });
+        crossed
+    }
+}
+
+/// A face between two points next to one another, across an axis.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Facet {
+    centre: [f64; 3],
+    edges: [f64; 3],
+    axis: u64,
+}
+
+impl Facet {
+    /// Whether a line crosses it. Faces side by side leave no gap.
+    fn is_crossed(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+        let axis = self.axis as usize;
+        let [before, after] = [from, to].map(|place| place[axis] - self.centre[axis]);
+        if before * after >= 0.0 {
+            return false;
+        }
+        let share = before / (before - after);
+        (0..3).filter(|k| *k != axis).all(|k| {
+            let place = from[k] + share * (to[k] - from[k]);
+            (place - self.centre[k]).abs() <= 0.5 * OVERLAP * self.edges[k]
+        })
+    }
+}

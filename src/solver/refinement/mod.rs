@@ -1,0 +1,379 @@
+//! Refinement during a run: which points are refined, and what the new ones begin with.
+//!
+//! Points with much strain energy or damage are triggers, and all points within a horizon of one are refined
+//! (Dipasquale et al. 2014, §2.1). A new point has the mean of what the points that it lies between have;
+//! as it takes its volume in equal parts from them, mass and momentum stay. Bonds between points that were
+//! there stay as they are; a new bond is broken if it crosses a pre-crack or a face along which points
+//! are parted, and between points that are parted none is born.
+
+use std::time::Instant;
+
+use crate::comm::sum::{ExactSum, reduce};
+use crate::comm::{self, IdOrder, agree};
+use crate::deck::expression::Expression;
+use crate::deck::plan::{Action, Plan, Selector, StepRule, Trigger};
+use crate::error::Result;
+use crate::points::bins::Bins;
+use crate::points::{Point, distance_squared};
+use crate::refine::{Grids, Pick, gather};
+
+mod facets;
+mod past;
+
+use super::Simulation;
+use super::assign::cutoffs;
+use super::motion::fields::Birth;
+use super::observers::Snapshot;
+use facets::Facets;
+use past::{NOWHERE, Past};
+
+/// What refinements have done since the start; the same on all ranks.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Refined {
+    /// Kinetic and strain energy that they added, J.
+    pub energy: f64,
+    /// Intact bonds that they added, each counted from both ends.
+    pub bonds: i64,
+}
+
+impl Refined {
+    /// As a checkpoint holds it.
+    pub fn words(self) -> [u64; 2] {
+        [self.energy.to_bits(), self.bonds as u64]
+    }
+
+    /// What [`Self::words`] gave.
+    pub fn of_words([energy, bonds]: [u64; 2]) -> Self {
+        Self {
+            energy: f64::from_bits(energy),
+            bonds: bonds as i64,
+        }
+    }
+}
+
+/// A point that makes those within its horizon be refined.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Source {
+    position: [f64; 3],
+    horizon: f64,
+}
+
+/// Whether a run can refine as its plan wants.
+///
+/// # Errors
+/// With loads on sets given by ids; during a run with steps that are undone and with relaxation.
+pub fn is_possible(plan: &Plan) -> Result<()> {
+    let Some(refinement) = &plan.refinement else {
+        return Ok(());
+    };
+    let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
+    let is_by_ids = |set: usize| matches!(plan.sets[set].selector, Selector::Ids { .. });
+    let mut conditions = plan.conditions.iter();
+    if let Some(condition) = conditions.find(|c| is_load(&c.action) && is_by_ids(c.set)) {
+        let message = format!(
+            "[condition.{}] set: a load on points given by their ids cannot follow a refined grid; give \
+             the set by `where`",
+            condition.name
+        );
+        return Err(plan.source.error(condition.span.clone(), message));
+    }
+    let Some(trigger) = &refinement.trigger else {
+        return Ok(());
+    };
+    let other = if plan.relaxes() {
+        "method = \"relaxation\""
+    } else if plan.adapts() {
+        "an adaptive step"
+    } else {
+        return Ok(());
+    };
+    let message = format!(
+        "[refinement.trigger]: does not go with {other}; refine `[refinement.region]` from the start"
+    );
+    Err(plan.source.error(trigger.span.clone(), message))
+}
+
+impl<'a, const D: usize> Simulation<'a, D> {
+    fn trigger(&self) -> Option<&'a Trigger> {
+        let refinement = self.plan.refinement.as_ref();
+        refinement.and_then(|refinement| refinement.trigger.as_ref())
+    }
+
+    /// Whether points may be born during the run.
+    pub fn may_refine(&self) -> bool {
+        self.trigger().is_some()
+    }
+
+    /// Whether bonds can be given to new points. Collective.
+    ///
+    /// # Errors
+    /// When bonds remember what they went through.
+    pub(super) fn can_bond_new_points(&self) -> Result<()> {
+        let Some(trigger) = self.trigger().filter(|_| self.forces.remember()) else {
+            return agree(self.comm, Ok(()));
+        };
+        let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
+                       have not; refine `[refinement.region]` from the start";
+        let error = self.plan.source.error(trigger.span.clone(), message);
+        agree(self.comm, Err(error))
+    }
+
+    /// Whether it is time to look for points to be refined.
+    pub fn is_refinement_due(&self) -> bool {
+        self.trigger()
+            .is_some_and(|trigger| self.clock.number().is_multiple_of(trigger.every_steps))
+    }
+
+    /// Refines what the triggers of the plan want. Returns how many points were born over all ranks.
+    /// Collective.
+    ///
+    /// # Errors
+    /// When METIS fails; the same on all ranks.
+    pub fn refine(&mut self) -> Result<u64> {
+        let Some(trigger) = self.trigger() else {
+            return Ok(0);
+        };
+        let start = Instant::now();
+        let snapshot = Snapshot::new(self);
+        let sources = self.sources(trigger, &snapshot);
+        let picks = gather(self.comm, &self.visible(&sources));
+        let mut grids = self.grids.clone();
+        if !grids.refine(&picks) {
+            return Ok(0);
+        }
+        let facets = Facets::new(self);
+        grids.part(&self.grids, &|a, b| facets.lie_between(a, b));
+        let [energy, bonds] = self.held(&snapshot);
+        let before = self.model.total;
+        self.regrid(grids, &facets)?;
+        let snapshot = Snapshot::new(self);
+        let [new_energy, new_bonds] = self.held(&snapshot);
+        self.refined.energy += new_energy - energy;
+        self.refined.bonds += new_bonds as i64 - bonds as i64;
+        self.times.regridding += start.elapsed();
+        Ok(self.model.total - before)
+    }
+
+    /// Kinetic and strain energy (J), and intact bonds from both ends, over all ranks.
+    fn held(&self, snapshot: &Snapshot) -> [f64; 2] {
+        let model = &self.model;
+        let mut sum = [ExactSum::ZERO];
+        for point in 0..model.owned() {
+            let mass = model.density_of(point) * model.volume[point];
+            let square: f64 = (0..D).map(|d| self.fields.velocity[d][point].powi(2)).sum();
+            sum[0].add(0.5 * mass * square);
+            sum[0].add(snapshot.stored.energy[point] * model.volume[point]);
+        }
+        let own = snapshot
+            .stored
+            .neighbours
+            .iter()
+            .map(|count| *count as u64)
+            .sum();
+        let energy = reduce(self.comm, &mut sum)[0];
+        [energy, comm::total(self.comm, own) as f64]
+    }
+
+    /// The triggers of all ranks.
+    fn sources(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<Source> {
+        let model = &self.model;
+        let mut most = [0.0_f64];
+        for energy in &snapshot.stored.energy {
+            most[0] = most[0].max(*energy);
+        }
+        self.comm.max(&mut most);
+        let least = trigger
+            .energy
+            .map_or(f64::INFINITY, |share| share * most[0]);
+        let time = self.clock.time();
+        let holds = |condition: &Expression, point| condition.is_true(model.position(point), time);
+        let is_source = |point: usize| {
+            if trigger
+                .only
+                .as_ref()
+                .is_some_and(|only| !holds(only, point))
+            {
+                return false;
+            }
+            let energy = snapshot.stored.energy[point];
+            let damage = || snapshot.damage(&self.family_volume, point);
+            energy >= least && energy > 0.0
+                || trigger.damage.is_some_and(|least| damage() >= least)
+                || (trigger.condition.as_ref()).is_some_and(|condition| holds(condition, point))
+        };
+        let own = (0..model.owned()).filter(|point| is_source(*point));
+        let own: Vec<Source> = own
+            .map(|point| Source {
+                position: model.position(point),
+                horizon: self.plan.block(usize::from(model.block[point])).horizon,
+            })
+            .collect();
+        gather(self.comm, &own)
+    }
+
+    /// The nodes of this rank that are to be refined: points that can be, within the horizon of a trigger.
+    fn visible(&self, sources: &[Source]) -> Vec<Pick> {
+        let longest = sources
+            .iter()
+            .map(|source| source.horizon)
+            .fold(0.0, f64::max);
+        if longest == 0.0 {
+            return Vec::new();
+        }
+        let places: Vec<[f64; 3]> = sources.iter().map(|source| source.position).collect();
+        let bins = Bins::new(&places, longest * (1.0 + 1e-9));
+        let model = &self.model;
+        let mut picks = Vec::new();
+        for point in 0..model.owned() {
+            let block = usize::from(model.block[point]);
+            let position = model.position(point);
+            let mut seen = false;
+            bins.within(position, |source, square| {
+                let horizon = sources[source as usize].horizon * (1.0 + 1e-9);
+                seen |= square <= horizon * horizon;
+            });
+            if seen {
+                picks.extend(self.grids.pick(block, position));
+            }
+        }
+        picks
+    }
+
+    /// Puts the run on other grids, with everything that points and bonds have. Collective.
+    ///
+    /// # Errors
+    /// When METIS fails; the same on all ranks.
+    fn regrid(&mut self, grids: Grids<'a>, facets: &Facets) -> Result<()> {
+        let comm = self.comm;
+        let past = Past::new(self, &grids);
+        let pieces = self.pieces_on(&grids);
+        let (ids, rows) = past.rows(self, &grids, &pieces);
+        let mut broken = self.broken();
+        broken.resize(ids.len(), Vec::new());
+        let source = IdOrder::new(comm, &ids, self.model.coarsest);
+        let width = past.columns.len();
+        let rows = source.collect(comm, &rows, width);
+        let lengths: Vec<u32> = broken.iter().map(|ids| ids.len() as u32).collect();
+        let block_lengths = source.collect(comm, &lengths, 1);
+        let broken = source.collect_ragged(comm, &broken.concat(), &lengths, &block_lengths);
+        drop(past);
+
+        let mut other = self.on(grids, pieces)?;
+        let order = other.id_order();
+        let rows = order.spread(comm, &rows, width);
+        let lengths = order.spread(comm, &block_lengths, 1);
+        let broken = order.spread_ragged(comm, &broken, &lengths, &block_lengths);
+        other.inherit(&rows, width, (&lengths, &broken), facets);
+        other.take_rows(&rows, width);
+        let steps = std::mem::take(&mut other.steps);
+        other.continue_from(&self.progress());
+        other.steps = steps;
+        other.times = self.times;
+        let (time, rule) = (other.clock.time(), other.time_rule());
+        if let StepRule::Automatic(safety) = rule.step {
+            let rest = rule.end - time;
+            let most = safety * other.scaled_stable_step();
+            other.clock.set_step(rest / (rest / most).ceil());
+        }
+        other.conditions.place(&mut other.fields, time, 0.0);
+        other.find_anew();
+        *self = other;
+        Ok(())
+    }
+
+    /// The points of other grids in the cells of this rank's points of level 0.
+    fn pieces_on(&self, grids: &Grids<'a>) -> Vec<Point> {
+        let coarse = self.pieces().into_iter();
+        let coarse = coarse.filter(|point| point.id < grids.coarsest());
+        grids.points(grids.unrefined(coarse))
+    }
+
+    /// The run at time 0 on other grids.
+    fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
+        Self::of_points(self.plan, self.comm, (pieces, grids), None, &mut || Ok(()))
+    }
+
+    /// Goes back to the grids that an earlier part of the run had refined so, at time 0. Collective.
+    ///
+    /// # Errors
+    /// When METIS fails; the same on all ranks.
+    pub fn refine_to(&mut self, state: &[Vec<Pick>; 2]) -> Result<()> {
+        let mut grids = self.grids.clone();
+        if grids.refine_to(state) {
+            let pieces = self.pieces_on(&grids);
+            *self = self.on(grids, pieces)?;
+        }
+        Ok(())
+    }
+
+    /// For each owned point the ids of those to which its bond is broken, ascending.
+    fn broken(&self) -> Vec<Vec<u64>> {
+        let mut broken = vec![Vec::new(); self.model.owned()];
+        self.forces
+            .for_each_broken(|here, there| broken[here].push(self.model.ids[there]));
+        broken.iter_mut().for_each(|ids| ids.sort_unstable());
+        broken
+    }
+
+    /// Breaks the bonds that were broken, and those of new points that cross facets. The last number of a
+    /// row is the block that the point had.
+    fn inherit(
+        &mut self,
+        rows: &[f64],
+        width: usize,
+        (lengths, broken): (&[u32], &[u64]),
+        facets: &Facets,
+    ) {
+        let model = &self.model;
+        let mut was: Vec<f64> = rows
+            .iter()
+            .skip(width - 1)
+            .step_by(width)
+            .copied()
+            .collect();
+        was.resize(model.volume.len(), 0.0);
+        self.forces.bring(self.comm, &mut was);
+        let ends = lengths.iter().scan(0, |end, length| {
+            *end += *length as usize;
+            Some(*end)
+        });
+        let starts: Vec<usize> = std::iter::once(0).chain(ends).collect();
+        let cutoffs = cutoffs(self.plan);
+        let count = self.plan.block_count();
+        let cut = |here: usize, there: usize| {
+            let [a, b] = [here, there].map(|point| model.position(point));
+            let [old, other] = [was[here], was[there]];
+            if old != NOWHERE && other != NOWHERE {
+                let cutoff = cutoffs[old as usize * count + other as usize];
+                if distance_squared(a, b) <= cutoff * cutoff {
+                    let own = &broken[starts[here]..starts[here + 1]];
+                    return own.binary_search(&model.ids[there]).is_ok();
+                }
+            }
+            if model.ids[here] < model.ids[there] {
+                facets.lie_between(a, b)
+            } else {
+                facets.lie_between(b, a)
+            }
+        };
+        self.forces.cut(cut);
+    }
+
+    /// Takes the state of the owned points from rows, of which the last number is none of it.
+    fn take_rows(&mut self, rows: &[f64], width: usize) {
+        let volume = &self.model.volume;
+        let fields = self.fields.each_mut().filter(|(field, _)| field.state);
+        let columns =
+            fields.flat_map(|(field, columns)| columns.iter_mut().map(move |c| (field, c)));
+        for (k, (field, column)) in columns.enumerate() {
+            let values = rows.iter().skip(k).step_by(width);
+            for ((number, value), volume) in column.iter_mut().zip(values).zip(volume) {
+                *number = match field.birth {
+                    Birth::Shared => value * volume,
+                    _ => *value,
+                };
+            }
+        }
+    }
+}
