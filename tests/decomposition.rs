@@ -267,6 +267,16 @@ fn blocks_of_the_normalised_law() {
 }
 
 #[test]
+fn blocks_of_bond_associated_correspondence() {
+    let law =
+        "bond_associated_correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    let deck = with_one_law(law).replace("brittle.critical_stretch", "brittle.energy");
+    same_everywhere("associated", &deck, true);
+    let deck = deck.replace("[grid]", "[grid]\nfamily = 'list'");
+    same_everywhere("associated-listed", &deck, true);
+}
+
+#[test]
 fn blocks_of_a_law_whose_bonds_remember() {
     let law = "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.01 }";
     let deck = with_one_law(law);

@@ -42,6 +42,7 @@ registration::register! {
     ordinary_plastic::OrdinaryPlastic,
     ordinary_viscoelastic::OrdinaryViscoelastic,
     correspondence::Correspondence,
+    correspondence::BondAssociated,
 }
 
 use crate::lanes::{Lanes, Numbers, Simd};
@@ -99,6 +100,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Whether [`Self::share`] reads the stretch of bonds.
     const SUM_READS_STRETCH: bool = true;
+
+    /// Whether [`Self::share`] reads the direction of bonds, which those that only fill up a group do
+    /// not have.
+    const SUM_READS_DIRECTION: bool = false;
 
     /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.
     const LINEAR: bool = false;

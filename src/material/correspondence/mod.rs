@@ -11,21 +11,22 @@
 //! ([`Control`]). In the loops this is T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H. The strain energy
 //! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
 
+mod bond_associated;
 mod control;
 mod family;
 mod hooke;
 mod stress;
-
-use nalgebra::SMatrix;
+mod tensor;
 
 use super::bond::Weights;
 use super::{
     Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Values, Word,
 };
 use crate::lanes::{Lanes, Numbers, Simd};
+pub use bond_associated::BondAssociated;
 use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
-use family::{extremes, shape_share, symmetric};
+use family::{extremes, from_rows, shape_share, symmetric, to_entries, to_rows};
 use hooke::Hooke;
 use stress::Stress;
 
@@ -74,12 +75,20 @@ impl Declared for Correspondence {
 }
 
 fn invariants(values: &Values) -> Invariants {
+    Invariants {
+        // The control of Wan et al. turns points whose family is not whole, by the square of z.
+        angular_momentum: values.word(control::KIND.name) != "wan2019",
+        ..of_stress(values)
+    }
+}
+
+/// What holds for the stress alone.
+fn of_stress(values: &Values) -> Invariants {
     let by_word = values.word(STRESS.name) == "willberg2022";
     Invariants {
         conservative: !by_word,
         objective: !by_word,
-        // The control of Wan et al. turns points whose family is not whole, by the square of z.
-        angular_momentum: values.word(control::KIND.name) != "wan2019",
+        angular_momentum: true,
     }
 }
 
@@ -189,7 +198,7 @@ impl<const D: usize> Law<D> for Correspondence {
         let (constants, found) = numbers.split_at_mut(2);
         let own = D * D + 2 * D;
         found[..own + OWN].fill(0.0);
-        let moved = SMatrix::<f64, D, D>::from_fn(|a, b| sums[2 * D + D * a + b]);
+        let moved = from_rows::<D>(&sums[2 * D..]);
         let stress = shape.inverse().and_then(|inverse| {
             let gradient = moved * inverse;
             let (stress, energy) = self.stress.at(&gradient)?;
@@ -201,15 +210,8 @@ impl<const D: usize> Law<D> for Correspondence {
         };
         let control = self.control.matrix(&inverse, constants[1]);
         let direct = stress * inverse - control * gradient;
-        for a in 0..D {
-            for b in 0..D {
-                found[D * a + b] = direct[(a, b)];
-            }
-            found[D * D + a] = control[(a, a)];
-        }
-        for (k, (a, b)) in family::mixed::<D>().enumerate() {
-            found[D * D + D + k] = control[(a, b)];
-        }
+        to_rows(&direct, found);
+        to_entries(&control, &mut found[D * D..]);
         found[own] = energy - 0.5 * stress.dot(&gradient);
     }
 
