@@ -20,7 +20,7 @@
 //! largest modulus and λ the smallest eigenvalue of K: a spring constant of c (1/λ + 1/(|ξ|² Σ ω Ṽ)) holds
 //! as much at least.
 
-use super::super::{Bond, Built, Declaration, Declared, Described, Given, Key, Law};
+use super::super::{Bond, Built, Declaration, Declared, Described, Given, Key, Law, PlasticState};
 use super::family::{
     FamilyShare, ShapeTensor, family_share, from_entries, from_rows, shape_share, to_entries,
     to_rows,
@@ -178,7 +178,7 @@ impl<const D: usize> Law<D> for BondAssociated {
         sum
     }
 
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let (direct, inverse) = (Places::direct::<D>(), Places::inverse::<D>());
         let singular = Places::singular::<D>();
         if stage == 0 {

@@ -20,7 +20,8 @@ mod tensor;
 
 use super::bond::Weights;
 use super::{
-    Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Values, Word,
+    Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, PlasticState,
+    Values, Word,
 };
 use crate::lanes::{Lanes, Numbers, Simd};
 pub use bond_associated::BondAssociated;
@@ -193,7 +194,7 @@ impl<const D: usize> Law<D> for Correspondence {
         family_share(bond)
     }
 
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let (constants, found) = numbers.split_at_mut(2);
         let own = D * D + 2 * D;
