@@ -144,6 +144,11 @@ fn fault_at(key: &'static str, message: impl Into<String>) -> Option<LawFault> {
     })
 }
 
+/// The first of the constants that are not those of an isotropic solid.
+pub fn own_constants(values: &Values) -> Option<&'static str> {
+    given_of(values, full_entries().chain(ORTHOTROPIC))
+}
+
 /// What is wrong with the constants in this setting.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let full = given_of(values, full_entries());

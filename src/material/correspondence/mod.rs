@@ -10,11 +10,14 @@
 //! z is the part of the motion that F does not see, and B z is what works against it
 //! ([`Control`]). In the loops this is T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H. The strain energy
 //! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
+//!
+//! Where a body yields ([`Plastic`]), P follows from F and from what flow has left at the point.
 
 mod bond_associated;
 mod control;
 mod family;
 mod hooke;
+mod plastic;
 mod stress;
 mod tensor;
 
@@ -29,6 +32,7 @@ use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
 use family::{extremes, from_rows, shape_share, symmetric, to_entries, to_rows};
 use hooke::Hooke;
+use plastic::Plastic;
 use stress::Stress;
 
 /// The law with its constants.
@@ -36,6 +40,7 @@ use stress::Stress;
 pub struct Correspondence {
     stress: Stress,
     control: Control,
+    plastic: Option<Plastic>,
 }
 
 const STRESS: Key = Key {
@@ -50,7 +55,13 @@ const STRESS: Key = Key {
     ]),
 };
 
-const KEYS: &[Key] = hooke::keys_with_hooke![STRESS, control::KIND, control::COEFFICIENT];
+const KEYS: &[Key] = hooke::keys_with_hooke![
+    STRESS,
+    plastic::YIELD_STRESS,
+    plastic::HARDENING,
+    control::KIND,
+    control::COEFFICIENT,
+];
 
 impl Declared for Correspondence {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
@@ -63,8 +74,12 @@ impl Declared for Correspondence {
             "poisson_ratio = 0.3, stress = 'neo-hooke', zero_energy = 'silling2017'",
             "poisson_ratio = 0.2, stress = 'willberg2022'",
             "poisson_ratio = 0.25, zero_energy = 'none'",
+            "poisson_ratio = 0.3, yield_stress = 0.12, hardening_modulus = 0.5, \
+             zero_energy = 'silling2017'",
         ],
-        fault: Some(hooke::fault),
+        fault: Some(|values, dimension| {
+            hooke::fault(values, dimension).or_else(|| plastic::fault(values))
+        }),
         elastic: Some(hooke::average),
         invariants,
         ..Declaration::new(
@@ -76,10 +91,13 @@ impl Declared for Correspondence {
 }
 
 fn invariants(values: &Values) -> Invariants {
+    let stress = of_stress(values);
+    let yields = values.get(plastic::YIELD_STRESS.name).is_some();
     Invariants {
+        conservative: stress.conservative && !yields,
         // The control of Wan et al. turns points whose family is not whole, by the square of z.
         angular_momentum: values.word(control::KIND.name) != "wan2019",
-        ..of_stress(values)
+        ..stress
     }
 }
 
@@ -98,15 +116,20 @@ fn build(given: &Given) -> Built {
     Built::plain(Correspondence {
         stress: Stress::of(given.values.word(STRESS.name), given, hooke),
         control: Control::of(given, hooke),
+        plastic: Plastic::of(given),
     })
 }
 
 impl Described for Correspondence {
     fn described(&self) -> Vec<(&'static str, String)> {
-        vec![
+        let mut facts = vec![
             ("stress", self.stress.name().to_owned()),
             ("zero energy", self.control.described()),
-        ]
+        ];
+        if let Some(plastic) = &self.plastic {
+            facts.push(("yields", plastic.described()));
+        }
+        facts
     }
 }
 
@@ -194,7 +217,7 @@ impl<const D: usize> Law<D> for Correspondence {
         family_share(bond)
     }
 
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], state: &mut PlasticState) {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let (constants, found) = numbers.split_at_mut(2);
         let own = D * D + 2 * D;
@@ -202,7 +225,10 @@ impl<const D: usize> Law<D> for Correspondence {
         let moved = from_rows::<D>(&sums[2 * D..]);
         let stress = shape.inverse().and_then(|inverse| {
             let gradient = moved * inverse;
-            let (stress, energy) = self.stress.at(&gradient)?;
+            let (stress, energy) = match &self.plastic {
+                Some(plastic) => plastic.at(&gradient, state),
+                None => self.stress.at(&gradient)?,
+            };
             Some((inverse, gradient, stress, energy))
         });
         let Some((inverse, gradient, stress, energy)) = stress else {
@@ -255,6 +281,10 @@ impl<const D: usize> Law<D> for Correspondence {
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
         numbers[2 + D * D + 2 * D]
+    }
+
+    fn flows(&self) -> bool {
+        self.plastic.is_some()
     }
 
     fn is_singular(&self, numbers: &[f64]) -> bool {

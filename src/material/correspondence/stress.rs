@@ -147,7 +147,7 @@ impl Stress {
 
 /// E = ½ (H + Hᵀ + HᵀH), without the difference of FᵀF and I.
 #[inline(always)]
-fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tensor<T, D> {
+pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tensor<T, D> {
     tensor(|a, b| {
         let mut sum = gradient[a][b] + gradient[b][a];
         for row in gradient {
