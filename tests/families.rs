@@ -166,6 +166,18 @@ fn normalised_bonds() {
 }
 
 #[test]
+fn bonds_of_bond_associated_correspondence() {
+    let (law, ratio) = ("bond_associated_correspondence", ", poisson_ratio = 0.3");
+    let grid = "horizon = 1.8\nvolume_correction = 'linear'";
+    let of = |template| {
+        deck(template, law, ratio, grid, "0.25")
+            .replace("brittle.critical_stretch", "brittle.energy")
+    };
+    compare::<3>(&of(SOLID));
+    compare::<2>(&of(PLANE));
+}
+
+#[test]
 fn bonds_that_remember() {
     let keys = ", yield_stretch = 0.01";
     let grid = "horizon = 2.3\nvolume_correction = 'linear'";

@@ -206,6 +206,16 @@ fn by_the_energy_of_bonds_of_correspondence() {
 }
 
 #[test]
+fn by_the_energy_of_bonds_of_bond_associated_correspondence() {
+    let law = format!("bond_associated_{CORRESPONDENCE}");
+    let [strain, stress] = by_energy(&law);
+    let space = cost::<3>("3d", 2, &law, ENERGY, 0.01);
+    let near = |cost: f64, bound: f64| (cost - 1.0).abs() < bound;
+    let all = near(strain, 0.03) && near(stress, 0.03) && near(space, 0.06);
+    assert!(all, "{strain} {stress} {space}");
+}
+
+#[test]
 fn by_the_energy_of_bonds_of_the_ordinary_law() {
     // A bond that breaks changes what all others of its ends hold: more than the bonds themselves give
     // is freed where the dilatation resists (ν above 1/4), less where it helps.

@@ -311,7 +311,7 @@ fn the_force_is_the_slope_of_the_energy() {
             for d in 0..D {
                 let force = before[point][d] * volume;
                 let place = simulation.fields.displacement[d][point];
-                let step = 1e-4;
+                let step = 2e-5;
                 simulation.fields.displacement[d][point] = place + step;
                 let above = energy(&mut simulation);
                 simulation.fields.displacement[d][point] = place - step;

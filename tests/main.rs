@@ -6,6 +6,7 @@ mod commands;
 mod communicator;
 mod contact;
 mod correspondence;
+mod correspondence_plastic;
 mod crack_branching;
 mod crack_paths;
 mod decks;

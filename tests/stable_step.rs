@@ -220,6 +220,11 @@ fn the_step_of_every_law_is_within_the_limit() {
         ordinary(0.4),
         "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.45, influence = 'inverse' }"
             .to_owned(),
+        "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }".to_owned(),
+        "bond_associated_correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }"
+            .to_owned(),
+        "bond_associated_correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = -0.2 }"
+            .to_owned(),
     ];
     for law in &laws {
         for dimension in ["plane-stress", "plane-strain"] {

@@ -122,6 +122,18 @@ fn of_points_with_a_dilatation() {
 }
 
 #[test]
+fn of_points_that_flow_while_bonds_break() {
+    let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, yield_stress = 0.03, hardening_modulus = 0.2 }";
+    let stretch = "critical_stretch = { critical_stretch = 0.03";
+    for family in ["lattice", "list"] {
+        let plate = plate(law, 0.0, family).replace(stretch, "energy = { fracture_energy = 0.005");
+        undone_and_made_again(&plate, |before, after| {
+            breaks(before, after) && after[DISSIPATED] > before[DISSIPATED]
+        });
+    }
+}
+
+#[test]
 fn of_bonds_that_yield_and_break() {
     let law = "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.01 }";
     for family in ["lattice", "list"] {

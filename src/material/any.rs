@@ -1,7 +1,7 @@
 //! Laws that are one of several: for what is done once a point, and for the bonds between blocks of
 //! different laws.
 
-use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, with_law};
+use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, with_law};
 use crate::lanes::{Lanes, Numbers};
 
 /// How many numbers of each kind the points and bonds of a law have.
@@ -130,8 +130,12 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], step: Option<f64>) {
-        with_law!(self, law => Law::<D>::point(law, stage, sums, numbers, step));
+    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], plastic: &mut PlasticState) {
+        with_law!(self, law => Law::<D>::point(law, stage, sums, numbers, plastic));
+    }
+
+    fn flows(&self) -> bool {
+        with_law!(self, law => Law::<D>::flows(law))
     }
 
     #[inline(never)]

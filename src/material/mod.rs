@@ -18,6 +18,7 @@ mod normalised;
 mod ordinary;
 mod ordinary_plastic;
 mod ordinary_viscoelastic;
+mod plastic_state;
 mod pmb;
 mod registration;
 
@@ -30,6 +31,7 @@ pub use declaration::{
 };
 pub use force_state::{Along, ForceState};
 pub use influence::Influence;
+pub use plastic_state::PlasticState;
 
 // Every law, by its file and type, in the order of the table of laws.
 registration::register! {
@@ -42,6 +44,7 @@ registration::register! {
     ordinary_plastic::OrdinaryPlastic,
     ordinary_viscoelastic::OrdinaryViscoelastic,
     correspondence::Correspondence,
+    correspondence::BondAssociated,
 }
 
 use crate::lanes::{Lanes, Numbers, Simd};
@@ -100,6 +103,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::share`] reads the stretch of bonds.
     const SUM_READS_STRETCH: bool = true;
 
+    /// Whether [`Self::share`] reads the direction of bonds, which those that only fill up a group do
+    /// not have.
+    const SUM_READS_DIRECTION: bool = false;
+
     /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.
     const LINEAR: bool = false;
 
@@ -130,9 +137,21 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// The numbers of a point from the sums of a stage: those of [`Self::Point`], then its own ones. In
-    /// a step (s) the point may remember; else nothing does.
-    fn point(&self, _stage: usize, _sums: &[f64], _numbers: &mut [f64], _step: Option<f64>) {}
+    /// The numbers of a point from the sums of a stage: those of [`Self::Point`], then its own ones. What
+    /// flow adds to the plastic state is kept in a step alone.
+    fn point(
+        &self,
+        _stage: usize,
+        _sums: &[f64],
+        _numbers: &mut [f64],
+        _plastic: &mut PlasticState,
+    ) {
+    }
+
+    /// Whether points keep a [`PlasticState`].
+    fn flows(&self) -> bool {
+        false
+    }
 
     /// What a bond keeps for an end when it has come to this deformation in a step (s).
     #[inline(always)]

@@ -19,7 +19,7 @@
 use super::bond::Weights;
 use super::{
     Along, AnyLaw, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law,
-    Word,
+    PlasticState, Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -224,7 +224,7 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     #[inline(always)]
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let [push, dilatation] = self.dilated(numbers[0], sums[0]);
         numbers[1] = push;
         numbers[2] = dilatation;

@@ -14,7 +14,8 @@ use std::f64::consts::PI;
 
 use super::ordinary::{Ordinary, eased_energy, eased_force};
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Word,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
+    PlasticState, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::Lanes;
@@ -134,7 +135,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     #[inline(always)]
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let pull = numbers[0];
         if stage == 0 {
             let [push, dilatation] = self.elastic.dilated(pull, sums[0]);

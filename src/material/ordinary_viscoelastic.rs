@@ -12,6 +12,7 @@
 use super::ordinary::{INFLUENCE, Ordinary, eased_energy, eased_force};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
+    PlasticState,
 };
 use crate::lanes::Lanes;
 
@@ -130,7 +131,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     }
 
     #[inline(always)]
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let [push, dilatation] = self.elastic.dilated(numbers[0], sums[0]);
         numbers[1] = push;
         numbers[2] = dilatation / D as f64;

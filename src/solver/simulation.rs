@@ -17,7 +17,7 @@ use super::conditions::{Conditions, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
-use super::motion::fields::Needs;
+use super::motion::fields::{Needs, plastic_columns};
 use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::{Clock, Fields, Kept, verlet};
@@ -188,6 +188,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             damping: model.damping.iter().any(|rate| *rate > 0.0),
             relaxation: plan.relaxes(),
             damage: plan.bodies.iter().any(|body| body.damage.is_some()),
+            plasticity: forces.flow(),
         };
         let mut fields = Fields::new(&model, needs);
         if let Some(density) = &mut fields.fictitious_density {
@@ -296,6 +297,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let acting = Acting {
             displacement: &mut fields.displacement,
             force: &mut fields.internal_force,
+            plastic: plastic_columns(
+                &mut fields.plastic_strain,
+                &mut fields.plastic_strain_equivalent,
+                &mut fields.plastic_work,
+            ),
         };
         self.times.evaluations += 1;
         let times = &mut self.times.forces;

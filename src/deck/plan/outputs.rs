@@ -189,6 +189,8 @@ pub enum Field {
     Neighbours,
     /// Number of the point's bonds that have broken since the start.
     BrokenBonds,
+    /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt of points of a law that flows, else 0.
+    PlasticStrainEquivalent,
     /// 1 where a point has too few bonds left for its law and carries no force, else 0.
     Singular,
     /// The rank that owns the point.
@@ -197,7 +199,7 @@ pub enum Field {
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -212,6 +214,7 @@ impl Field {
         Self::DeformationGradient,
         Self::Neighbours,
         Self::BrokenBonds,
+        Self::PlasticStrainEquivalent,
         Self::Singular,
         Self::Rank,
     ];
@@ -233,6 +236,7 @@ impl Field {
             Self::DeformationGradient => "deformation_gradient",
             Self::Neighbours => "neighbours",
             Self::BrokenBonds => "broken_bonds",
+            Self::PlasticStrainEquivalent => "plastic_strain_equivalent",
             Self::Singular => "singular",
             Self::Rank => "rank",
         }
@@ -250,6 +254,7 @@ impl Field {
             | Self::DeformationGradient
             | Self::Neighbours
             | Self::BrokenBonds
+            | Self::PlasticStrainEquivalent
             | Self::Singular
             | Self::Rank => "1",
             Self::WeightedVolume => "m^5",

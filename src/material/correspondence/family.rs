@@ -57,6 +57,43 @@ pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) 
     (Numbers::each(|d| xi[d] * xi[d]), others)
 }
 
+/// A symmetric tensor from its diagonal and mixed entries.
+pub fn from_entries<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
+    let mut tensor = SMatrix::zeros();
+    for a in 0..D {
+        tensor[(a, a)] = entries[a];
+    }
+    for (k, (a, b)) in mixed::<D>().enumerate() {
+        tensor[(a, b)] = entries[D + k];
+        tensor[(b, a)] = entries[D + k];
+    }
+    tensor
+}
+
+/// Writes the diagonal and mixed entries of a symmetric tensor.
+pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64]) {
+    for a in 0..D {
+        entries[a] = tensor[(a, a)];
+    }
+    for (k, (a, b)) in mixed::<D>().enumerate() {
+        entries[D + k] = tensor[(a, b)];
+    }
+}
+
+/// A tensor from its entries, row by row.
+pub fn from_rows<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
+    SMatrix::from_fn(|a, b| entries[D * a + b])
+}
+
+/// Writes the entries of a tensor, row by row.
+pub fn to_rows<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64]) {
+    for a in 0..D {
+        for b in 0..D {
+            entries[D * a + b] = tensor[(a, b)];
+        }
+    }
+}
+
 /// K = Σ ω ξ⊗ξ Ṽ of a point.
 #[derive(Debug, Clone, Copy)]
 pub struct ShapeTensor<const D: usize>(SMatrix<f64, D, D>);
@@ -64,15 +101,7 @@ pub struct ShapeTensor<const D: usize>(SMatrix<f64, D, D>);
 impl<const D: usize> ShapeTensor<D> {
     /// From its diagonal and mixed entries, m⁵.
     pub fn new(entries: &[f64]) -> Self {
-        let mut tensor = SMatrix::zeros();
-        for a in 0..D {
-            tensor[(a, a)] = entries[a];
-        }
-        for (k, (a, b)) in mixed::<D>().enumerate() {
-            tensor[(a, b)] = entries[D + k];
-            tensor[(b, a)] = entries[D + k];
-        }
-        Self(tensor)
+        Self(from_entries(entries))
     }
 
     /// K⁻¹ (m⁻⁵), unless K is nearly singular.

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, Matrix6, Rotation3, SMatrix, Vector3};
 
 use super::super::{Given, Key, Kind, LawFault, Values};
+use super::tensor::{Number, Tensor};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
@@ -141,6 +142,11 @@ fn fault_at(key: &'static str, message: impl Into<String>) -> Option<LawFault> {
         key: Some(key),
         message: message.into(),
     })
+}
+
+/// The first of the constants that are not those of an isotropic solid.
+pub fn own_constants(values: &Values) -> Option<&'static str> {
+    given_of(values, full_entries().chain(ORTHOTROPIC))
 }
 
 /// What is wrong with the constants in this setting.
@@ -308,18 +314,19 @@ impl Hooke {
     }
 
     /// S = C : E, Pa.
-    pub fn stress<const D: usize>(&self, strain: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-        let mut stress = SMatrix::zeros();
+    #[inline(always)]
+    pub fn stress<T: Number, const D: usize>(&self, strain: &Tensor<T, D>) -> Tensor<T, D> {
+        let mut stress = [[T::of(0.0); D]; D];
         for i in components::<D>() {
             let (a, b) = VOIGT[i];
-            let mut sum = 0.0;
+            let mut sum = T::of(0.0);
             for j in components::<D>() {
                 let (c, d) = VOIGT[j];
                 let factor = if c == d { 1.0 } else { 2.0 };
-                sum += self.0[(i, j)] * factor * strain[(c, d)];
+                sum = sum + strain[c][d] * (self.0[(i, j)] * factor);
             }
-            stress[(a, b)] = sum;
-            stress[(b, a)] = sum;
+            stress[a][b] = sum;
+            stress[b][a] = sum;
         }
         stress
     }

@@ -10,23 +10,29 @@
 //! z is the part of the motion that F does not see, and B z is what works against it
 //! ([`Control`]). In the loops this is T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H. The strain energy
 //! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
+//!
+//! Where a body yields ([`Plastic`]), P follows from F and from what flow has left at the point.
 
+mod bond_associated;
 mod control;
 mod family;
 mod hooke;
+mod plastic;
 mod stress;
-
-use nalgebra::SMatrix;
+mod tensor;
 
 use super::bond::Weights;
 use super::{
-    Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Values, Word,
+    Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, PlasticState,
+    Values, Word,
 };
 use crate::lanes::{Lanes, Numbers, Simd};
+pub use bond_associated::BondAssociated;
 use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
-use family::{extremes, shape_share, symmetric};
+use family::{extremes, from_rows, shape_share, symmetric, to_entries, to_rows};
 use hooke::Hooke;
+use plastic::Plastic;
 use stress::Stress;
 
 /// The law with its constants.
@@ -34,6 +40,7 @@ use stress::Stress;
 pub struct Correspondence {
     stress: Stress,
     control: Control,
+    plastic: Option<Plastic>,
 }
 
 const STRESS: Key = Key {
@@ -48,7 +55,13 @@ const STRESS: Key = Key {
     ]),
 };
 
-const KEYS: &[Key] = hooke::keys_with_hooke![STRESS, control::KIND, control::COEFFICIENT];
+const KEYS: &[Key] = hooke::keys_with_hooke![
+    STRESS,
+    plastic::YIELD_STRESS,
+    plastic::HARDENING,
+    control::KIND,
+    control::COEFFICIENT,
+];
 
 impl Declared for Correspondence {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
@@ -61,8 +74,12 @@ impl Declared for Correspondence {
             "poisson_ratio = 0.3, stress = 'neo-hooke', zero_energy = 'silling2017'",
             "poisson_ratio = 0.2, stress = 'willberg2022'",
             "poisson_ratio = 0.25, zero_energy = 'none'",
+            "poisson_ratio = 0.3, yield_stress = 0.12, hardening_modulus = 0.5, \
+             zero_energy = 'silling2017'",
         ],
-        fault: Some(hooke::fault),
+        fault: Some(|values, dimension| {
+            hooke::fault(values, dimension).or_else(|| plastic::fault(values))
+        }),
         elastic: Some(hooke::average),
         invariants,
         ..Declaration::new(
@@ -74,12 +91,23 @@ impl Declared for Correspondence {
 }
 
 fn invariants(values: &Values) -> Invariants {
+    let stress = of_stress(values);
+    let yields = values.get(plastic::YIELD_STRESS.name).is_some();
+    Invariants {
+        conservative: stress.conservative && !yields,
+        // The control of Wan et al. turns points whose family is not whole, by the square of z.
+        angular_momentum: values.word(control::KIND.name) != "wan2019",
+        ..stress
+    }
+}
+
+/// What holds for the stress alone.
+fn of_stress(values: &Values) -> Invariants {
     let by_word = values.word(STRESS.name) == "willberg2022";
     Invariants {
         conservative: !by_word,
         objective: !by_word,
-        // The control of Wan et al. turns points whose family is not whole, by the square of z.
-        angular_momentum: values.word(control::KIND.name) != "wan2019",
+        angular_momentum: true,
     }
 }
 
@@ -88,15 +116,20 @@ fn build(given: &Given) -> Built {
     Built::plain(Correspondence {
         stress: Stress::of(given.values.word(STRESS.name), given, hooke),
         control: Control::of(given, hooke),
+        plastic: Plastic::of(given),
     })
 }
 
 impl Described for Correspondence {
     fn described(&self) -> Vec<(&'static str, String)> {
-        vec![
+        let mut facts = vec![
             ("stress", self.stress.name().to_owned()),
             ("zero energy", self.control.described()),
-        ]
+        ];
+        if let Some(plastic) = &self.plastic {
+            facts.push(("yields", plastic.described()));
+        }
+        facts
     }
 }
 
@@ -184,15 +217,18 @@ impl<const D: usize> Law<D> for Correspondence {
         family_share(bond)
     }
 
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: Option<f64>) {
+    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], state: &mut PlasticState) {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let (constants, found) = numbers.split_at_mut(2);
         let own = D * D + 2 * D;
         found[..own + OWN].fill(0.0);
-        let moved = SMatrix::<f64, D, D>::from_fn(|a, b| sums[2 * D + D * a + b]);
+        let moved = from_rows::<D>(&sums[2 * D..]);
         let stress = shape.inverse().and_then(|inverse| {
             let gradient = moved * inverse;
-            let (stress, energy) = self.stress.at(&gradient)?;
+            let (stress, energy) = match &self.plastic {
+                Some(plastic) => plastic.at(&gradient, state),
+                None => self.stress.at(&gradient)?,
+            };
             Some((inverse, gradient, stress, energy))
         });
         let Some((inverse, gradient, stress, energy)) = stress else {
@@ -201,15 +237,8 @@ impl<const D: usize> Law<D> for Correspondence {
         };
         let control = self.control.matrix(&inverse, constants[1]);
         let direct = stress * inverse - control * gradient;
-        for a in 0..D {
-            for b in 0..D {
-                found[D * a + b] = direct[(a, b)];
-            }
-            found[D * D + a] = control[(a, a)];
-        }
-        for (k, (a, b)) in family::mixed::<D>().enumerate() {
-            found[D * D + D + k] = control[(a, b)];
-        }
+        to_rows(&direct, found);
+        to_entries(&control, &mut found[D * D..]);
         found[own] = energy - 0.5 * stress.dot(&gradient);
     }
 
@@ -252,6 +281,10 @@ impl<const D: usize> Law<D> for Correspondence {
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
         numbers[2 + D * D + 2 * D]
+    }
+
+    fn flows(&self) -> bool {
+        self.plastic.is_some()
     }
 
     fn is_singular(&self, numbers: &[f64]) -> bool {

@@ -5,7 +5,9 @@ use nalgebra::SMatrix;
 use super::super::Given;
 use super::family::determinant;
 use super::hooke::Hooke;
+use super::tensor::{Number, Tensor, contracted, matrix, rows, tensor};
 use crate::dimension::Dimension;
+use crate::lanes::{Lanes, WIDTH};
 
 /// How stress follows from the deformation gradient.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +32,17 @@ pub struct NeoHooke {
     plane_stress: bool,
     /// Largest eigenvalue of Hooke's matrix at rest, Pa.
     largest: f64,
+}
+
+/// What eight bonds have at their own displacement gradients.
+#[derive(Debug, Clone, Copy)]
+pub struct OfBonds<const D: usize> {
+    /// P, Pa.
+    pub piola: Tensor<Lanes, D>,
+    /// W, J/m³.
+    pub energy: Lanes,
+    /// 1 where the law has no stress, and P and W are 0.
+    pub missing: Lanes,
 }
 
 impl Stress {
@@ -71,17 +84,14 @@ impl Stress {
         gradient: &SMatrix<f64, D, D>,
     ) -> Option<(SMatrix<f64, D, D>, f64)> {
         let deformation = SMatrix::<f64, D, D>::identity() + gradient;
-        // Twice the strain, without the difference of FᵀF and I.
-        let doubled = gradient + gradient.transpose() + gradient.tr_mul(gradient);
         match self {
             Self::StVenantKirchhoff(hooke) => {
-                let strain = doubled * 0.5;
-                let stress = hooke.stress(&strain);
-                Some((deformation * stress, 0.5 * stress.dot(&strain)))
+                let (stress, energy) = st_venant_kirchhoff(hooke, &rows(gradient));
+                Some((matrix(&stress), energy))
             }
             Self::Willberg2022(hooke) => {
-                let strain = doubled * 0.5;
-                let stress = hooke.stress(&strain);
+                let strain = matrix(&green_strain(&rows(gradient)));
+                let stress = matrix(&hooke.stress(&rows(&strain)));
                 let inverse = deformation.try_inverse()?;
                 let volume = determinant(&deformation);
                 let piola = stress * inverse.transpose() * volume;
@@ -92,6 +102,7 @@ impl Stress {
                     return None;
                 }
                 let inverse = deformation.try_inverse()?.transpose();
+                let doubled = matrix(&green_strain(&rows(gradient))) * 2.0;
                 let (log, energy) = law.in_plane(&doubled);
                 // F − F⁻ᵀ = F⁻ᵀ (FᵀF − I).
                 let shear = inverse * doubled * law.shear;
@@ -99,6 +110,69 @@ impl Stress {
             }
         }
     }
+
+    /// As [`Self::at`], of eight bonds; compiled once, and not into every loop over bonds.
+    #[inline(never)]
+    pub fn of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
+        let none = Lanes::splat(0.0);
+        if let Self::StVenantKirchhoff(hooke) = self {
+            let (piola, energy) = st_venant_kirchhoff(hooke, gradient);
+            return OfBonds {
+                piola,
+                energy,
+                missing: none,
+            };
+        }
+        let mut all = OfBonds {
+            piola: [[none; D]; D],
+            energy: none,
+            missing: none,
+        };
+        for lane in 0..WIDTH {
+            let own = SMatrix::from_fn(|a, b| gradient[a][b].0[lane]);
+            let Some((piola, energy)) = self.at::<D>(&own) else {
+                all.missing.0[lane] = 1.0;
+                continue;
+            };
+            for a in 0..D {
+                for b in 0..D {
+                    all.piola[a][b].0[lane] = piola[(a, b)];
+                }
+            }
+            all.energy.0[lane] = energy;
+        }
+        all
+    }
+}
+
+/// E = ½ (H + Hᵀ + HᵀH), without the difference of FᵀF and I.
+#[inline(always)]
+pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tensor<T, D> {
+    tensor(|a, b| {
+        let mut sum = gradient[a][b] + gradient[b][a];
+        for row in gradient {
+            sum = sum + row[a] * row[b];
+        }
+        sum * 0.5
+    })
+}
+
+/// P = F (C : E) and W = ½ E : C : E.
+#[inline(always)]
+fn st_venant_kirchhoff<T: Number, const D: usize>(
+    hooke: &Hooke,
+    gradient: &Tensor<T, D>,
+) -> (Tensor<T, D>, T) {
+    let strain = green_strain(gradient);
+    let second = hooke.stress(&strain);
+    let piola = tensor(|a, b| {
+        let mut sum = second[a][b];
+        for k in 0..D {
+            sum = sum + gradient[a][k] * second[k][b];
+        }
+        sum
+    });
+    (piola, contracted(&second, &strain) * 0.5)
 }
 
 impl NeoHooke {

@@ -11,8 +11,9 @@ use crate::comm::{self, Communicator};
 use crate::families::Which;
 use crate::solver::model::Model;
 
-use super::evaluate::{ForceTimes, News};
+use super::evaluate::{Acting, ForceTimes, News};
 use super::force::Evolution;
+use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
 use super::{Forces, Stage};
 
@@ -71,8 +72,8 @@ impl<const D: usize> Forces<D> {
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
-        displacement: &[Vec<f64>; D],
-        force: &mut [Vec<f64>; D],
+        mut acting: Acting<'_, D>,
+        evolution: Evolution,
         times: &mut ForceTimes,
     ) {
         self.broken.sort_by_key(|broken| broken.point);
@@ -100,41 +101,64 @@ impl<const D: usize> Forces<D> {
         let halo_before = times.halo;
         let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
         for points in self.ranges(own.iter().copied()) {
-            self.find_numbers(points, model, displacement, force);
+            self.find_numbers(points, model, &mut acting, evolution);
         }
-        let changed = self.send_numbers(comm, model, displacement, own, times);
+        let changed = self.send_numbers(comm, model, acting.displacement, own, times);
         for points in self.ranges(changed.into_iter()) {
-            self.find_forces(points, force);
+            self.find_forces(points, acting.force);
         }
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Finds the numbers of some points anew, and books the energy that they lose by it.
+    /// Finds the numbers of some points anew, and books the energy that they lose by it, but for what
+    /// plastic flow takes.
     fn find_numbers(
         &mut self,
         points: Range<usize>,
         model: &Model<D>,
-        displacement: &[Vec<f64>; D],
-        force: &mut [Vec<f64>; D],
+        acting: &mut Acting<'_, D>,
+        evolution: Evolution,
     ) {
-        let before = self.stored_at(model, points.clone()).energy;
+        let Acting {
+            displacement,
+            force,
+            plastic,
+        } = acting;
+        let before = self.held(model, points.clone(), plastic);
         for stage in (0..self.numbers.stages).map(Stage::PointSum) {
             if stage != Stage::PointSum(0) {
                 self.update(News::OwnNumbers, Which::Owned, model, displacement);
             }
             self.clear(stage, points.clone());
             self.run(stage, points.clone(), force, Evolution::None);
-            self.finish(stage, points.clone(), model, Evolution::None);
+            self.finish(stage, points.clone(), model, evolution, plastic);
         }
         // Bonds read what lattices show of the points.
         self.update(News::OwnNumbers, Which::Owned, model, displacement);
-        let after = self.stored_at(model, points.clone()).energy;
+        let after = self.held(model, points.clone(), plastic);
         for broken in &mut self.broken {
             if points.contains(&broken.point) {
                 let k = broken.point - points.start;
                 broken.energy += model.volume[broken.point] * (before[k] - after[k]);
             }
         }
+    }
+
+    /// What some points hold and have lost by plastic flow, J/m³.
+    fn held(
+        &mut self,
+        model: &Model<D>,
+        points: Range<usize>,
+        plastic: &PlasticColumns<'_>,
+    ) -> Vec<f64> {
+        let mut energy = self.stored_at(model, points.clone()).energy;
+        let [.., work] = plastic;
+        if !work.is_empty() {
+            for (energy, work) in energy.iter_mut().zip(&work[points]) {
+                *energy += work;
+            }
+        }
+        energy
     }
 
     /// Sends the new numbers of points to those who read them. Returns the owned points whose forces

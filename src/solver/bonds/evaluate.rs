@@ -16,6 +16,7 @@ use crate::solver::model::Model;
 use super::broken::Broken;
 use super::force::{Evolution, Force};
 use super::list_points;
+use super::point_numbers::PlasticColumns;
 use super::point_sums::{SmallestStretch, StageSum};
 use super::sweep::{Source, sweep};
 use super::{Forces, Stage};
@@ -60,6 +61,8 @@ pub struct Acting<'a, const D: usize> {
     pub displacement: &'a mut [Vec<f64>; D],
     /// Internal force density of the owned points, N/m³; replaced.
     pub force: &'a mut [Vec<f64>; D],
+    /// What plastic flow has left at the owned points; changed in a step.
+    pub plastic: PlasticColumns<'a>,
 }
 
 impl<const D: usize> Forces<D> {
@@ -77,6 +80,7 @@ impl<const D: usize> Forces<D> {
         let Acting {
             displacement,
             force,
+            mut plastic,
         } = acting;
         self.broken.clear();
         let owned = model.owned();
@@ -142,13 +146,18 @@ impl<const D: usize> Forces<D> {
             self.update(news, Which::Ghosts, model, displacement);
             let border = model.interior..owned;
             self.run(stage, border, force, evolution);
-            self.finish(stage, 0..owned, model, evolution);
+            self.finish(stage, 0..owned, model, evolution, &mut plastic);
             in_bonds += start.elapsed();
         }
         times.bonds += in_bonds;
         times.halo += start.elapsed() - in_bonds;
         if evolution != Evolution::None {
-            self.settle(comm, model, displacement, force, times);
+            let acting = Acting {
+                displacement,
+                force,
+                plastic,
+            };
+            self.settle(comm, model, acting, evolution, times);
         }
     }
 
@@ -268,6 +277,7 @@ impl<const D: usize> Forces<D> {
         points: Range<usize>,
         model: &Model<D>,
         evolution: Evolution,
+        plastic: &mut PlasticColumns<'_>,
     ) {
         let blocks = &self.blocks;
         match stage {
@@ -287,8 +297,9 @@ impl<const D: usize> Forces<D> {
                     });
             }
             Stage::PointSum(number) => {
-                let step = evolution.step();
-                self.numbers.finish(number, points, model, blocks, step);
+                let keeps = evolution != Evolution::None;
+                self.numbers
+                    .finish(number, points, model, blocks, plastic, keeps);
             }
             Stage::Force => {}
         }

@@ -16,16 +16,6 @@ pub enum Evolution {
     None,
 }
 
-impl Evolution {
-    /// The length of the step (s), if there is one.
-    pub fn step(self) -> Option<f64> {
-        match self {
-            Self::Step(step) => Some(step),
-            Self::None => None,
-        }
-    }
-}
-
 /// Sums the forces of the intact bonds: force density by component (N/m³), less those of bonds that
 /// break by what their force states say. Of these it sums the number, the energy (J) that the points'
 /// shares of them set free, how much of it they held above their criterion (J), and their forces (N/m³).

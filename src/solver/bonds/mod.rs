@@ -43,6 +43,7 @@ pub use evaluate::{Acting, ForceTimes};
 pub use force::Evolution;
 pub use interaction::{BlockLaws, Interaction};
 pub use kept::KeptBonds;
+pub use point_numbers::PlasticColumns;
 pub use seen::Stored;
 
 /// One sum over the bonds.
@@ -213,6 +214,11 @@ impl<const D: usize> Forces<D> {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
         let grids: usize = self.grids.iter().map(GridValues::bytes).sum();
         bonds + size_of_val(&self.nodes[..]) + grids
+    }
+
+    /// Whether points of any law keep a plastic state; the same on all ranks.
+    pub fn flow(&self) -> bool {
+        self.blocks.iter().any(|block| Law::<D>::flows(&block.law))
     }
 
     /// The vector instructions of the loops.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::material::{Counts, Law, MOST};
+use crate::material::{Counts, Law, MOST, PlasticState};
 use crate::solver::model::Model;
 
 use super::interaction::BlockLaws;
@@ -13,8 +13,14 @@ const CHUNK: usize = 4096;
 /// Numbers of a point, at most.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
-/// Columns that a stage works on, at most: numbers and sums.
-const COLUMNS: usize = NUMBERS + MOST.sum;
+/// The first of the columns of the plastic state among those that a stage works on.
+const PLASTIC: usize = NUMBERS + MOST.sum;
+
+/// Columns that a stage works on, at most: numbers, sums and plastic state.
+const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
+
+/// The columns of the plastic states of the owned points; empty where no law has any.
+pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
 /// The numbers of the local points by column: those that bonds read (of ghosts too), then those of a
 /// law alone (of owned points).
@@ -82,14 +88,16 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Finds the numbers of some owned points that follow from the sums of a stage.
+    /// Finds the numbers of some owned points that follow from the sums of a stage. `keeps` says whether
+    /// plastic flow is for good.
     pub fn finish<const D: usize>(
         &mut self,
         stage: usize,
         points: Range<usize>,
         model: &Model<D>,
         blocks: &[BlockLaws],
-        step: Option<f64>,
+        plastic: &mut PlasticColumns<'_>,
+        keeps: bool,
     ) {
         let mut columns: [&mut [f64]; COLUMNS] = std::array::from_fn(|_| &mut [][..]);
         for (place, column) in self.columns.iter_mut().enumerate() {
@@ -97,6 +105,9 @@ impl PointNumbers {
         }
         for (place, column) in self.sums.iter_mut().enumerate() {
             columns[NUMBERS + place] = &mut column[points.clone()];
+        }
+        for (place, column) in plastic.iter_mut().enumerate() {
+            columns[PLASTIC + place] = column.get_mut(points.clone()).unwrap_or_default();
         }
         over_points(points, columns, &|points, columns| {
             for (k, point) in points.enumerate() {
@@ -108,10 +119,17 @@ impl PointNumbers {
                 let get = |column: usize| columns[column].get(k).copied().unwrap_or(0.0);
                 let mut numbers: [f64; NUMBERS] = std::array::from_fn(get);
                 let sums: [f64; MOST.sum] = std::array::from_fn(|s| get(NUMBERS + s));
-                Law::<D>::point(law, stage, &sums[..counts.sum], &mut numbers, step);
+                let before = PlasticState::of(std::array::from_fn(|p| get(PLASTIC + p)));
+                let mut after = before;
+                Law::<D>::point(law, stage, &sums[..counts.sum], &mut numbers, &mut after);
                 let found = counts.point + counts.own;
                 for (column, number) in columns.iter_mut().zip(numbers).take(found) {
                     column[k] = number;
+                }
+                if keeps && after != before {
+                    for (column, number) in columns[PLASTIC..].iter_mut().zip(after.numbers()) {
+                        column[k] = number;
+                    }
                 }
             }
         });

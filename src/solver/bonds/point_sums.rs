@@ -41,8 +41,8 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
         let share = (self.law).share::<N>(&group.bond, group.own, &group.memory[0]);
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
-            // The stretch of a bond that only fills up a group is not a number.
-            let share = if L::SUM_READS_STRETCH {
+            // The stretch and direction of a bond that only fills up a group are not numbers.
+            let share = if L::SUM_READS_STRETCH || L::SUM_READS_DIRECTION {
                 simd.keep(share.get(k), group.intact)
             } else {
                 share.get(k)

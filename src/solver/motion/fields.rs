@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use crate::deck::plan::Field;
-use crate::solver::bonds::Broken;
+use crate::solver::bonds::{Broken, PlasticColumns};
 use crate::solver::model::Model;
 
 /// What a field is, and what happens to it.
@@ -177,6 +177,25 @@ fields! {
         name: "overshoot_energy",
         ..ENERGY
     };
+    /// Plastic strain of a point, xx, yy, zz, yz, xz, xy; none where no points flow.
+    plastic_strain: Option<[Vec<f64>; 6]> = Description {
+        name: "plastic_strain",
+        unit: "1",
+        ..STATE
+    };
+    /// Equivalent plastic strain of a point; none where no points flow.
+    plastic_strain_equivalent: Option<Vec<f64>> = Description {
+        name: "plastic_strain_equivalent",
+        unit: "1",
+        output: Some(Field::PlasticStrainEquivalent),
+        ..STATE
+    };
+    /// What plastic flow of a point has dissipated, J/m³; none where no points flow.
+    plastic_work: Option<Vec<f64>> = Description {
+        name: "plastic_work",
+        unit: "J/m^3",
+        ..STATE
+    };
     /// Work done by loads and supports, J; none without them.
     external_work: Option<Vec<f64>> = Description {
         name: "external_work",
@@ -238,6 +257,19 @@ pub struct Needs {
     pub relaxation: bool,
     /// Whether bonds can break.
     pub damage: bool,
+    /// Whether points keep a plastic state.
+    pub plasticity: bool,
+}
+
+/// The columns of the plastic state; empty where there is none.
+pub fn plastic_columns<'a>(
+    strain: &'a mut Option<[Vec<f64>; 6]>,
+    equivalent: &'a mut Option<Vec<f64>>,
+    work: &'a mut Option<Vec<f64>>,
+) -> PlasticColumns<'a> {
+    let fields: [&mut dyn Columns; 3] = [strain, equivalent, work];
+    let mut columns = fields.into_iter().flat_map(Columns::columns_mut);
+    std::array::from_fn(|_| columns.next().map(Vec::as_mut_slice).unwrap_or_default())
 }
 
 impl<const D: usize> Fields<D> {
@@ -255,6 +287,9 @@ impl<const D: usize> Fields<D> {
             broken_bonds: needs.damage.then(scalar),
             freed_energy: needs.damage.then(scalar),
             overshoot_energy: needs.damage.then(scalar),
+            plastic_strain: needs.plasticity.then(|| std::array::from_fn(|_| scalar())),
+            plastic_strain_equivalent: needs.plasticity.then(scalar),
+            plastic_work: needs.plasticity.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
             damping_power: needs.damping.then(scalar),
             relaxation_velocity: needs.relaxation.then(|| vector(owned)),
@@ -355,6 +390,6 @@ mod tests {
                 offered += 1;
             }
         }
-        assert_eq!(offered, 4);
+        assert_eq!(offered, 5);
     }
 }

@@ -4,9 +4,11 @@ use nalgebra::{Matrix3, SMatrix};
 
 use crate::deck::plan::Field;
 use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
 use crate::material::determinant;
 use crate::solver::Simulation;
 use crate::solver::bonds::Stored;
+use crate::solver::motion::Fields;
 
 /// What the bonds hold at one moment; found once, used by fields and history.
 pub struct Snapshot {
@@ -17,9 +19,14 @@ pub struct Snapshot {
 impl Snapshot {
     /// Looks at a run now, whose forces are those of the present place.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        Self {
-            stored: simulation.forces.stored(&simulation.model),
+        let mut stored = simulation.forces.stored(&simulation.model);
+        if let Some(work) = &simulation.fields.plastic_work {
+            stored.dissipated.resize(work.len(), 0.0);
+            for (dissipated, work) in stored.dissipated.iter_mut().zip(work) {
+                *dissipated += work;
+            }
         }
+        Self { stored }
     }
 
     /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
@@ -99,8 +106,8 @@ impl Snapshot {
             }
             Field::Singular => simulation.forces.singular(model),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
-            // Where no bonds can break.
-            Field::BrokenBonds => vec![0.0; count],
+            // Where no bonds can break, and no points flow.
+            Field::BrokenBonds | Field::PlasticStrainEquivalent => vec![0.0; count],
             Field::Displacement | Field::Velocity | Field::ForceDensity => {
                 unreachable!("one of the points' own fields")
             }
@@ -110,17 +117,20 @@ impl Snapshot {
 
 /// Cauchy's stress from Kirchhoff's, row by row: over the volume that the deformed body has for one of
 /// the undeformed. In plane stress the plate thins as Hooke's law has it, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy)
-/// with logarithmic strains.
+/// with logarithmic strains, and by its plastic strain; that takes no volume.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
 ) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
-        let ratio = poisson_ratio(simulation, point);
+        let ratio = elastic(simulation, point).poisson_ratio;
         let in_plane = determinant(gradient);
         let growth = match simulation.plan.dimension {
-            Dimension::PlaneStress { .. } => in_plane.powf((1.0 - 2.0 * ratio) / (1.0 - ratio)),
+            Dimension::PlaneStress { .. } => {
+                let elastic = in_plane * plastic_strain_across(&simulation.fields, point).exp();
+                elastic.powf((1.0 - 2.0 * ratio) / (1.0 - ratio))
+            }
             _ => in_plane,
         };
         // A body turned inside out has no volume to speak of.
@@ -139,11 +149,10 @@ fn von_mises(stress: &[f64]) -> f64 {
     (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
 }
 
-/// ν of an owned point's body.
-fn poisson_ratio<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+/// The elastic constants of an owned point's body.
+fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isotropic {
     let block = usize::from(simulation.model.block[point]);
-    let body = simulation.plan.block(block).body;
-    body.material.elastic.poisson_ratio
+    simulation.plan.block(block).body.material.elastic
 }
 
 /// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
@@ -151,21 +160,36 @@ fn poisson_ratio<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -
 fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match simulation.plan.dimension {
         Dimension::PlaneStress { .. } => {
-            let ratio = poisson_ratio(simulation, point);
+            let ratio = elastic(simulation, point).poisson_ratio;
             (1.0 - 2.0 * ratio) / (1.0 - ratio)
         }
         Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => 1.0,
     }
 }
 
+/// The plastic strain zz of an owned point.
+fn plastic_strain_across<const D: usize>(fields: &Fields<D>, point: usize) -> f64 {
+    let [_, _, zz, ..] = match &fields.plastic_strain {
+        Some(strain) => strain,
+        None => return 0.0,
+    };
+    zz[point]
+}
+
 /// The stress across the directions of the setting where there is no strain, by Hooke's law: zz = ν (xx +
-/// yy) in plane strain, yy = zz = ν/(1 − ν) xx in 1-D.
+/// yy) − E e_zz in plane strain with a plastic strain e, yy = zz = ν/(1 − ν) xx in 1-D.
 fn across<const D: usize>(simulation: &Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
     for point in 0..zz.len() {
-        let ratio = poisson_ratio(simulation, point);
+        let Isotropic {
+            youngs_modulus: young,
+            poisson_ratio: ratio,
+        } = elastic(simulation, point);
         match simulation.plan.dimension {
-            Dimension::PlaneStrain { .. } => zz[point] = ratio * (xx[point] + yy[point]),
+            Dimension::PlaneStrain { .. } => {
+                let plastic = plastic_strain_across(&simulation.fields, point);
+                zz[point] = ratio * (xx[point] + yy[point]) - young * plastic;
+            }
             Dimension::Line { .. } => {
                 zz[point] = ratio / (1.0 - ratio) * xx[point];
                 yy[point] = zz[point];

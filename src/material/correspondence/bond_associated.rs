@@ -1,0 +1,250 @@
+//! Bond-associated correspondence: a classical law for the stress of each bond, from a deformation gradient
+//! of its own. There is no motion that it does not see, and nothing to control.
+//!
+//! Breitzman & Dayal 2018: the classical energy is taken of a gradient that has the bond's own motion along
+//! the bond and that of the family across it, and then the mean over the bonds, where correspondence takes
+//! the energy of the mean. With F = I + H of [`Correspondence`](super::Correspondence) and n = ξ/|ξ|,
+//!
+//! F_ξ = F + (Y − F ξ)⊗ξ/|ξ|²,  W = Σ w Ψ(F_ξ),  w = ω Ṽ/Σ ω Ṽ,
+//!
+//! over the intact bonds. The force state is its slope, with P_ξ = ∂Ψ/∂F at F_ξ:
+//!
+//! T⟨ξ⟩ = ω (P_ξ ξ/|ξ|² / Σ ω Ṽ + Z K⁻¹ ξ),  Z = Σ w P_ξ (I − n⊗n).
+//!
+//! F_ξ ξ = Y, so that W is 0 for those motions alone that leave the length of every bond as it is. F is
+//! that of the point, not the mean of both ends': a force state is then one of the point's own family, and
+//! Σ T⟨ξ⟩⊗Y Ṽ = Σ w P_ξ F_ξᵀ is symmetric at every point. The gradients of Chen 2018, of
+//! the neighbours that both ends of a bond share, want enough of these and a shape tensor for every bond.
+//!
+//! W ≤ ½ c Σ w |H_ξ|² with |H_ξ|² = |H (I − n⊗n)|² + |η|²/|ξ|² and |H|² ≤ Σ ω |η|² Ṽ/λ, where c is the
+//! largest modulus and λ the smallest eigenvalue of K: a spring constant of c (1/λ + 1/(|ξ|² Σ ω Ṽ)) holds
+//! as much at least.
+
+use super::super::{Bond, Built, Declaration, Declared, Described, Given, Key, Law, PlasticState};
+use super::family::{
+    FamilyShare, ShapeTensor, family_share, from_entries, from_rows, shape_share, to_entries,
+    to_rows,
+};
+use super::hooke::{self, Hooke};
+use super::stress::{OfBonds, Stress};
+use super::tensor::{Tensor, tensor};
+use super::{STRESS, of_stress};
+use crate::lanes::{Lanes, Numbers};
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BondAssociated {
+    stress: Stress,
+}
+
+const KEYS: &[Key] = hooke::keys_with_hooke![STRESS];
+
+impl Declared for BondAssociated {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: KEYS,
+        any_poisson_ratio: true,
+        no_line: Some(
+            "`bond_associated_correspondence` has no 1-D form; `pmb` is the same there for ν = 0.25",
+        ),
+        breaks_by_energy: true,
+        examples: &[
+            "poisson_ratio = 0.4",
+            "poisson_ratio = 0.3, stress = 'neo-hooke'",
+            "poisson_ratio = 0.2, stress = 'willberg2022'",
+        ],
+        fault: Some(hooke::fault),
+        elastic: Some(hooke::average),
+        invariants: of_stress,
+        ..Declaration::new(
+            "bond_associated_correspondence",
+            "of the stress at a deformation gradient of each bond's own",
+            build,
+        )
+    }];
+}
+
+fn build(given: &Given) -> Built {
+    let hooke = Hooke::of(given).expect("the constants have been looked at");
+    Built::plain(BondAssociated {
+        stress: Stress::of(given.values.word(STRESS.name), given, hooke),
+    })
+}
+
+impl Described for BondAssociated {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![("stress of each bond", self.stress.name().to_owned())]
+    }
+}
+
+/// Two constants, of which the stiffness is c/λ and c/(|ξ|² Σ ω Ṽ); 1/Σ ω Ṽ of the intact bonds; then H, and
+/// Z K⁻¹.
+type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
+
+/// The places of a point's numbers.
+struct Places;
+
+impl Places {
+    const WEIGHT: usize = 2;
+    const GRADIENT: usize = 3;
+
+    const fn direct<const D: usize>() -> usize {
+        Self::GRADIENT + D * D
+    }
+
+    /// K⁻¹, by diagonal and mixed entries.
+    const fn inverse<const D: usize>() -> usize {
+        Self::direct::<D>() + D * D
+    }
+
+    /// Whether there are too few bonds, or one without a stress.
+    const fn singular<const D: usize>() -> usize {
+        Self::inverse::<D>() + 2 * D
+    }
+}
+
+impl BondAssociated {
+    /// What follows from the gradients H_ξ of the bonds.
+    #[inline(always)]
+    fn stresses<const D: usize>(&self, bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
+        let xi = &bond.reference;
+        let share = bond.inverse * bond.inverse;
+        let rest: [Lanes; D] = Numbers::each(|a| {
+            let mut seen = gradient[a][0] * xi[0];
+            for b in 1..D {
+                seen += gradient[a][b] * xi[b];
+            }
+            (bond.moved[a] - seen) * share
+        });
+        let own = tensor(|a, b| gradient[a][b] + rest[a] * xi[b]);
+        self.stress.of_bonds(&own)
+    }
+}
+
+impl<const D: usize> Law<D> for BondAssociated {
+    type Point = Point<D>;
+    type Memory = [Lanes; 0];
+    /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
+    type WholeSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
+    /// K as in the whole sum, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ; then Z Σ ω Ṽ (N m), and whether a bond has no stress.
+    type Sum = (FamilyShare<D>, [Lanes; 1]);
+    type Force = [Lanes; D];
+    const CONSTANTS: usize = 2;
+    const STAGES: usize = 2;
+    const OWN_NUMBERS: usize = 2 * D + 1;
+    const LEAST_DIMENSION: usize = 2;
+    const SUM_READS_STRETCH: bool = false;
+    const SUM_READS_DIRECTION: bool = true;
+    const FORCE_READS_SHORTENING: bool = false;
+    // The stresses, in a loop of their own, take most of the time.
+    const HOT: bool = false;
+
+    #[inline(always)]
+    fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
+        (shape_share(&bond.reference), [Lanes::splat(1.0)])
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        let shape = ShapeTensor::<D>::new(sums);
+        let largest = self.stress.largest_modulus();
+        if shape.inverse().is_some() {
+            numbers[0] = largest / shape.smallest();
+            numbers[1] = largest / sums[2 * D];
+        }
+    }
+
+    #[inline(always)]
+    fn share<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        (_, (gradient, _)): &Point<D>,
+        _: &[Lanes; 0],
+    ) -> Self::Sum {
+        if S == 0 {
+            return (family_share(bond), [Lanes::splat(1.0)]);
+        }
+        let OfBonds { piola, missing, .. } = self.stresses(bond, gradient);
+        let n: [Lanes; D] = Numbers::each(|d| bond.reference[d] * bond.inverse);
+        let mut sum = Self::Sum::splat(0.0);
+        for a in 0..D {
+            let mut along = piola[a][0] * n[0];
+            for b in 1..D {
+                along += piola[a][b] * n[b];
+            }
+            for b in 0..D {
+                *sum.get_mut(D * a + b) = piola[a][b] - along * n[b];
+            }
+        }
+        *sum.get_mut(D * D) = missing;
+        sum
+    }
+
+    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+        let (direct, inverse) = (Places::direct::<D>(), Places::inverse::<D>());
+        let singular = Places::singular::<D>();
+        if stage == 0 {
+            numbers[Places::WEIGHT..=singular].fill(0.0);
+            let Some(inverse_shape) = ShapeTensor::<D>::new(sums).inverse() else {
+                numbers[singular] = 1.0;
+                return;
+            };
+            numbers[Places::WEIGHT] = 1.0 / sums[2 * D + D * D];
+            let gradient = from_rows::<D>(&sums[2 * D..]) * inverse_shape;
+            to_rows(&gradient, &mut numbers[Places::GRADIENT..]);
+            to_entries(&inverse_shape, &mut numbers[inverse..]);
+            return;
+        }
+        if sums[D * D] > 0.0 {
+            numbers[Places::WEIGHT..singular].fill(0.0);
+            numbers[singular] = 1.0;
+        }
+        let weight = numbers[Places::WEIGHT];
+        let inverse_shape = from_entries::<D>(&numbers[inverse..]);
+        let product = from_rows::<D>(sums) * inverse_shape * weight;
+        to_rows(&product, &mut numbers[direct..]);
+    }
+
+    #[inline(always)]
+    fn force(
+        &self,
+        bond: &Bond<D>,
+        ([.., weight], (gradient, direct)): &Point<D>,
+        _: &[Lanes; 0],
+    ) -> [Lanes; D] {
+        let stress = self.stresses(bond, gradient).piola;
+        let share = bond.inverse * bond.inverse * *weight;
+        Numbers::each(|a| {
+            let mut sum = (stress[a][0] * share + direct[a][0]) * bond.reference[0];
+            for b in 1..D {
+                sum += (stress[a][b] * share + direct[a][b]) * bond.reference[b];
+            }
+            sum
+        })
+    }
+
+    #[inline(always)]
+    fn bond_energy(
+        &self,
+        bond: &Bond<D>,
+        ([.., weight], (gradient, _)): &Point<D>,
+        _: &[Lanes; 0],
+    ) -> Lanes {
+        self.stresses(bond, gradient).energy * *weight
+    }
+
+    fn needs_shape(&self) -> bool {
+        true
+    }
+
+    fn is_singular(&self, numbers: &[f64]) -> bool {
+        numbers[Places::singular::<D>()] > 0.0
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, length: Lanes, ([whole, along, _], _): &Point<D>) -> Lanes {
+        *whole + *along / (length * length)
+    }
+
+    fn resists_across(&self) -> bool {
+        true
+    }
+}

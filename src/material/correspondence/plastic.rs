@@ -1,0 +1,377 @@
+//! J2 plasticity with isotropic hardening, of the strain of each point's family.
+//!
+//! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic one, E = E_e + E_p, and
+//! S = C : E_e, P = F S. E does not change when the body turns, so that none of this knows rotations: there is
+//! no frame to carry along, no polar decomposition and no rate to integrate, and without flow it is the law of
+//! St. Venant and Kirchhoff. It is meant for small strains under rotations of any size.
+//!
+//! With the deviator S_d and q = √(3/2 |S_d|²) the yield surface is q = σ_y + H ε̄. What leaves it in a step
+//! returns along S_d (Simo & Hughes 1998, §3.3): Δε̄ = (q − σ_y − H ε̄)/(3G + H), ΔE_p = (3/2) Δε̄ S_d/q. In
+//! plane stress, where the stress across the sheet stays 0, ΔE_p = x S_d of the stress in the end, with the x
+//! of a scalar equation (§3.4).
+//!
+//! What flow dissipates is all of the plastic work ∫ q dε̄.
+
+use nalgebra::{Matrix3, SMatrix};
+
+use super::super::{Given, Key, Kind, LawFault, PlasticState, Values};
+use super::hooke;
+use super::stress::green_strain;
+use super::tensor::{matrix, rows};
+use crate::dimension::Dimension;
+
+/// The constants of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plastic {
+    /// σ_y, Pa.
+    yield_stress: f64,
+    /// H, Pa.
+    hardening: f64,
+    /// λ, Pa; in plane stress that of the sheet.
+    lambda: f64,
+    /// G, Pa.
+    shear: f64,
+    /// Whether the stress across the plane is 0.
+    is_sheet: bool,
+}
+
+pub const YIELD_STRESS: Key = Key {
+    name: "yield_stress",
+    meaning: "σ_y, Pa, at which an isotropic body with the first `stress` yields when it is pulled along an \
+              axis (von Mises); elastic if not given",
+    kind: Kind::Optional {
+        range: f64::MIN_POSITIVE..f64::INFINITY,
+        words: "above 0",
+    },
+};
+
+pub const HARDENING: Key = Key {
+    name: "hardening_modulus",
+    meaning: "H, Pa, by which the yield stress grows with the equivalent plastic strain; 0 if not given",
+    kind: Kind::Optional {
+        range: 0.0..f64::INFINITY,
+        words: "at least 0",
+    },
+};
+
+/// How far above the yield stress, as a share of it, nothing flows: what has returned once does not flow again
+/// by rounding.
+const SURFACE: f64 = 1e-12;
+
+/// What is wrong with the values of the keys.
+pub fn fault(values: &Values) -> Option<LawFault> {
+    let fault = |key: &Key, message: &str| {
+        Some(LawFault {
+            key: Some(key.name),
+            message: message.to_owned(),
+        })
+    };
+    if values.get(YIELD_STRESS.name).is_none() {
+        values.get(HARDENING.name)?;
+        return fault(
+            &HARDENING,
+            "a body hardens when it yields: give `yield_stress`, too",
+        );
+    }
+    if let Some(constant) = hooke::own_constants(values) {
+        let message = format!(
+            "an isotropic solid alone can yield: give two elastic constants in place of `{constant}`"
+        );
+        return fault(&YIELD_STRESS, &message);
+    }
+    if values.word(super::STRESS.name) != "st-venant-kirchhoff" {
+        return fault(
+            &super::STRESS,
+            "a body that yields has `stress = \"st-venant-kirchhoff\"`",
+        );
+    }
+    None
+}
+
+impl Plastic {
+    /// That of a body, if it yields.
+    pub fn of(given: &Given) -> Option<Self> {
+        let number = |key: &Key| {
+            let is_given = given.values.get(key.name).is_some();
+            is_given.then(|| given.values.number(key.name))
+        };
+        let (shear, ratio) = (given.elastic.shear_modulus(), given.elastic.poisson_ratio);
+        let is_sheet = matches!(given.dimension, Dimension::PlaneStress { .. });
+        Some(Self {
+            yield_stress: number(&YIELD_STRESS)?,
+            hardening: number(&HARDENING).unwrap_or(0.0),
+            lambda: if is_sheet {
+                2.0 * shear * ratio / (1.0 - ratio)
+            } else {
+                given.elastic.lame_lambda()
+            },
+            shear,
+            is_sheet,
+        })
+    }
+
+    /// For people to read.
+    pub fn described(&self) -> String {
+        let Self {
+            yield_stress,
+            hardening,
+            ..
+        } = self;
+        format!("at {yield_stress:.4e} Pa, hardening {hardening:.4e} Pa")
+    }
+
+    /// P (Pa) and the elastic energy density (J/m³) at a displacement gradient, to which the body comes from
+    /// a plastic state that changes with it.
+    pub fn at<const D: usize>(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        state: &mut PlasticState,
+    ) -> (SMatrix<f64, D, D>, f64) {
+        let mut strain = Matrix3::zeros();
+        let in_plane = matrix(&green_strain(&rows(gradient)));
+        strain.view_mut((0, 0), (D, D)).copy_from(&in_plane);
+        let trial = self.stress(&(strain - tensor_of(&state.strain)));
+        self.flow(&trial, state);
+        let elastic = strain - tensor_of(&state.strain);
+        let stress = self.stress(&elastic);
+        let second: SMatrix<f64, D, D> = stress.fixed_view::<D, D>(0, 0).into_owned();
+        (second + gradient * second, 0.5 * stress.dot(&elastic))
+    }
+
+    /// S of an elastic strain, Pa.
+    fn stress(&self, elastic: &Matrix3<f64>) -> Matrix3<f64> {
+        let mut stress = elastic * (2.0 * self.shear);
+        if self.is_sheet {
+            let mean = self.lambda * (elastic[(0, 0)] + elastic[(1, 1)]);
+            stress[(0, 0)] += mean;
+            stress[(1, 1)] += mean;
+            stress[(2, 2)] = 0.0;
+        } else {
+            let mean = self.lambda * elastic.trace();
+            for k in 0..3 {
+                stress[(k, k)] += mean;
+            }
+        }
+        stress
+    }
+
+    /// The stress at which a body of this state yields, Pa.
+    fn limit(&self, state: &PlasticState) -> f64 {
+        self.yield_stress + self.hardening * state.equivalent
+    }
+
+    /// Lets flow what would come to this stress (Pa) without.
+    fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) {
+        let (limit, most) = (self.limit(state), equivalent(trial));
+        // Of what is not finite nothing flows, and it is told as what it is.
+        let flows = most > limit * (1.0 + SURFACE) && most.is_finite();
+        if !flows {
+            return;
+        }
+        let (growth, change) = if self.is_sheet {
+            self.in_a_sheet(trial, limit)
+        } else {
+            let growth = (most - limit) / (3.0 * self.shear + self.hardening);
+            (growth, deviator(trial) * (1.5 * growth / most))
+        };
+        let entries = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
+        for (strain, entry) in state.strain.iter_mut().zip(entries) {
+            *strain += change[entry];
+        }
+        state.equivalent += growth;
+        state.work += (limit + 0.5 * self.hardening * growth) * growth;
+    }
+
+    /// Δε̄ and ΔE_p in plane stress. C and the deviator's projection have the same eigenvectors, so that the
+    /// parts of the stress shrink by 1/(1 + x c); q shrinks with x and is convex, and Newton's method comes to
+    /// its root from one side.
+    fn in_a_sheet(&self, trial: &Matrix3<f64>, limit: f64) -> (f64, Matrix3<f64>) {
+        let (xx, yy, xy) = (trial[(0, 0)], trial[(1, 1)], trial[(0, 1)]);
+        let even = 2.0 * (self.lambda + self.shear) / 3.0;
+        let uneven = 2.0 * self.shear;
+        let hardening = 2.0 / 3.0 * self.hardening;
+        let squares = [
+            0.25 * (xx + yy) * (xx + yy),
+            0.75 * (xx - yy) * (xx - yy) + 3.0 * xy * xy,
+        ];
+        let mut x = 0.0;
+        for _ in 0..100 {
+            let shrunk = [1.0 + x * even, 1.0 + x * uneven];
+            let parts = [
+                squares[0] / shrunk[0].powi(2),
+                squares[1] / shrunk[1].powi(2),
+            ];
+            let q = (parts[0] + parts[1]).sqrt();
+            let slope = -(parts[0] * even / shrunk[0] + parts[1] * uneven / shrunk[1]) / q;
+            let rest = q * (1.0 - hardening * x) - limit;
+            let step = rest / (slope * (1.0 - hardening * x) - hardening * q);
+            x -= step;
+            if step.abs() <= 1e-15 * x {
+                break;
+            }
+        }
+        let sum = 0.5 * (xx + yy) / (1.0 + x * even);
+        let difference = 0.5 * (xx - yy) / (1.0 + x * uneven);
+        let shear = xy / (1.0 + x * uneven);
+        let mut stress = Matrix3::from_diagonal(&[sum + difference, sum - difference, 0.0].into());
+        stress[(0, 1)] = shear;
+        stress[(1, 0)] = shear;
+        (2.0 / 3.0 * x * equivalent(&stress), deviator(&stress) * x)
+    }
+}
+
+/// A symmetric tensor of its entries xx, yy, zz, yz, xz, xy.
+fn tensor_of([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Matrix3<f64> {
+    Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
+}
+
+fn deviator(stress: &Matrix3<f64>) -> Matrix3<f64> {
+    stress - Matrix3::from_diagonal_element(stress.trace() / 3.0)
+}
+
+/// q = √(3/2 |S_d|²).
+fn equivalent(stress: &Matrix3<f64>) -> f64 {
+    1.5_f64.sqrt() * deviator(stress).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix2;
+
+    use super::*;
+    use crate::elastic::Isotropic;
+
+    const YIELD: f64 = 0.01;
+    const HARDENING_MODULUS: f64 = 0.3;
+
+    fn law(dimension: Dimension) -> Plastic {
+        let mut values = Values::defaults(super::super::KEYS);
+        values.set(YIELD_STRESS.name, YIELD.into());
+        values.set(HARDENING.name, HARDENING_MODULUS.into());
+        let given = Given {
+            dimension,
+            elastic: Isotropic {
+                youngs_modulus: 3.0,
+                poisson_ratio: 0.3,
+            },
+            horizon: 1.0,
+            values: &values,
+            from_fracture_energy: false,
+        };
+        Plastic::of(&given).unwrap()
+    }
+
+    /// Gradients of a walk in all directions, some steps of which are large.
+    fn walk<const D: usize>() -> impl Iterator<Item = SMatrix<f64, D, D>> {
+        let mut number = 0.0_f64;
+        let mut place = SMatrix::<f64, D, D>::zeros();
+        (0..400).map(move |step| {
+            let size = if step % 7 == 0 { 0.02 } else { 0.002 };
+            place = SMatrix::from_fn(|a, b| {
+                number += 1.0;
+                0.9 * place[(a, b)] + size * (number * number + 0.3 * number).sin()
+            });
+            place
+        })
+    }
+
+    fn check<const D: usize>(law: &Plastic) {
+        let mut state = PlasticState::default();
+        for gradient in walk::<D>() {
+            let before = state;
+            law.at(&gradient, &mut state);
+            let strain = matrix(&green_strain(&rows(&gradient)));
+            let mut elastic = -tensor_of(&state.strain);
+            for a in 0..D {
+                for b in 0..D {
+                    elastic[(a, b)] += strain[(a, b)];
+                }
+            }
+            let stress = law.stress(&elastic);
+            let over = equivalent(&stress) / law.limit(&state) - 1.0;
+            assert!(over < 1e-12, "{over}");
+            assert!(state.work >= before.work && state.equivalent >= before.equivalent);
+            let flow = tensor_of(&state.strain) - tensor_of(&before.strain);
+            assert!(flow.trace().abs() < 1e-16);
+            if state != before {
+                assert!(over > -1e-12, "{over}");
+                // Along the deviator, and as long as the equivalent strain says.
+                let growth = state.equivalent - before.equivalent;
+                let wanted = deviator(&stress) * (1.5 * growth / equivalent(&stress));
+                assert!((flow - wanted).norm() < 1e-9 * growth);
+            }
+            // Once it has flowed it stays.
+            let after = state;
+            law.at(&gradient, &mut state);
+            assert_eq!(state, after);
+        }
+        assert!(state.equivalent > 0.1, "{state:?}");
+    }
+
+    #[test]
+    fn the_yield_surface_is_not_left_and_flow_dissipates() {
+        check::<3>(&law(Dimension::Space));
+        check::<2>(&law(Dimension::PlaneStrain { thickness: 1.0 }));
+        check::<2>(&law(Dimension::PlaneStress { thickness: 1.0 }));
+    }
+
+    #[test]
+    fn a_sheet_flows_as_the_solid_that_is_free_across_it() {
+        let sheet = law(Dimension::PlaneStress { thickness: 1.0 });
+        let solid = law(Dimension::Space);
+        let [mut of_sheet, mut of_solid] = [PlasticState::default(); 2];
+        for gradient in walk::<2>() {
+            let (stress, energy) = sheet.at(&gradient, &mut of_sheet);
+            let mut whole = Matrix3::zeros();
+            whole.fixed_view_mut::<2, 2>(0, 0).copy_from(&gradient);
+            // The gradient across at which the stress across is 0, between two that are too small and too
+            // large.
+            let [mut low, mut high] = [-0.3, 0.3];
+            for _ in 0..80 {
+                whole[(2, 2)] = 0.5 * (low + high);
+                let (stress, _) = solid.at(&whole, &mut of_solid.clone());
+                if stress[(2, 2)] > 0.0 {
+                    high = whole[(2, 2)];
+                } else {
+                    low = whole[(2, 2)];
+                }
+            }
+            let (wanted, wanted_energy) = solid.at(&whole, &mut of_solid);
+            let wanted: Matrix2<f64> = wanted.fixed_view::<2, 2>(0, 0).into_owned();
+            assert!((stress - wanted).norm() < 1e-9 * YIELD, "{stress} {wanted}");
+            assert!((energy - wanted_energy).abs() < 1e-9 * YIELD);
+            assert!((of_sheet.equivalent - of_solid.equivalent).abs() < 1e-9);
+        }
+        assert!(of_sheet.equivalent > 0.1);
+    }
+
+    #[test]
+    fn without_flow_it_is_the_elastic_law() {
+        for dimension in [
+            Dimension::PlaneStress { thickness: 1.0 },
+            Dimension::PlaneStrain { thickness: 1.0 },
+        ] {
+            let law = law(dimension);
+            let values = Values::defaults(super::super::KEYS);
+            let given = Given {
+                dimension,
+                elastic: Isotropic {
+                    youngs_modulus: 3.0,
+                    poisson_ratio: 0.3,
+                },
+                horizon: 1.0,
+                values: &values,
+                from_fracture_energy: false,
+            };
+            let hooke = hooke::Hooke::of(&given).unwrap();
+            let elastic = super::super::Stress::of("st-venant-kirchhoff", &given, hooke);
+            let gradient = Matrix2::new(1e-3, 2e-3, -5e-4, 1e-3);
+            let mut state = PlasticState::default();
+            let (stress, energy) = law.at(&gradient, &mut state);
+            let (wanted, wanted_energy) = elastic.at(&gradient).unwrap();
+            assert_eq!(state, PlasticState::default());
+            assert!((stress - wanted).norm() < 1e-14 * wanted.norm());
+            assert!((energy / wanted_energy - 1.0).abs() < 1e-14);
+        }
+    }
+}

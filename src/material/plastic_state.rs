@@ -1,0 +1,33 @@
+//! What plastic flow leaves at a point, from step to step.
+
+/// Plastic strain and what came of it; 0 at the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PlasticState {
+    /// E_p: xx, yy, zz, yz, xz, xy.
+    pub strain: [f64; 6],
+    /// ∫ √(⅔ Ė_p:Ė_p) dt.
+    pub equivalent: f64,
+    /// What flow has dissipated, J/m³.
+    pub work: f64,
+}
+
+impl PlasticState {
+    /// How many numbers it has.
+    pub const COUNT: usize = 8;
+
+    /// From its numbers, in the order in which they are declared.
+    pub fn of(numbers: [f64; Self::COUNT]) -> Self {
+        let [strain @ .., equivalent, work] = numbers;
+        Self {
+            strain,
+            equivalent,
+            work,
+        }
+    }
+
+    /// Its numbers, in the order in which they are declared.
+    pub fn numbers(&self) -> [f64; Self::COUNT] {
+        let [xx, yy, zz, yz, xz, xy] = self.strain;
+        [xx, yy, zz, yz, xz, xy, self.equivalent, self.work]
+    }
+}

@@ -1,0 +1,365 @@
+//! J2 plasticity in correspondence: against one-dimensional curves, under rotation, and in motion.
+
+use fissure::deck::plan::Field;
+use fissure::solver::Simulation;
+use fissure::solver::bonds::Evolution;
+use fissure::solver::observers::{HistoryObserver, Snapshot};
+
+use crate::support::{forces, simulate};
+
+const YOUNG: f64 = 5.0;
+const RATIO: f64 = 0.3;
+const SHEAR: f64 = YOUNG / (2.0 * (1.0 + RATIO));
+// Small strains, at which Cauchy's stress is nearly that of the law.
+const YIELD: f64 = 1e-4;
+const HARDENING: f64 = 0.4;
+
+/// A cube or square with a law that yields.
+fn deck(dimension: &str, more: &str) -> String {
+    let (upper, lower, thickness) = match dimension {
+        "3d" => ("[5, 5, 5]", "[0, 0, 0]", ""),
+        _ => ("[7, 7]", "[0, 0]", "thickness = 0.5"),
+    };
+    format!(
+        "dimension = '{dimension}'
+        {thickness}
+        grid = {{ spacing = 1, horizon = 2.5, volume_correction = 'linear' }}
+        material.metal.correspondence = {{ density = 1, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, yield_stress = {YIELD}, hardening_modulus = {HARDENING} }}
+        body.block = {{ material = 'metal', shape.box = {{ lower = {lower}, upper = {upper} }} }}
+        {more}
+        "
+    )
+}
+
+/// Takes all points where a gradient of displacement has them, row by row.
+fn strain<const D: usize>(
+    simulation: &mut Simulation<D>,
+    gradient: [[f64; 3]; 3],
+    evolution: Evolution,
+) {
+    for point in 0..simulation.model.volume.len() {
+        let place = simulation.model.position(point);
+        for d in 0..D {
+            let moved = (0..D).map(|k| gradient[d][k] * place[k]).sum();
+            simulation.fields.displacement[d][point] = moved;
+        }
+    }
+    simulation.evaluate(evolution);
+}
+
+/// A field, of which all points of the body have the same; their first row.
+fn same<const D: usize>(simulation: &mut Simulation<D>, field: Field) -> Vec<f64> {
+    let snapshot = Snapshot::new(simulation);
+    let all = snapshot.field(simulation, field);
+    let (first, rest) = all.split_at(field.components());
+    let size = first
+        .iter()
+        .fold(1e-9_f64, |most, entry| most.max(entry.abs()));
+    for row in rest.chunks_exact(first.len()) {
+        let close = row
+            .iter()
+            .zip(first)
+            .all(|(a, b)| (a - b).abs() < 1e-6 * size);
+        assert!(close, "{field:?}: {row:?} {first:?}");
+    }
+    first.to_vec()
+}
+
+fn dissipated<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
+    Snapshot::new(simulation).stored.dissipated[0]
+}
+
+/// A bar or a sheared sheet with a yield stress and linear hardening, as the numbers of one dimension.
+struct Curve {
+    modulus: f64,
+    strength: f64,
+    hardening: f64,
+    plastic: f64,
+    flowed: f64,
+    work: f64,
+}
+
+impl Curve {
+    /// The stress (Pa) at a strain.
+    fn stress(&mut self, strain: f64) -> f64 {
+        let trial = self.modulus * (strain - self.plastic);
+        let limit = self.strength + self.hardening * self.flowed;
+        let growth = ((trial.abs() - limit) / (self.modulus + self.hardening)).max(0.0);
+        self.work += (limit + 0.5 * self.hardening * growth) * growth;
+        self.flowed += growth;
+        self.plastic += growth * trial.signum();
+        self.modulus * (strain - self.plastic)
+    }
+}
+
+/// A cycle of strains, in units of that at which the body yields.
+fn cycle() -> impl Iterator<Item = f64> {
+    let legs = [(0, 30), (30, -25), (-25, 40), (40, 10)];
+    legs.into_iter().flat_map(|(from, to): (i32, i32)| {
+        let sign = (to - from).signum();
+        (1..=(to - from).abs()).map(move |k| 0.1 * f64::from(from + sign * k))
+    })
+}
+
+/// Follows a cycle; `motion` is the gradient of a strain and of the one across it, at which the first normal
+/// stress across is 0 if `free`.
+fn follow<const D: usize>(
+    mut simulation: Simulation<D>,
+    mut curve: Curve,
+    free: bool,
+    motion: impl Fn(f64, f64) -> [[f64; 3]; 3],
+    seen: impl Fn(&[f64]) -> f64,
+    equivalent: f64,
+) {
+    let (strength, yields) = (curve.strength, curve.strength / curve.modulus);
+    let mut across = 0.0;
+    let mut before = 0.0;
+    for share in cycle() {
+        let wanted = curve.stress(share * yields);
+        if free {
+            // By secants, with forces that are only looked at.
+            let mut of = |across: f64| {
+                strain(
+                    &mut simulation,
+                    motion(share * yields, across),
+                    Evolution::None,
+                );
+                same(&mut simulation, Field::Stress)[1]
+            };
+            let mut last = (across, of(across));
+            across -= 1e-2 * yields;
+            for _ in 0..30 {
+                let now = (across, of(across));
+                if now.1.abs() < 1e-9 * strength || now.0 == last.0 {
+                    break;
+                }
+                across = now.0 - now.1 * (now.0 - last.0) / (now.1 - last.1);
+                last = now;
+            }
+        }
+        strain(
+            &mut simulation,
+            motion(share * yields, across),
+            Evolution::Step(0.0),
+        );
+        let stress = seen(&same(&mut simulation, Field::Stress));
+        assert!(
+            (stress - wanted).abs() < 0.01 * strength,
+            "{share}: {stress} for {wanted}"
+        );
+        let flowed = same(&mut simulation, Field::PlasticStrainEquivalent)[0];
+        let error = (flowed - equivalent * curve.flowed).abs();
+        assert!(
+            error < 0.01 * yields,
+            "{share}: {flowed} for {}",
+            curve.flowed
+        );
+        // Of Cauchy's stress, which differs by the strain.
+        let mises = same(&mut simulation, Field::VonMisesStress)[0];
+        let limit = YIELD + HARDENING * flowed;
+        assert!(mises < 1.005 * limit, "{share}: {mises} beyond {limit}");
+        let lost = dissipated(&mut simulation);
+        assert!(lost >= before, "{share}: {lost} after {before}");
+        before = lost;
+        assert!(
+            (lost - curve.work).abs() < 0.01 * (curve.work + strength * yields),
+            "{lost} {}",
+            curve.work
+        );
+    }
+    assert!(before > 0.0);
+}
+
+#[test]
+fn a_cycle_of_pulling_follows_the_curve_of_a_bar() {
+    let curve = || Curve {
+        modulus: YOUNG,
+        strength: YIELD,
+        hardening: HARDENING,
+        plastic: 0.0,
+        flowed: 0.0,
+        work: 0.0,
+    };
+    let pull =
+        |along: f64, across: f64| [[along, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, across]];
+    let seen = |stress: &[f64]| stress[0];
+    let text = |dimension| deck(dimension, "time.end = 1");
+    simulate::<3, _>(&text("3d"), |s| follow(s, curve(), true, pull, seen, 1.0));
+    simulate::<2, _>(&text("plane-stress"), |s| {
+        follow(s, curve(), true, pull, seen, 1.0)
+    });
+}
+
+#[test]
+fn a_cycle_of_shear_follows_the_curve_of_its_yield_stress() {
+    let root = 3_f64.sqrt();
+    let curve = || Curve {
+        modulus: SHEAR,
+        strength: YIELD / root,
+        // ε̄ is the plastic shear over √3.
+        hardening: HARDENING / 3.0,
+        plastic: 0.0,
+        flowed: 0.0,
+        work: 0.0,
+    };
+    let shear = |along: f64, _: f64| [[0.0, along, 0.0], [0.0; 3], [0.0; 3]];
+    let seen = |stress: &[f64]| stress[3];
+    for dimension in ["plane-strain", "plane-stress"] {
+        let text = deck(dimension, "time.end = 1");
+        simulate::<2, _>(&text, |s| {
+            follow(s, curve(), false, shear, seen, 1.0 / root)
+        });
+    }
+}
+
+#[test]
+fn in_plane_strain_the_stress_across_is_that_of_the_body_that_has_flowed() {
+    let text = deck("plane-strain", "time.end = 1");
+    simulate::<2, _>(&text, |mut simulation| {
+        for (number, share) in cycle().enumerate() {
+            let along = share * YIELD / YOUNG;
+            let gradient = [[2.0 * along, 0.0, 0.0], [0.0, -along, 0.0], [0.0; 3]];
+            strain(&mut simulation, gradient, Evolution::Step(0.0));
+            let mises = same(&mut simulation, Field::VonMisesStress)[0];
+            let flowed = same(&mut simulation, Field::PlasticStrainEquivalent)[0];
+            let limit = YIELD + HARDENING * flowed;
+            assert!(mises < 1.005 * limit, "{share}: {mises} beyond {limit}");
+            // The end of the first pull.
+            if number == 29 {
+                assert!(
+                    flowed > 0.0 && mises > 0.995 * limit,
+                    "{mises} below {limit}"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn forces_that_are_only_looked_at_change_nothing() {
+    let text = deck("3d", "time.end = 1");
+    simulate::<3, _>(&text, |mut simulation| {
+        let yields = YIELD / YOUNG;
+        let pulled = |share: f64| [[share * yields, 0.0, 0.0], [0.0; 3], [0.0; 3]];
+        let state = |simulation: &Simulation<3>| {
+            let fields = &simulation.fields;
+            let strain = fields.plastic_strain.clone().unwrap();
+            (
+                strain,
+                fields.plastic_strain_equivalent.clone(),
+                fields.plastic_work.clone(),
+            )
+        };
+        strain(&mut simulation, pulled(9.0), Evolution::Step(0.0));
+        let (before, kept) = (forces(&simulation), state(&simulation));
+        assert!(kept.1.as_ref().unwrap()[0] > 0.0);
+        strain(&mut simulation, pulled(-40.0), Evolution::None);
+        assert_ne!(forces(&simulation), before);
+        assert_eq!(state(&simulation), kept);
+        strain(&mut simulation, pulled(9.0), Evolution::None);
+        assert_eq!(forces(&simulation), before);
+        // Nor does a step that brings nothing new.
+        strain(&mut simulation, pulled(9.0), Evolution::Step(0.0));
+        assert_eq!(forces(&simulation), before);
+        assert_eq!(state(&simulation), kept);
+    });
+}
+
+#[test]
+fn a_body_that_has_flowed_does_not_flow_when_it_turns() {
+    let text = deck("3d", "time.end = 1");
+    simulate::<3, _>(&text, |mut simulation| {
+        let stretched =
+            nalgebra::Matrix3::new(1.01, 0.004, 0.0, 0.0, 0.995, 0.002, 0.001, 0.0, 1.0);
+        let mut take = |turn: f64| {
+            let axis = nalgebra::Vector3::new(0.3, -0.5, 0.8);
+            let turned = nalgebra::Rotation3::new(axis * turn) * stretched;
+            let gradient = turned - nalgebra::Matrix3::identity();
+            let gradient = std::array::from_fn(|a| std::array::from_fn(|b| gradient[(a, b)]));
+            strain(&mut simulation, gradient, Evolution::Step(0.0));
+            [Field::PlasticStrainEquivalent, Field::VonMisesStress]
+                .map(|field| same(&mut simulation, field)[0])
+        };
+        let [flowed, mises] = take(0.0);
+        assert!(flowed > 10.0 * YIELD / YOUNG, "{flowed}");
+        for turn in [0.4, 1.3, 2.9] {
+            let [again, stress] = take(turn);
+            assert!((again / flowed - 1.0).abs() < 1e-10, "{again} {flowed}");
+            assert!((stress / mises - 1.0).abs() < 1e-9, "{stress} {mises}");
+        }
+    });
+}
+
+#[test]
+fn the_energy_of_a_body_that_flows_is_balanced() {
+    let error = |safety: f64| {
+        let more = format!(
+            "initial.burst.velocity = ['4e-5*(x - 3.5)', '2e-5*x*(y - 3)']
+            time = {{ end = 30, safety = {safety} }}"
+        );
+        let of = |dimension: &str| {
+            simulate::<2, _>(&deck(dimension, &more), |mut simulation| {
+                let mut observer = HistoryObserver::new(&simulation).unwrap();
+                let mut row = |simulation: &mut Simulation<2>| {
+                    let snapshot = Snapshot::new(simulation);
+                    observer.row(simulation, &snapshot).energies
+                };
+                row(&mut simulation);
+                while simulation.clock.number() < simulation.clock.last() {
+                    simulation.advance();
+                }
+                let energies = row(&mut simulation);
+                let start = energies.kinetic + energies.strain + energies.dissipated;
+                assert!(energies.dissipated > 0.2 * start, "{energies:?}");
+                (energies.error / start).abs()
+            })
+        };
+        ["plane-strain", "plane-stress"].map(of)
+    };
+    // It falls with the square of the step.
+    for (coarse, fine) in error(0.4).into_iter().zip(error(0.1)) {
+        assert!(fine < 1e-3 && fine < 0.1 * coarse, "{coarse} {fine}");
+    }
+}
+
+#[test]
+fn a_relaxed_body_yields_as_one_that_is_pulled() {
+    // Supports of two horizons: the families of all whom free points are bonded to reach no end of the bar.
+    let text = format!(
+        "dimension = 'plane-stress'
+        thickness = 0.5
+        grid = {{ spacing = 1, horizon = 2.5, volume_correction = 'linear' }}
+        material.metal.correspondence = {{ density = 1, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, yield_stress = {YIELD}, hardening_modulus = {HARDENING} }}
+        body.bar = {{ material = 'metal', shape.box = {{ lower = [-11, 0], upper = [11, 7] }} }}
+        set.ends.where = 'abs(x) > 6'
+        condition.pull = {{ set = 'ends', displacement = ['{strain}*x*t', 'free'] }}
+        time = {{ end = 3, method = 'relaxation', relaxation = {{ load_steps = 6, tolerance = 1e-6 }} }}
+        ",
+        strain = YIELD / YOUNG,
+    );
+    simulate::<2, _>(&text, |mut simulation| {
+        while !simulation.is_over() {
+            simulation.advance();
+            simulation.check().unwrap();
+        }
+        let snapshot = Snapshot::new(&mut simulation);
+        let stress = snapshot.field(&mut simulation, Field::Stress);
+        let flowed = snapshot.field(&mut simulation, Field::PlasticStrainEquivalent);
+        // E (ε − ε̄) = σ_y + H ε̄.
+        let growth = 2.0 * YIELD / (YOUNG + HARDENING);
+        for point in 0..simulation.model.owned() {
+            let [xx, yy] = [stress[6 * point], stress[6 * point + 1]];
+            let wanted = YIELD + HARDENING * growth;
+            assert!(
+                (xx / wanted - 1.0).abs() < 0.01,
+                "{point}: {xx} for {wanted}"
+            );
+            assert!(yy.abs() < 0.01 * wanted, "{point}: {yy}");
+            assert!(
+                (flowed[point] / growth - 1.0).abs() < 0.01,
+                "{point}: {} for {growth}",
+                flowed[point]
+            );
+        }
+    });
+}
