@@ -101,6 +101,7 @@ fn look<const D: usize>(plan: &Plan, asked: &Asked) -> Result<Report> {
     report.say("size");
     say::size(
         &mut report,
+        plan,
         simulation.model.total,
         simulation.forces.directed_bonds() / 2,
     );
