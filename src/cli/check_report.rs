@@ -180,7 +180,10 @@ pub fn sets(report: &mut Report, plan: &Plan, survey: &Survey) {
 
 /// Points and bonds.
 pub fn size(report: &mut Report, plan: &Plan, points: u64, bonds: u64) {
-    let trigger = plan.refinement.as_ref().map(|refinement| &refinement.trigger);
+    let trigger = plan
+        .refinement
+        .as_ref()
+        .map(|refinement| &refinement.trigger);
     let note = if matches!(trigger, Some(Some(_))) {
         " at the start; what follows does not know how many are born"
     } else {

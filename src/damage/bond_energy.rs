@@ -83,7 +83,7 @@ mod tests {
                     // The cap of directions that cross.
                     Dimension::Space => 2.0 * PI * (1.0 - z / r) * r * r,
                     Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
-                        2.0 * (z / r).acos() * r * thickness
+                        2.0 * libm::acos(z / r) * r * thickness
                     }
                     Dimension::Line { cross_section } => cross_section,
                 };

@@ -35,17 +35,17 @@ pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
         let mut crossing = Vec::with_capacity((LENGTHS * ANGLES) as usize);
         for j in 0..LENGTHS {
             let r = distance + (1.0 - distance) * middle(j, LENGTHS);
-            let widest = (distance / r).acos();
+            let widest = libm::acos(distance / r);
             let ring = influence.at(r, 1.0) * (1.0 - distance) / f64::from(LENGTHS);
             for k in 0..ANGLES {
                 let angle = widest * middle(k, ANGLES);
                 let arc = widest / f64::from(ANGLES);
                 let volume = ring
                     * match dimension {
-                        3 => 2.0 * PI * r * r * angle.sin() * arc,
+                        3 => 2.0 * PI * r * r * libm::sin(angle) * arc,
                         _ => 2.0 * r * arc,
                     };
-                let cosine = angle.cos();
+                let cosine = libm::cos(angle);
                 crossing.push([r / cosine, r * cosine * volume, r * r * volume]);
             }
         }

@@ -66,7 +66,7 @@ fn same_place(plan: &Plan, points: &[Point; 2]) -> Error {
 
 /// A large number for a message, to two digits.
 fn rounded(value: f64) -> String {
-    let unit = 10_f64.powf(value.log10().floor() - 1.0);
+    let unit = libm::pow(10_f64, libm::log10(value).floor() - 1.0);
     shown((value / unit).round() * unit)
 }
 

@@ -118,7 +118,7 @@ fn quadrant_in_disc(x: f64, y: f64, radius: f64) -> f64 {
     let a = (radius * radius - y * y).max(0.0).sqrt().min(x);
     let under_circle = |u: f64| {
         let height = (radius * radius - u * u).max(0.0).sqrt();
-        0.5 * (u * height + radius * radius * (u / radius).min(1.0).asin())
+        0.5 * (u * height + radius * radius * libm::asin((u / radius).min(1.0)))
     };
     a * y + under_circle(x) - under_circle(a)
 }

@@ -428,7 +428,7 @@ mod tests {
             check(std::array::from_fn(|_| {
                 let sign = if random() < 0.5 { -1.0 } else { 1.0 };
                 match round % 4 {
-                    0 => sign * 10_f64.powf(-20.0 * random()),
+                    0 => sign * libm::pow(10_f64, -20.0 * random()),
                     1 => sign * NEAR * (0.9 + 0.2 * random()),
                     2 => 0.02 * (random() - 0.5),
                     _ => 5.0 * random() - 0.999_999,

@@ -22,7 +22,7 @@ impl Influence {
         match self {
             Self::Constant => 1.0,
             Self::Linear => (1.0 - ratio).max(0.0),
-            Self::Gaussian => (-4.0 * ratio * ratio).exp(),
+            Self::Gaussian => libm::exp(-4.0 * ratio * ratio),
             Self::Inverse => 1.0 / ratio,
         }
     }
@@ -60,7 +60,7 @@ mod tests {
             (
                 Influence::Gaussian,
                 3,
-                (1.0 - 5.0 * (-4.0_f64).exp()) / 32.0,
+                (1.0 - 5.0 * libm::exp(-4.0_f64)) / 32.0,
             ),
         ];
         for (influence, power, expected) in cases {

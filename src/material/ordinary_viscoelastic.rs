@@ -90,7 +90,7 @@ impl OrdinaryViscoelastic {
     /// 1 − a and β of a step (s).
     fn relaxed(&self, step: f64) -> [f64; 2] {
         let x = step / self.relaxation_time;
-        let gone = -(-x).exp_m1();
+        let gone = -libm::expm1(-x);
         let beta = if x < 1e-3 {
             // 1 − (1 − e^−x)/x without the difference.
             x * (0.5 - x * (1.0 / 6.0 - x / 24.0))

@@ -113,7 +113,7 @@ fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
         along.clamp(0.0, 1.0)
     };
     let across = offset - along * edge;
-    across.x.hypot(across.y)
+    libm::hypot(across.x, across.y)
 }
 
 #[cfg(test)]

@@ -202,7 +202,7 @@ fn thickness<const D: usize>(plan: &Plan, cells: &HashSet<[i64; 4]>, depth: f64)
         let shortest = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
         (own().next().is_some()).then_some(shortest)
     };
-    let difference = |thickness: &f64| (thickness / depth).ln().abs();
+    let difference = |thickness: &f64| libm::log(thickness / depth).abs();
     (0..plan.bodies.len())
         .filter_map(of_body)
         .max_by(|a, b| difference(a).total_cmp(&difference(b)))

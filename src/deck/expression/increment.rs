@@ -55,14 +55,16 @@ fn unary(operation: Unary, a: Moving) -> Moving {
         _ if change == 0.0 => 0.0,
         Unary::Negate => -change,
         Unary::IntegerPower(power) => power_change(from, to, change, power),
-        Unary::Sine => 2.0 * middle.cos() * half.sin(),
-        Unary::Cosine => -2.0 * middle.sin() * half.sin(),
-        Unary::HyperbolicSine => 2.0 * middle.cosh() * half.sinh(),
-        Unary::HyperbolicCosine => 2.0 * middle.sinh() * half.sinh(),
-        Unary::HyperbolicTangent => change.tanh() * (1.0 - value * to.tanh()),
-        Unary::Exponential => value * change.exp_m1(),
-        Unary::Logarithm if from > 0.0 => (change / from).ln_1p(),
-        Unary::DecimalLogarithm if from > 0.0 => (change / from).ln_1p() / std::f64::consts::LN_10,
+        Unary::Sine => 2.0 * libm::cos(middle) * libm::sin(half),
+        Unary::Cosine => -2.0 * libm::sin(middle) * libm::sin(half),
+        Unary::HyperbolicSine => 2.0 * libm::cosh(middle) * libm::sinh(half),
+        Unary::HyperbolicCosine => 2.0 * libm::sinh(middle) * libm::sinh(half),
+        Unary::HyperbolicTangent => libm::tanh(change) * (1.0 - value * libm::tanh(to)),
+        Unary::Exponential => value * libm::expm1(change),
+        Unary::Logarithm if from > 0.0 => libm::log1p(change / from),
+        Unary::DecimalLogarithm if from > 0.0 => {
+            libm::log1p(change / from) / std::f64::consts::LN_10
+        }
         Unary::SquareRoot if from > 0.0 => change / (value + to.sqrt()),
         Unary::Absolute if from > 0.0 && to > 0.0 => change,
         Unary::Absolute if from < 0.0 && to < 0.0 => -change,
@@ -94,10 +96,10 @@ fn binary(operation: Binary, a: Moving, b: Moving) -> Moving {
         Binary::Multiply => a.value * b.change + a.change * b.end(),
         Binary::Divide => (a.change - value * b.change) / b.end(),
         Binary::Power if b.change == 0.0 && a.value > 0.0 => {
-            value * (b.value * (a.change / a.value).ln_1p()).exp_m1()
+            value * libm::expm1(b.value * libm::log1p(a.change / a.value))
         }
         Binary::Power if a.change == 0.0 && a.value > 0.0 => {
-            value * (b.change * a.value.ln()).exp_m1()
+            value * libm::expm1(b.change * libm::log(a.value))
         }
         Binary::Hypotenuse if value > 0.0 => {
             let squares = a.change * (a.value + a.end()) + b.change * (b.value + b.end());

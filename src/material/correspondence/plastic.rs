@@ -269,7 +269,7 @@ mod tests {
             let size = if step % 7 == 0 { 0.02 } else { 0.002 };
             place = SMatrix::from_fn(|a, b| {
                 number += 1.0;
-                0.9 * place[(a, b)] + size * (number * number + 0.3 * number).sin()
+                0.9 * place[(a, b)] + size * libm::sin(number * number + 0.3 * number)
             });
             place
         })

@@ -178,7 +178,7 @@ fn st_venant_kirchhoff<T: Number, const D: usize>(
 impl NeoHooke {
     /// ln det FᵀF, that across the plane included, and W, from FᵀF − I of the plane or of space.
     fn in_plane<const D: usize>(&self, doubled: &SMatrix<f64, D, D>) -> (f64, f64) {
-        let own = (growth(doubled)).ln_1p();
+        let own = libm::log1p(growth(doubled));
         // q = ln of the square of the stretch across the plane.
         let across = if self.plane_stress && D == 2 {
             self.across(own)
@@ -186,7 +186,7 @@ impl NeoHooke {
             0.0
         };
         let log = own + across;
-        let trace = doubled.trace() + across.exp_m1();
+        let trace = doubled.trace() + libm::expm1(across);
         let energy = 0.5 * self.shear * (trace - log) + 0.125 * self.lambda * log * log;
         (log, energy)
     }
@@ -195,8 +195,8 @@ impl NeoHooke {
     fn across(&self, own: f64) -> f64 {
         let mut q = -0.5 * self.lambda * own / (self.shear + 0.5 * self.lambda);
         for _ in 0..20 {
-            let rest = self.shear * q.exp_m1() + 0.5 * self.lambda * (own + q);
-            let step = rest / (self.shear * q.exp() + 0.5 * self.lambda);
+            let rest = self.shear * libm::expm1(q) + 0.5 * self.lambda * (own + q);
+            let step = rest / (self.shear * libm::exp(q) + 0.5 * self.lambda);
             q -= step;
             if step.abs() <= 1e-15 * q.abs() {
                 break;

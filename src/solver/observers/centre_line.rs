@@ -290,7 +290,7 @@ mod tests {
     /// Two rows of points of unit spacing along a straight line.
     fn band(from: [f64; 2], to: [f64; 2]) -> Vec<Damaged> {
         let way = [to[0] - from[0], to[1] - from[1]];
-        let length = way[0].hypot(way[1]);
+        let length = libm::hypot(way[0], way[1]);
         let unit = way.map(|entry| entry / length);
         let count = length.round() as usize;
         let point = |k: usize, side: f64| Damaged {

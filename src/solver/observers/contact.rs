@@ -168,7 +168,7 @@ impl ContactWatch {
 /// Edge of a cube, square or line of a point's volume, m.
 fn spacing_of<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let extent = simulation.model.volume[point] / simulation.plan.dimension.section();
-    extent.powf(1.0 / D as f64)
+    libm::pow(extent, 1.0 / D as f64)
 }
 
 /// Present place of an owned point, m.

@@ -49,7 +49,7 @@ impl CrackPath {
         let volumes = &model.volume[..model.owned()];
         let mut largest = [volumes.iter().copied().fold(0.0, f64::max)];
         comm.max(&mut largest);
-        let spacing = (largest[0] / plan.dimension.section()).powf(1.0 / D as f64);
+        let spacing = libm::pow(largest[0] / plan.dimension.section(), 1.0 / D as f64);
         let link = (LINK * plan.horizon).max(DIAGONAL * spacing);
         let reach = Reach {
             link,

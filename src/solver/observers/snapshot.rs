@@ -128,8 +128,9 @@ fn cauchy_stress<const D: usize>(
         let in_plane = determinant(gradient);
         let growth = match simulation.plan.dimension {
             Dimension::PlaneStress { .. } => {
-                let elastic = in_plane * plastic_strain_across(&simulation.fields, point).exp();
-                elastic.powf((1.0 - 2.0 * ratio) / (1.0 - ratio))
+                let elastic =
+                    in_plane * libm::exp(plastic_strain_across(&simulation.fields, point));
+                libm::pow(elastic, (1.0 - 2.0 * ratio) / (1.0 - ratio))
             }
             _ => in_plane,
         };
