@@ -10,15 +10,14 @@ use std::time::Instant;
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{self, IdOrder, agree};
-use crate::deck::expression::Expression;
-use crate::deck::plan::{Action, Plan, Selector, StepRule, Trigger};
+use crate::deck::plan::StepRule;
 use crate::error::Result;
-use crate::points::bins::Bins;
 use crate::points::{Point, distance_squared};
-use crate::refine::{Grids, Pick, gather};
+use crate::refine::{Grids, Pick};
 
 mod facets;
 mod past;
+mod trigger;
 
 use super::Simulation;
 use super::assign::cutoffs;
@@ -26,6 +25,7 @@ use super::motion::fields::Birth;
 use super::observers::Snapshot;
 use facets::Facets;
 use past::{NOWHERE, Past};
+pub use trigger::is_possible;
 
 /// What refinements have done since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -51,60 +51,7 @@ impl Refined {
     }
 }
 
-/// A point that makes those within its horizon be refined.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Source {
-    position: [f64; 3],
-    horizon: f64,
-}
-
-/// Whether a run can refine as its plan wants.
-///
-/// # Errors
-/// With loads on sets given by ids; during a run with steps that are undone and with relaxation.
-pub fn is_possible(plan: &Plan) -> Result<()> {
-    let Some(refinement) = &plan.refinement else {
-        return Ok(());
-    };
-    let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
-    let is_by_ids = |set: usize| matches!(plan.sets[set].selector, Selector::Ids { .. });
-    let mut conditions = plan.conditions.iter();
-    if let Some(condition) = conditions.find(|c| is_load(&c.action) && is_by_ids(c.set)) {
-        let message = format!(
-            "[condition.{}] set: a load on points given by their ids cannot follow a refined grid; give \
-             the set by `where`",
-            condition.name
-        );
-        return Err(plan.source.error(condition.span.clone(), message));
-    }
-    let Some(trigger) = &refinement.trigger else {
-        return Ok(());
-    };
-    let other = if plan.relaxes() {
-        "method = \"relaxation\""
-    } else if plan.adapts() {
-        "an adaptive step"
-    } else {
-        return Ok(());
-    };
-    let message = format!(
-        "[refinement.trigger]: does not go with {other}; refine `[refinement.region]` from the start"
-    );
-    Err(plan.source.error(trigger.span.clone(), message))
-}
-
 impl<'a, const D: usize> Simulation<'a, D> {
-    fn trigger(&self) -> Option<&'a Trigger> {
-        let refinement = self.plan.refinement.as_ref();
-        refinement.and_then(|refinement| refinement.trigger.as_ref())
-    }
-
-    /// Whether points may be born during the run.
-    pub fn may_refine(&self) -> bool {
-        self.trigger().is_some()
-    }
-
     /// Whether bonds can be given to new points. Collective.
     ///
     /// # Errors
@@ -136,8 +83,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         };
         let start = Instant::now();
         let snapshot = Snapshot::new(self);
-        let sources = self.sources(trigger, &snapshot);
-        let picks = gather(self.comm, &self.visible(&sources));
+        let picks = self.picks(trigger, &snapshot);
         let mut grids = self.grids.clone();
         if !grids.refine(&picks) {
             return Ok(0);
@@ -173,71 +119,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .sum();
         let energy = reduce(self.comm, &mut sum)[0];
         [energy, comm::total(self.comm, own) as f64]
-    }
-
-    /// The triggers of all ranks.
-    fn sources(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<Source> {
-        let model = &self.model;
-        let mut most = [0.0_f64];
-        for energy in &snapshot.stored.energy {
-            most[0] = most[0].max(*energy);
-        }
-        self.comm.max(&mut most);
-        let least = trigger
-            .energy
-            .map_or(f64::INFINITY, |share| share * most[0]);
-        let time = self.clock.time();
-        let holds = |condition: &Expression, point| condition.is_true(model.position(point), time);
-        let is_source = |point: usize| {
-            if trigger
-                .only
-                .as_ref()
-                .is_some_and(|only| !holds(only, point))
-            {
-                return false;
-            }
-            let energy = snapshot.stored.energy[point];
-            let damage = || snapshot.damage(&self.family_volume, point);
-            energy >= least && energy > 0.0
-                || trigger.damage.is_some_and(|least| damage() >= least)
-                || (trigger.condition.as_ref()).is_some_and(|condition| holds(condition, point))
-        };
-        let own = (0..model.owned()).filter(|point| is_source(*point));
-        let own: Vec<Source> = own
-            .map(|point| Source {
-                position: model.position(point),
-                horizon: self.plan.block(usize::from(model.block[point])).horizon,
-            })
-            .collect();
-        gather(self.comm, &own)
-    }
-
-    /// The nodes of this rank that are to be refined: points that can be, within the horizon of a trigger.
-    fn visible(&self, sources: &[Source]) -> Vec<Pick> {
-        let longest = sources
-            .iter()
-            .map(|source| source.horizon)
-            .fold(0.0, f64::max);
-        if longest == 0.0 {
-            return Vec::new();
-        }
-        let places: Vec<[f64; 3]> = sources.iter().map(|source| source.position).collect();
-        let bins = Bins::new(&places, longest * (1.0 + 1e-9));
-        let model = &self.model;
-        let mut picks = Vec::new();
-        for point in 0..model.owned() {
-            let block = usize::from(model.block[point]);
-            let position = model.position(point);
-            let mut seen = false;
-            bins.within(position, |source, square| {
-                let horizon = sources[source as usize].horizon * (1.0 + 1e-9);
-                seen |= square <= horizon * horizon;
-            });
-            if seen {
-                picks.extend(self.grids.pick(block, position));
-            }
-        }
-        picks
     }
 
     /// Puts the run on other grids, with everything that points and bonds have. Collective.
