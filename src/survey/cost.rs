@@ -1,7 +1,9 @@
 //! What a run takes: memory and space on the disc.
 
 use crate::deck::plan::{Action, FamilyRule, Plan, PointSource, Quadrature};
+use crate::material::{Law, PlasticState};
 use crate::solver::Simulation;
+use crate::solver::assign::block_laws;
 use crate::solver::conditions::members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
@@ -157,7 +159,7 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
 }
 
 /// Numbers that a checkpoint holds a point: displacement, velocity, energy set free; reactions, work; what
-/// damping takes.
+/// damping takes; what plastic flow leaves.
 fn saved_width(plan: &Plan) -> usize {
     let dimension = plan.dimension.count();
     let is_support =
@@ -175,7 +177,13 @@ fn saved_width(plan: &Plan) -> usize {
     } else {
         0
     };
-    2 * dimension + 1 + supported + worked + usize::from(damped) + relaxed
+    let flows = plan.blocks().any(|block| match dimension {
+        2 => Law::<2>::flows(&block_laws(plan, &block).law),
+        3 => Law::<3>::flows(&block_laws(plan, &block).law),
+        _ => false,
+    });
+    let flowed = if flows { PlasticState::COUNT } else { 0 };
+    2 * dimension + 1 + supported + worked + usize::from(damped) + relaxed + flowed
 }
 
 fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {

@@ -52,19 +52,22 @@ impl Facets {
         let widest = all.iter().flat_map(|facet| facet.edges[..D].iter());
         let widest = widest.copied().fold(0.0, f64::max);
         Self {
-            bins: Bins::new(&centres, 0.5 * longest + widest),
+            bins: Bins::new(&centres, longest + widest),
             all,
         }
     }
 
-    /// Whether one of them lies between two positions (m) that are not farther apart than points with a bond.
-    pub fn lie_between(&self, from: [f64; 3], to: [f64; 3]) -> bool {
-        let middle = std::array::from_fn(|k| 0.5 * (from[k] + to[k]));
-        let mut crossed = false;
-        self.bins.within(middle, |facet, _| {
-            crossed = crossed || self.all[facet as usize].is_crossed(from, to);
-        });
-        crossed
+    /// Those that a bond of a point at a position (m) may cross, by index.
+    pub fn near(&self, position: [f64; 3]) -> Vec<u32> {
+        let mut near = Vec::new();
+        self.bins.within(position, |facet, _| near.push(facet));
+        near
+    }
+
+    /// Whether one of those `near` an end lies between the ends (m).
+    pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
+        let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);
+        facets.any(|facet| facet.is_crossed(from, to))
     }
 }
 

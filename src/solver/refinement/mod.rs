@@ -6,6 +6,7 @@
 //! there stay as they are; a new bond is broken if it crosses a pre-crack or a face along which points
 //! are parted, and between points that are parted none is born.
 
+use std::cell::OnceCell;
 use std::time::Instant;
 
 use crate::comm::sum::{ExactSum, reduce};
@@ -89,7 +90,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
             return Ok(0);
         }
         let facets = Facets::new(self);
-        grids.part(&self.grids, &|a, b| facets.lie_between(a, b));
+        grids.part(&self.grids, &|a, b| {
+            facets.lie_between(&facets.near(a), a, b)
+        });
         let [energy, bonds] = self.held(&snapshot);
         let before = self.model.total;
         self.regrid(grids, &facets)?;
@@ -222,6 +225,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let starts: Vec<usize> = std::iter::once(0).chain(ends).collect();
         let cutoffs = cutoffs(self.plan);
         let count = self.plan.block_count();
+        let near = vec![OnceCell::new(); model.owned()];
         let cut = |here: usize, there: usize| {
             let [a, b] = [here, there].map(|point| model.position(point));
             let [old, other] = [was[here], was[there]];
@@ -232,10 +236,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
                     return own.binary_search(&model.ids[there]).is_ok();
                 }
             }
+            let near = near[here].get_or_init(|| facets.near(a));
             if model.ids[here] < model.ids[there] {
-                facets.lie_between(a, b)
+                facets.lie_between(near, a, b)
             } else {
-                facets.lie_between(b, a)
+                facets.lie_between(near, b, a)
             }
         };
         self.forces.cut(cut);
