@@ -91,12 +91,16 @@ def distance(places, branches):
             share = numpy.clip((places - start) @ along / max(along @ along, 1e-30), 0, 1)
             gaps = places - start - share[:, None] * along
             nearest = numpy.minimum(nearest, numpy.hypot(*gaps.T))
-    return nearest.max()
+    return nearest.max(initial=0)
+
+
+def has_grown(branches):
+    return any((branch[:, 0] > BEYOND_THE_NOTCH).any() for branch in branches)
 
 
 def apart(one, other):
     """The largest distance between two cracks, seen from either, m; not a number where there is none."""
-    if not one or not other:
+    if not has_grown(one) or not has_grown(other):
         return numpy.nan
     return max(distance(numpy.concatenate(one), other), distance(numpy.concatenate(other), one))
 

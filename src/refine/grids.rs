@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use crate::comm::{Communicator, agree};
-use crate::deck::plan::{Block, Kind, Plan};
+use crate::deck::plan::{Block, Kind, Plan, PreCrack};
 use crate::error::Result;
 use crate::families::cutoff;
-use crate::points::{LatticeBody, Point};
+use crate::points::{LatticeBody, Point, crack};
 
 use super::pattern::{Node, Pattern};
 use super::place::{Place, born, parents};
@@ -66,7 +66,8 @@ impl<'a> Grids<'a> {
         self.coarsest
     }
 
-    /// Refines what the plan wants from the start; `coarse` are this rank's points of level 0. Collective.
+    /// Refines what the plan wants from the start, but for nodes between places that a pre-crack parts; `coarse`
+    /// are this rank's points of level 0. Collective.
     ///
     /// # Errors
     /// When there is no point in a region; the same on all ranks.
@@ -75,6 +76,7 @@ impl<'a> Grids<'a> {
         let Some(refinement) = &plan.refinement else {
             return Ok(());
         };
+        let whole = self.clone();
         for region in &refinement.regions {
             for level in 0..region.level {
                 let mut picks: Vec<Pick> = Vec::new();
@@ -101,6 +103,10 @@ impl<'a> Grids<'a> {
                 self.refine(&all);
             }
         }
+        let crosses = |crack: &PreCrack, a, b| crack::crosses(&crack.surface, a, b);
+        self.part(&whole, &|a, b| {
+            plan.cracks.iter().any(|crack| crosses(crack, a, b))
+        });
         Ok(())
     }
 
