@@ -445,7 +445,7 @@ impl Tree {
                     "^" if right.trunc() == right && (-16.0..=16.0).contains(&right) => {
                         left.powi(right as i32)
                     }
-                    "^" => left.powf(right),
+                    "^" => libm::pow(left, right),
                     "<" => truth(left < right),
                     "<=" => truth(left <= right),
                     ">" => truth(left > right),
@@ -463,15 +463,15 @@ impl Tree {
                     .map(|argument| argument.value(names))
                     .collect();
                 match (*function, values.as_slice()) {
-                    ("sin", [a]) => a.sin(),
-                    ("exp", [a]) => a.exp(),
-                    ("log", [a]) => a.ln(),
+                    ("sin", [a]) => libm::sin(*a),
+                    ("exp", [a]) => libm::exp(*a),
+                    ("log", [a]) => libm::log(*a),
                     ("sqrt", [a]) => a.sqrt(),
                     ("abs", [a]) => a.abs(),
                     ("floor", [a]) => a.floor(),
                     ("step", [a]) => truth(*a >= 0.0 || a.is_nan()),
-                    ("atan2", [a, b]) => a.atan2(*b),
-                    ("hypot", [a, b]) => a.hypot(*b),
+                    ("atan2", [a, b]) => libm::atan2(*a, *b),
+                    ("hypot", [a, b]) => libm::hypot(*a, *b),
                     ("if", [a, b, c]) => {
                         if *a != 0.0 {
                             *b
