@@ -1,6 +1,7 @@
 //! What goes wrong on one rank ends all of them, soon, with one message and the right exit code; what
 //! was written before stays readable.
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -91,36 +92,85 @@ fn a_value_that_is_not_finite() {
     assert_eq!(messages.len(), 1, "the same point on any number of ranks");
 }
 
-#[test]
-fn a_full_disc() {
-    let folder = Folder::new("disc");
+/// Mounts a disc of some size, such as `2m`; `None` where only root could.
+fn small_disc(folder: &Folder, size: &str) -> Option<PathBuf> {
     let disc = folder.join("small");
     std::fs::create_dir(&disc).unwrap();
     let mounted = Command::new("mount")
-        .args(["-t", "tmpfs", "-o", "size=2m", "tmpfs"])
+        .args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
         .arg(&disc)
         .stderr(Stdio::null())
         .status();
-    if !mounted.is_ok_and(|status| status.success()) {
-        eprintln!("skipped: only root can mount the small disc that this test fills");
-        return;
+    if mounted.is_ok_and(|status| status.success()) {
+        return Some(disc);
     }
+    eprintln!("skipped: only root can mount the small disc that this test fills");
+    None
+}
+
+fn unmount(disc: &Path) {
+    let unmounted = Command::new("umount").arg(disc).status();
+    assert!(unmounted.unwrap().success());
+}
+
+/// A run that ends because its disc is full; says so once.
+fn fill(ranks: usize, deck: &Path, out: &Path) {
+    let mut command = fissure(ranks);
+    command.arg("run").arg(deck).arg("--output").arg(out);
+    let output = finish(&mut command);
+    let printed = text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
+    assert_eq!(printed.matches("error:").count(), 1, "{printed}");
+    assert!(printed.contains("No space left"), "{printed}");
+}
+
+#[test]
+fn a_full_disc() {
+    let folder = Folder::new("disc");
+    let Some(disc) = small_disc(&folder, "2m") else {
+        return;
+    };
     let deck = folder.write("deck.toml", &bar("end = 100"));
     for ranks in [1, 2, 3] {
         let out = disc.join(format!("out{ranks}"));
-        let mut command = fissure(ranks);
-        command.arg("run").arg(&deck).arg("--output").arg(&out);
-        let output = finish(&mut command);
-        let printed = text(&output);
-        assert_eq!(output.status.code(), Some(1), "{printed}");
-        assert_eq!(printed.matches("error:").count(), 1, "{printed}");
-        assert!(printed.contains("No space left"), "{printed}");
+        fill(ranks, &deck, &out);
         // Room for the whole result is made before the run, so that nothing is computed in vain.
         assert!(!out.join("result.vtkhdf").exists());
         std::fs::remove_dir_all(&out).unwrap();
     }
-    let unmounted = Command::new("umount").arg(&disc).status();
-    assert!(unmounted.unwrap().success());
+    unmount(&disc);
+}
+
+#[test]
+fn a_full_disc_while_points_are_born() {
+    let folder = Folder::new("disc-growing");
+    let Some(disc) = small_disc(&folder, "2m") else {
+        return;
+    };
+    let text = "dimension = 'plane-stress'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.plate = { material = 'rubber', shape.box = { lower = [0, 0], upper = [40, 30] } }
+        initial.pull.velocity = ['0.001*x', 0]
+        refinement = { levels = 1, trigger = { where = 'x < t', every_steps = 10 } }
+        output.every_steps = 2
+        time.end = 60
+        ";
+    let deck = folder.write("deck.toml", text);
+    for ranks in [1, 2] {
+        let out = disc.join(format!("out{ranks}"));
+        fill(ranks, &deck, &out);
+        let reader = ResultReader::open(&out.join("result.vtkhdf")).unwrap();
+        let last = reader.times().unwrap().len() - 1;
+        assert!(last > 3 && reader.points(last) > reader.points(0), "{last}");
+        for step in [0, last] {
+            let displacement = reader.field("displacement", step).unwrap();
+            assert_eq!(displacement.len(), 3 * reader.points(step));
+            assert_eq!(reader.ids(step).unwrap().len(), reader.points(step));
+        }
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+    unmount(&disc);
 }
 
 #[test]

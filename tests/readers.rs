@@ -12,17 +12,32 @@ fn vtk_and_h5py_agree() {
         return;
     };
     let folder = Folder::new("readers");
+    let growing = "refinement = { levels = 1, trigger = { where = 'x < 2 + t', every_steps = 4 } }";
     let decks = [
-        ("1d", "[0]", "[40]", "['0.01*x']"),
-        ("plane-stress", "[0, 0]", "[20, 9]", "['0.01*x', '-0.01*y']"),
+        ("1d", "[0]", "[40]", "['0.01*x']", ""),
+        (
+            "plane-stress",
+            "[0, 0]",
+            "[20, 9]",
+            "['0.01*x', '-0.01*y']",
+            "",
+        ),
+        (
+            "plane-strain",
+            "[0, 0]",
+            "[20, 9]",
+            "['0.01*x', '-0.01*y']",
+            growing,
+        ),
         (
             "3d",
             "[0, 0, 0]",
             "[9, 8, 7]",
             "['0.01*x', 0, '0.02*sin(z)']",
+            "",
         ),
     ];
-    for (dimension, lower, upper, displacement) in decks {
+    for (dimension, lower, upper, displacement, more) in decks {
         let deck = folder.write(
             "deck.toml",
             &format!(
@@ -34,6 +49,7 @@ fn vtk_and_h5py_agree() {
                 output.every_steps = 3
                 output.fields = ['displacement', 'velocity', 'damage', 'neighbours']
                 time.end = 6
+                {more}
                 "
             ),
         );
