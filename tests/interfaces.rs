@@ -1,7 +1,7 @@
 //! Bonds between bodies: what each rule makes of their constants, pair by pair, and that whatever the
 //! rule action and reaction cancel.
 
-use crate::support::{displace, largest_force, simulate};
+use crate::support::{displace, largest_force, simulate, simulate_on};
 use fissure::solver::Simulation;
 
 /// The micromodulus of a bar, 12E/(5δ²A) (N/m⁶).
@@ -176,5 +176,51 @@ fn momentum_is_kept_by_every_rule() {
                 assert!(net.abs() < 1e-12 * gross, "{net} of {gross}: {text}");
             }
         });
+    }
+}
+
+#[test]
+fn pieces_that_are_worked_on_between_messages_do_not_cut_vectors() {
+    // Points of the fine layers have bonds in two lists, then in a lattice, and the sum of three numbers depends on
+    // their order. Each rank has more points than are worked on in one piece, and the borders between pieces fall
+    // elsewhere in a vector of the lattice for each width.
+    let piece = 4096 * rayon::current_num_threads();
+    let layers = |below: usize, above: usize, width: usize| {
+        let boxes = (0..piece / 280).map(|n| {
+            let (below, above) = (5 * n + below, 5 * n + above);
+            format!("{{ box = {{ lower = [0, {below}], upper = [{width}, {above}] }} }}")
+        });
+        boxes.collect::<Vec<_>>().join(", ")
+    };
+    let forces = |width: usize, ranks: usize| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3, family = 'lattice' }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.one = {{ material = 'rubber', shape.union = [{}] }}
+            body.other = {{ material = 'rubber', shape.union = [{}] }}
+            body.fine = {{ material = 'rubber', spacing = 0.5, shape.union = [{}] }}
+            time.end = 1
+            ",
+            layers(0, 1, width),
+            layers(1, 2, width),
+            layers(2, 5, width)
+        );
+        let found = simulate_on::<2, _>(ranks, &text, |mut simulation| {
+            assert!(simulation.model.interior > piece);
+            displace(&mut simulation, |[x, y, z]| {
+                let swing = 0.01 * (x * y).sin();
+                [x + swing, y + 0.01 * (x + 2.0 * y).cos(), z]
+            });
+            let (model, force) = (&simulation.model, &simulation.fields.internal_force);
+            let bits = |k: usize| (model.ids[k], [force[0][k].to_bits(), force[1][k].to_bits()]);
+            (0..model.owned()).map(bits).collect::<Vec<_>>()
+        });
+        let mut all = found.concat();
+        all.sort_unstable();
+        all
+    };
+    for width in 61..66 {
+        assert!(forces(width, 1) == forces(width, 2), "width {width}");
     }
 }

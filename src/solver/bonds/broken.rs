@@ -235,17 +235,7 @@ impl<const D: usize> Forces<D> {
 
     /// The points in ascending ranges, each with all points whose bonds are worked on together.
     fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
-        let with_others = |point: usize| {
-            let bonds = self
-                .interactions
-                .iter()
-                .map(|interaction| &interaction.bonds);
-            let together = bonds.map(|bonds| bonds.together(point));
-            together.fold(point..point + 1, |all, one| {
-                all.start.min(one.start)..all.end.max(one.end)
-            })
-        };
-        let mut ranges: Vec<Range<usize>> = points.map(with_others).collect();
+        let mut ranges: Vec<Range<usize>> = points.map(|point| self.together(point)).collect();
         ranges.sort_unstable_by_key(|range| range.start);
         let mut merged: Vec<Range<usize>> = Vec::new();
         for range in ranges {

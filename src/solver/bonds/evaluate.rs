@@ -118,7 +118,7 @@ impl<const D: usize> Forces<D> {
                 let mut rest = 0..model.interior;
                 // Once all messages have arrived the rest is done in one piece.
                 while rest.len() > piece && progress() {
-                    let next = rest.start + piece;
+                    let next = self.border(rest.start + piece);
                     let points = rest.start..next;
                     timed(&mut || self.run(stage, points.clone(), force, evolution));
                     rest.start = next;
@@ -159,6 +159,14 @@ impl<const D: usize> Forces<D> {
             };
             self.settle(comm, model, acting, evolution, times);
         }
+    }
+
+    /// The first point from one on that is not worked on together with the one before it. A vector of a
+    /// lattice that were cut would add to its last points before their earlier interactions do: their sums
+    /// would be rounded otherwise, as messages arrive.
+    fn border(&self, from: usize) -> usize {
+        let end = self.together(from - 1).end;
+        if end == from { from } else { self.border(end) }
     }
 
     /// What a stage reads anew from other ranks.

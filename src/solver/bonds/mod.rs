@@ -22,6 +22,7 @@ mod point_sums;
 mod seen;
 mod sweep;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::comm::{Communicator, Halo};
@@ -214,6 +215,15 @@ impl<const D: usize> Forces<D> {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
         let grids: usize = self.grids.iter().map(GridValues::bytes).sum();
         bonds + size_of_val(&self.nodes[..]) + grids
+    }
+
+    /// The owned points, one after the other, whose bonds are worked on together with those of one of them.
+    fn together(&self, point: usize) -> Range<usize> {
+        let bonds = self.interactions.iter().map(|it| &it.bonds);
+        let together = bonds.map(|bonds| bonds.together(point));
+        together.fold(point..point + 1, |all, one| {
+            all.start.min(one.start)..all.end.max(one.end)
+        })
     }
 
     /// Whether points of any law keep a plastic state; the same on all ranks.
