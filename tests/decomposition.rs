@@ -293,12 +293,14 @@ fn growing() -> String {
         damage = 0.3
         where = 't > 1e-6 && x < 3*dx && y > 0'
         every_steps = 5
-        "
+        [checkpoint]
+        every_steps = 9
+        {RESTLESS}"
     )
 }
 
 #[test]
-fn a_plate_that_is_refined_while_it_is_torn() {
+fn a_plate_that_is_refined_while_it_is_torn_and_dealt_out_anew() {
     same_everywhere("growing", &growing(), true);
 }
 

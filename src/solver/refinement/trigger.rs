@@ -19,7 +19,7 @@ struct Source {
 /// Whether a run can refine as its plan wants.
 ///
 /// # Errors
-/// With loads on sets given by ids; during a run with relaxation, steps that are undone and `[balance]`.
+/// With loads on sets given by ids; during a run with relaxation and steps that are undone.
 pub fn is_possible(plan: &Plan) -> Result<()> {
     let Some(refinement) = &plan.refinement else {
         return Ok(());
@@ -42,9 +42,6 @@ pub fn is_possible(plan: &Plan) -> Result<()> {
         "method = \"relaxation\""
     } else if plan.adapts() {
         "an adaptive step"
-    } else if plan.balance.is_some() {
-        // Seen: last digits of forces that depended on when points were dealt out.
-        "`[balance]`"
     } else {
         return Ok(());
     };
