@@ -116,10 +116,11 @@ def main():
     for name, text, reference in CASES:
         out, seconds = run(arguments, name, text)
         with h5py.File(out / "result.vtkhdf") as file:
-            history = file["history"]
+            table = file["history"]
+            history = dict(zip(table.attrs["columns"].split(","), table[-1]))
             counts = file["VTKHDF/NumberOfPoints"][:]
-            energy = 1e3 * history["fracture_energy"][-1]
-            length = 1e3 * history["crack_notch_length"][-1]
+            energy = 1e3 * history["fracture_energy"]
+            length = 1e3 * history["crack_notch_length"]
         branches = lines(out)
         found[name] = branches
         gap = f"{1e3 * apart(branches, found[reference]):9.2f}" if reference else "        -"

@@ -94,6 +94,13 @@ class Energy:
         return self.places[row, 0][order], self.density[row][order]
 
 
+def columns(file, *names):
+    """Columns of the history of a result."""
+    table = file["history"]
+    found = dict(zip(table.attrs["columns"].split(","), table[:].T))
+    return [found[name] for name in names]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
@@ -107,8 +114,7 @@ def main():
     plain = run(arguments, "uniform", deck("delta", 0, None, seen, after))
     uniform = Energy(plain)
     at, density = uniform.profile()
-    before = plain["history/probe_reflected_displacement_x"][:]
-    times = plain["history/time"][:]
+    before, times = columns(plain, "probe_reflected_displacement_x", "time")
 
     print("rule     level  factor    loss % (paper)     gain % (paper)   reflected % (paper)")
     cases = [(rule, level, None) for rule in ("delta", "delta-m") for level in (1, 2, 3)]
@@ -122,7 +128,7 @@ def main():
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
         near = np.abs(energy.places - CENTRE).max(axis=1) < 5 * DX
         change = 100 * (energy.density[near] / wanted[near] - 1)
-        found = np.interp(times, file["history/time"][:], file["history/probe_reflected_displacement_x"][:])
+        found = np.interp(times, *columns(file, "time", "probe_reflected_displacement_x"))
         late = times > (CENTRE[0] - 0.1) / SPEED + 0.09
         reflected = 100 * np.abs(found - before)[late].max() / AMPLITUDE
         loss, gain, coming_back = PAPER[rule, level]

@@ -1,12 +1,14 @@
 //! What every law must do in every dimension: nothing at rest, nothing under rigid motion, equal and
-//! opposite forces, forces that are the slope of the energy, both ends of a bond broken together.
+//! opposite forces, forces that are the slope of the energy, both ends of a bond broken together, the same bits
+//! however it is run.
 
+use crate::support::saved::{state, whole};
 use crate::support::{displace, force, forces, largest_force, plan, simulate, simulate_on};
 use fissure::dimension::Dimension;
 use fissure::material::{Declaration, Invariants, declarations};
 use fissure::solver::Simulation;
 use fissure::solver::bonds::Evolution;
-use fissure::solver::motion::Kept;
+use fissure::solver::motion::{Kept, Saved};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// A law, and what stands in its table beside density and Young's modulus.
@@ -414,6 +416,92 @@ fn together<const D: usize>(text: &str) {
             all.binary_search(&(*there, *here)).is_ok(),
             "{here} {there}"
         );
+    }
+}
+
+/// Steps of a run whose bits are compared.
+const STEPS: usize = 8;
+
+#[test]
+fn the_bits_are_the_same_on_any_ranks_and_after_a_restart() {
+    for case in cases() {
+        let damage = case.damages(0.25).into_iter().next();
+        let broken = if damage.is_some() {
+            ", damage = 'brittle'"
+        } else {
+            ""
+        };
+        let damage = damage.unwrap_or_default();
+        for family in ["lattice", "list"] {
+            let shaken = |dimension, velocity: &str| {
+                let body = deck(dimension, &case.table(), "exact", broken);
+                let body = body.replace(
+                    "horizon = 3,",
+                    &format!("horizon = 3, family = '{family}',"),
+                );
+                format!("{body}{damage}\ninitial.shake.velocity = {velocity}\n")
+            };
+            if case.has_line() {
+                same_bits::<1>(&shaken("1d", "['0.3*sin(2*x)']"));
+            }
+            let velocity = "['0.3*sin(2*x + y)', '0.2*cos(x - 3*y)']";
+            same_bits::<2>(&shaken("plane-stress", velocity));
+            same_bits::<2>(&shaken("plane-strain", velocity));
+            let velocity = "['0.3*sin(2*x + y)', '0.2*cos(x - 3*z)', '0.2*sin(x*y)']";
+            same_bits::<3>(&shaken("3d", velocity));
+        }
+    }
+}
+
+fn same_bits<const D: usize>(text: &str) {
+    let run = |ranks: usize, text: &str, steps: usize| {
+        whole(simulate_on::<D, _>(ranks, text, |mut simulation| {
+            (0..steps).for_each(|_| simulation.advance());
+            state(&simulation).1
+        }))
+    };
+    let wanted = run(1, text, STEPS);
+    let (values, ..) = &wanted;
+    assert!(values.iter().all(|bits| f64::from_bits(*bits).is_finite()));
+    assert!(run(3, text, STEPS) == wanted, "on 3 ranks: {text}");
+
+    let parts = simulate_on::<D, _>(2, text, |mut simulation| {
+        (0..STEPS / 2).for_each(|_| simulation.advance());
+        state(&simulation).1
+    });
+    let joined = joined(parts);
+    let continued = simulate_on::<D, _>(3, text, |mut simulation| {
+        let (order, _) = state(&simulation);
+        let own = part(&joined, order.first() as usize, order.count());
+        simulation.restore(&order, &own).unwrap();
+        (0..STEPS - STEPS / 2).for_each(|_| simulation.advance());
+        state(&simulation).1
+    });
+    assert!(whole(continued) == wanted, "after a restart: {text}");
+}
+
+/// What several ranks have saved as if one had.
+fn joined(parts: Vec<Saved>) -> Saved {
+    let mut parts = parts.into_iter();
+    let first = parts.next().unwrap();
+    parts.fold(first, |mut all, part| {
+        all.values.extend(part.values);
+        all.lengths.extend(part.lengths);
+        all.bonds.extend(part.bonds);
+        all
+    })
+}
+
+/// The part of some points of what one rank has saved.
+fn part(all: &Saved, first: usize, count: usize) -> Saved {
+    let bytes = |points: usize| all.lengths[..points].iter().sum::<u32>() as usize;
+    let (points, width) = (first..first + count, all.width);
+    Saved {
+        width,
+        values: all.values[width * points.start..width * points.end].to_vec(),
+        bonds: all.bonds[bytes(points.start)..bytes(points.end)].to_vec(),
+        lengths: all.lengths[points].to_vec(),
+        progress: all.progress.clone(),
     }
 }
 

@@ -394,6 +394,32 @@ fn a_later_end_and_other_outputs_are_allowed_and_other_physics_is_not() {
 }
 
 #[test]
+fn bonds_broken_since_the_last_output_add_up_to_all_that_broke() {
+    let folder = Folder::new("newly-broken");
+    let text = plate("1.5e-5", "").replace(
+        "output.every_steps = 200",
+        "output = { every_steps = 90, fields = ['broken_bonds', 'newly_broken_bonds'] }",
+    );
+    let (deck, out) = (folder.write("deck.toml", &text), folder.join("out"));
+    // Stops between two outputs, and goes on.
+    succeed(&mut run(1, &deck, &out, &["--set", "end=1.25e-5"]));
+    succeed(&mut run(2, &deck, &out, &["--restart"]));
+    let reader = ResultReader::open(&result(&out)).unwrap();
+    let steps = reader.steps().unwrap();
+    assert!(steps.contains(&1170) && steps.contains(&1260), "{steps:?}");
+    let mut so_far = vec![0.0; reader.field("broken_bonds", 0).unwrap().len()];
+    for step in 0..steps.len() {
+        let new = reader.field("newly_broken_bonds", step).unwrap();
+        so_far
+            .iter_mut()
+            .zip(&new)
+            .for_each(|(sum, new)| *sum += new);
+        assert_eq!(so_far, reader.field("broken_bonds", step).unwrap());
+    }
+    assert!(so_far.iter().sum::<f64>() > 100.0);
+}
+
+#[test]
 fn a_damped_state_based_run_goes_on_as_if_it_had_never_stopped() {
     goes_on(
         "damped",

@@ -65,7 +65,7 @@ pub fn print(outcome: &Outcome, threads: usize) {
 const REGRIDDING: &str = "other points";
 
 /// Names and times (s) of the phases.
-fn phases(seconds: &Phases) -> [(&'static str, f64); 8] {
+fn phases(seconds: &Phases) -> [(&'static str, f64); 9] {
     [
         ("set-up", seconds.set_up),
         ("bonds", seconds.bonds),
@@ -73,6 +73,7 @@ fn phases(seconds: &Phases) -> [(&'static str, f64); 8] {
         ("motion", seconds.motion),
         (REGRIDDING, seconds.regridding),
         ("output", seconds.output),
+        ("history", seconds.history),
         ("checkpoints", seconds.checkpoints),
         ("whole run", seconds.whole),
     ]

@@ -2,7 +2,7 @@
 
 use super::expression::{Expression, Variable};
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
-use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS};
+use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS, STEPS_A_ROW};
 use super::plan::{
     Action, Body, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule, History,
     Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan,
@@ -61,7 +61,10 @@ impl Plan {
                 set: None,
             },
             history: History {
-                every: Interval::Seconds(end / ROWS),
+                every: Interval::Seldom {
+                    seconds: end / ROWS,
+                    steps: STEPS_A_ROW,
+                },
                 reactions: Vec::new(),
                 support_forces: Vec::new(),
                 damage_threshold: DEFAULT_DAMAGE_THRESHOLD,

@@ -1,7 +1,8 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, VolumeCorrection, common_keys,
+    Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, VolumeCorrection,
+    common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
 use super::plan::{self, CheckpointRule, HorizonRule, Interval, Plan};
@@ -97,6 +98,11 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         history.every_steps.is_some(),
         plan.history.every,
     );
+    if let Interval::Seldom { seconds, steps } = plan.history.every {
+        history.every.get_or_insert_with(|| default_number(seconds));
+        let steps = || Spanned::new(0..0, Count::new(steps));
+        history.every_steps.get_or_insert_with(steps);
+    }
     history.damage_threshold = history
         .damage_threshold
         .take()

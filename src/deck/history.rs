@@ -5,8 +5,8 @@ use serde_spanned::Spanned;
 use super::grammar::{self, Deck, Text};
 use super::names::suits_a_column;
 use super::number::{Number, Vector};
-use super::outputs::{ROWS, interval};
-use super::plan::{self, Field};
+use super::outputs::{ROWS, STEPS_A_ROW, interval};
+use super::plan::{self, Field, Interval};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::find_set;
 use crate::error::Result;
@@ -14,8 +14,8 @@ use crate::error::Result;
 /// Damage above which a point counts as cracked if the deck does not say.
 pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
-/// Validates what is written to the history; `end` (s) is the end of the run, `horizon` (m) that of the
-/// grid.
+/// Validates what is written to the history; `end` (s) is the end of the run, which may be explicit in all its
+/// steps, `horizon` (m) that of the grid.
 ///
 /// # Errors
 /// On an unknown set or field, a wrong place or number.
@@ -23,7 +23,7 @@ pub fn history(
     scope: &Scope,
     deck: &Deck,
     sets: &[plan::Set],
-    end: f64,
+    (end, explicit): (f64, bool),
     horizon: f64,
 ) -> Result<plan::History> {
     let history = deck.history.get_ref();
@@ -68,13 +68,7 @@ pub fn history(
         tip(scope, name, table, sets, damage_threshold)
     })?;
     Ok(plan::History {
-        every: interval(
-            scope,
-            "[history]",
-            &history.every,
-            &history.every_steps,
-            end / ROWS,
-        )?,
+        every: rows(scope, history, end / ROWS, explicit)?,
         reactions: history
             .reactions
             .iter()
@@ -87,6 +81,25 @@ pub fn history(
         cracks: cracks.into_values().collect(),
         tips: tips.into_values().collect(),
     })
+}
+
+/// When rows are written.
+fn rows(
+    scope: &Scope,
+    history: &grammar::History,
+    default: f64,
+    explicit: bool,
+) -> Result<Interval> {
+    let (every, every_steps) = (&history.every, &history.every_steps);
+    let seldom = |seconds, steps| Interval::Seldom { seconds, steps };
+    match (every, every_steps) {
+        (None, None) if explicit => Ok(seldom(default, STEPS_A_ROW)),
+        (Some(every), Some(steps)) => {
+            let seconds = scope.positive(every, "[history] every")?;
+            Ok(seldom(seconds, steps.get_ref().get()))
+        }
+        _ => interval(scope, "[history]", every, every_steps, default),
+    }
 }
 
 /// The key of a table, if its name can be part of the names of columns.

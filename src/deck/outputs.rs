@@ -86,8 +86,10 @@ pub const DEFAULT_FIELDS: [plan::Field; 4] = [
 /// Outputs of a run whose deck does not say how many.
 pub const OUTPUTS: f64 = 50.0;
 
-/// Rows of the history of a run whose deck does not say how many.
+/// Rows of the history of a run whose deck does not say how many, and the fewest steps between them: a row
+/// takes as long as one or two steps.
 pub const ROWS: f64 = 500.0;
+pub const STEPS_A_ROW: u64 = 20;
 
 /// Validates when points are dealt out anew.
 ///

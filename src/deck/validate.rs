@@ -43,6 +43,8 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         shapes::crack(&scope, name, table)
     })?;
     let time = time::time(&scope, deck)?;
+    let stages = time::stages(&scope, deck, &time)?;
+    let relaxes = time.is_relaxation() || stages.iter().any(|stage| stage.time.is_relaxation());
     Ok(Plan {
         source: source.clone(),
         warnings: Vec::new(),
@@ -62,9 +64,9 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         cracks: cracks.into_values().collect(),
         initials: conditions::initials(&scope, deck, &sets)?,
         conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
-        stages: time::stages(&scope, deck, &time)?,
+        stages,
         output: outputs::output(&scope, deck, &sets, time.end)?,
-        history: history::history(&scope, deck, &sets, time.end, horizon)?,
+        history: history::history(&scope, deck, &sets, (time.end, !relaxes), horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
         balance: outputs::balance(&scope, deck)?,
         sets,

@@ -1,5 +1,5 @@
-//! The history: numbers of the whole body (energies, reactions, probes) over time, as columns of
-//! the result file and as a CSV file beside it.
+//! The history: numbers of the whole body (energies, reactions, probes) over time, as a table in the
+//! result file and as a CSV file beside it.
 
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
@@ -12,8 +12,13 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// The group of the columns.
+/// The table: a row for each moment.
 pub(super) const HISTORY: &str = "/history";
+
+/// Its attributes, with the names and the units of the columns, and what is between them there.
+pub(super) const COLUMNS: &str = "columns";
+pub(super) const UNITS: &str = "units";
+pub(super) const SEPARATOR: &str = ",";
 
 /// What a history holds from the start.
 #[derive(Debug, Clone, Copy)]
@@ -26,32 +31,30 @@ pub struct HistoryContents<'a> {
     pub rows: u64,
 }
 
-/// A table of f64 columns that grows by rows.
+/// The open history.
 pub struct History {
-    columns: Vec<Dataset>,
+    table: Dataset,
     csv: PathBuf,
     /// On rank 0 only.
     writer: Option<File>,
 }
 
 impl History {
-    /// Collective. Makes the group `/history` with one dataset per (name, unit) column, and the
-    /// CSV file with a header such as `time [s],step,kinetic_energy [J]`; an older one is replaced.
+    /// Collective. Makes the table `/history`, and the CSV file with a header such as
+    /// `time [s],step,kinetic_energy [J]`; an older one is replaced.
     ///
     /// # Errors
-    /// There is a history already, two columns have one name, or the files cannot be written.
+    /// There is a history already, or the files cannot be written.
     pub fn create(file: &mut CollectiveFile<'_>, contents: &HistoryContents) -> Result<Self> {
         let HistoryContents { columns, csv, rows } = *contents;
-        file.create_group(HISTORY)?;
-        let mut datasets = Vec::new();
-        for (position, (name, unit)) in columns.iter().enumerate() {
-            let rows = Rows::Extensible {
-                per_append: rows.max(LEAST_ROWS),
-            };
-            let column = file.create_dataset::<f64>(&format!("{HISTORY}/{name}"), rows, None)?;
-            file.set_dataset_attribute(&column, "unit", Attribute::Text(unit))?;
-            file.set_dataset_attribute(&column, "column", Attribute::Integer(position as i64))?;
-            datasets.push(column);
+        let rows = Rows::Extensible {
+            per_append: rows.max(LEAST_ROWS),
+        };
+        let table = file.create_dataset::<f64>(HISTORY, rows, Some(columns.len()))?;
+        let names: Vec<&str> = columns.iter().map(|(name, _)| &name[..]).collect();
+        let units: Vec<&str> = columns.iter().map(|(_, unit)| *unit).collect();
+        for (name, texts) in [(COLUMNS, names), (UNITS, units)] {
+            file.set_dataset_attribute(&table, name, Attribute::Text(&texts.join(SEPARATOR)))?;
         }
         let comm = file.communicator();
         let writer = if comm.rank() == 0 {
@@ -60,7 +63,7 @@ impl History {
             Ok(None)
         };
         Ok(Self {
-            columns: datasets,
+            table,
             csv: csv.to_path_buf(),
             writer: agree(comm, writer)?,
         })
@@ -69,26 +72,19 @@ impl History {
     /// Collective. The first `count` rows of the history in a file, the same on all ranks.
     ///
     /// # Errors
-    /// A column is missing or too short.
-    pub fn read(
-        file: &mut CollectiveFile<'_>,
-        columns: &[(String, &str)],
-        count: u64,
-    ) -> Result<Vec<Vec<f64>>> {
-        let mut rows = vec![Vec::with_capacity(columns.len()); count as usize];
-        for (name, _) in columns {
-            let column = file.open_dataset(&format!("{HISTORY}/{name}"))?;
-            let values: Vec<f64> = file.read_rows(&column, 0, count as usize)?;
-            for (row, value) in rows.iter_mut().zip(values) {
-                row.push(value);
-            }
-        }
-        Ok(rows)
+    /// The table is missing or too short.
+    pub fn read(file: &mut CollectiveFile<'_>, count: u64) -> Result<Vec<Vec<f64>>> {
+        let table = file.open_dataset(HISTORY)?;
+        let values: Vec<f64> = file.read_rows(&table, 0, count as usize)?;
+        Ok(values
+            .chunks_exact(table.columns())
+            .map(<[f64]>::to_vec)
+            .collect())
     }
 
     /// Number of rows written.
     pub fn rows(&self) -> u64 {
-        self.columns.first().map_or(0, Dataset::rows)
+        self.table.rows()
     }
 
     /// Collective. Adds rows to both files; all ranks pass the same, rank 0 writes them.
@@ -97,16 +93,14 @@ impl History {
     /// A row has not one number per column, or the disc is full.
     pub fn append(&mut self, file: &mut CollectiveFile<'_>, rows: &[Vec<f64>]) -> Result<()> {
         agree(file.communicator(), self.append_csv(rows))?;
-        for (position, column) in self.columns.iter_mut().enumerate() {
-            let first = column.rows();
-            file.extend(column, rows.len() as u64)?;
-            let values: Vec<f64> = match self.writer {
-                Some(_) => rows.iter().map(|row| row[position]).collect(),
-                None => Vec::new(),
-            };
-            file.write_rows(column, first, &values)?;
-        }
-        Ok(())
+        let first = self.table.rows();
+        file.extend(&mut self.table, rows.len() as u64)?;
+        let values = if self.writer.is_some() {
+            rows.concat()
+        } else {
+            Vec::new()
+        };
+        file.write_rows(&self.table, first, &values)
     }
 
     fn append_csv(&mut self, rows: &[Vec<f64>]) -> Result<()> {
@@ -115,8 +109,8 @@ impl History {
         };
         let mut text = String::new();
         for row in rows {
-            if row.len() != self.columns.len() {
-                let (length, columns) = (row.len(), self.columns.len());
+            let (length, columns) = (row.len(), self.table.columns());
+            if length != columns {
                 let message = format!("a history row has {length} numbers for {columns} columns");
                 return Err(Error::run(message));
             }

@@ -1,7 +1,7 @@
 //! Reading result files, by one process.
 
 use super::field::POINT_DATA;
-use super::history::HISTORY;
+use super::history::{COLUMNS, HISTORY, SEPARATOR, UNITS};
 use super::vtkhdf::STEPS;
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
@@ -225,31 +225,25 @@ impl ResultReader {
         if !self.file.link_exists(HISTORY) {
             return Ok(Vec::new());
         }
-        let read = || -> hdf5::Result<Vec<(i64, StoredColumn)>> {
-            let datasets = self.file.group(HISTORY)?.datasets()?.into_iter();
-            datasets
-                .map(|dataset| {
-                    let name = dataset
-                        .name()
-                        .rsplit('/')
-                        .next()
-                        .unwrap_or_default()
-                        .to_owned();
-                    let (unit, values) = (text(&dataset, "unit")?, dataset.read_raw()?);
-                    let position = dataset.attr("column")?.read_scalar()?;
-                    Ok((position, StoredColumn { name, unit, values }))
-                })
-                .collect()
+        let read = || -> hdf5::Result<Vec<StoredColumn>> {
+            let table = self.file.dataset(HISTORY)?;
+            let (names, units) = (text(&table, COLUMNS)?, text(&table, UNITS)?);
+            let both = names.split(SEPARATOR).zip(units.split(SEPARATOR));
+            let column = |(name, unit): (&str, &str)| StoredColumn {
+                name: name.to_owned(),
+                unit: unit.to_owned(),
+                values: Vec::new(),
+            };
+            let mut columns: Vec<StoredColumn> = both.map(column).collect();
+            let values: Vec<f64> = table.read_raw()?;
+            for row in values.chunks_exact(columns.len()) {
+                for (column, value) in columns.iter_mut().zip(row) {
+                    column.values.push(*value);
+                }
+            }
+            Ok(columns)
         };
-        let mut columns = read().map_err(|error| self.damaged(HISTORY, &error))?;
-        columns.sort_by_key(|(position, _)| *position);
-        // A run that was killed may have left columns of different lengths.
-        let rows = columns.iter().map(|(_, column)| column.values.len()).min();
-        let shorten = |(_, mut column): (i64, StoredColumn)| {
-            column.values.truncate(rows.unwrap_or(0));
-            column
-        };
-        Ok(columns.into_iter().map(shorten).collect())
+        read().map_err(|error| self.damaged(HISTORY, &error))
     }
 
     /// The file's own attributes (deck, version, command line, …), by name.

@@ -6,7 +6,7 @@
 //!                        one vertex per point, at its reference position, written once
 //! /VTKHDF/PointData/f    static fields [points], others [steps × points] (, components)
 //! /VTKHDF/Steps          NSteps; Values (times), Step (numbers), and where a step's rows start
-//! /history/c             one number per history row and column
+//! /history               a table: a row for each moment; attributes: columns, units, between commas
 //! ```
 //!
 //! Where points may be born during a run, each step has its own points and static fields, one after the
@@ -254,7 +254,7 @@ impl<'a> ResultFile<'a> {
         let part = path.with_extension("vtkhdf.part");
         let copied = Self::copy(&mut old, &part, comm, contents, (kept, times, numbers));
         let finished = copied.and_then(|mut result| {
-            let rows = History::read(&mut old, history.columns, kept_rows)?;
+            let rows = History::read(&mut old, kept_rows)?;
             old.close()?;
             result.create_history(history)?;
             result.append_history(&rows)?;
@@ -493,7 +493,7 @@ impl<'a> ResultFile<'a> {
     /// Starts the history: a table of numbers, in the file and in a CSV file.
     ///
     /// # Errors
-    /// The history's files cannot be written, or two columns have one name.
+    /// The history's files cannot be written.
     pub fn create_history(&mut self, contents: &HistoryContents) -> Result<()> {
         self.history = Some(History::create(&mut self.file, contents)?);
         self.file.flush()

@@ -185,7 +185,7 @@ impl<'a> Job<'a> {
         self.observer.end(matches!(left, Left::Complete));
         let no_collective_cause = recorder.file.no_collective_cause();
         let last_row = recorder.last_row.take();
-        let spent = recorder.spent;
+        let spent = (recorder.spent, recorder.spent_on_rows);
         recorder.close()?;
         let stopped = match left {
             Left::Complete => None,
@@ -193,7 +193,7 @@ impl<'a> Job<'a> {
             Left::Failed(error) => return Err(error),
         };
         let whole = self.options.started.elapsed();
-        let spent = (spent, checkpoints.spent, whole);
+        let spent = [spent.0, spent.1, checkpoints.spent, whole];
         let steps = simulation.clock.number() - first;
         Ok(Outcome {
             stopped,

@@ -43,8 +43,10 @@ pub struct Phases {
     pub motion: f64,
     /// Refinements of the grid, and points that were dealt out anew.
     pub regridding: f64,
-    /// Result and history.
+    /// Result.
     pub output: f64,
+    /// History.
+    pub history: f64,
     /// Checkpoints.
     pub checkpoints: f64,
     /// All, from the start of the process on if the caller says when that was.
@@ -53,12 +55,12 @@ pub struct Phases {
 
 impl Summary {
     /// Gathers the figures of `steps` steps with so many checkpoints; `spent` is the time of output,
-    /// of checkpoints and in all. Collective.
+    /// of the history, of checkpoints and in all. Collective.
     pub(super) fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         steps: u64,
         checkpoints: u64,
-        spent: (Duration, Duration, Duration),
+        [output, history, checkpointing, whole]: [Duration; 4],
     ) -> Self {
         let times = &simulation.times;
         let phases = [
@@ -67,9 +69,10 @@ impl Summary {
             times.forces.halo,
             times.motion,
             times.regridding,
-            spent.0,
-            spent.1,
-            spent.2,
+            output,
+            history,
+            checkpointing,
+            whole,
         ];
         let mut seconds = phases.map(|phase| phase.as_secs_f64());
         simulation.comm.max(&mut seconds);
@@ -80,6 +83,7 @@ impl Summary {
             motion,
             regridding,
             output,
+            history,
             checkpointing,
             whole,
         ] = seconds;
@@ -100,6 +104,7 @@ impl Summary {
                 motion,
                 regridding,
                 output,
+                history,
                 checkpoints: checkpointing,
                 whole,
             },

@@ -158,8 +158,8 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Numbers that a checkpoint holds a point: displacement, velocity, energy set free; reactions, work; what
-/// damping takes; what plastic flow leaves.
+/// Numbers that a checkpoint holds a point: displacement, velocity; bonds that broke, and their energies;
+/// reactions, work; what damping takes; what plastic flow leaves.
 fn saved_width(plan: &Plan) -> usize {
     let dimension = plan.dimension.count();
     let is_support =
@@ -171,6 +171,8 @@ fn saved_width(plan: &Plan) -> usize {
         0
     };
     let worked = usize::from(!plan.conditions.is_empty());
+    let breaks = plan.bodies.iter().any(|body| body.damage.is_some());
+    let broken = if breaks { 4 } else { 0 };
     let damped = plan.bodies.iter().any(|body| body.material.damping > 0.0);
     let relaxed = if plan.relaxes() {
         2 * dimension + supported
@@ -183,7 +185,7 @@ fn saved_width(plan: &Plan) -> usize {
         _ => false,
     });
     let flowed = if flows { PlasticState::COUNT } else { 0 };
-    2 * dimension + 1 + supported + worked + usize::from(damped) + relaxed + flowed
+    2 * dimension + broken + supported + worked + usize::from(damped) + relaxed + flowed
 }
 
 fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {

@@ -42,10 +42,11 @@ pub enum Precision {
 #[derive(Debug, Clone, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct History {
-    /// Simulated time between rows in s; a five-hundredth of the run if neither is given.
+    /// Simulated time between rows in s. If neither is given, a five-hundredth of the run, and 20 steps where
+    /// the whole run is explicit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
-    /// Steps between rows.
+    /// Steps between rows; with `every` rows are written at multiples of so many steps only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
     /// Sets whose reaction force is recorded, by component.

@@ -9,6 +9,13 @@ pub enum Interval {
     Seconds(f64),
     /// Time steps.
     Steps(u64),
+    /// So many seconds of simulated time, but only after multiples of so many steps.
+    Seldom {
+        /// Simulated time, s.
+        seconds: f64,
+        /// Steps.
+        steps: u64,
+    },
 }
 
 /// When checkpoints are written.
@@ -189,6 +196,8 @@ pub enum Field {
     Neighbours,
     /// Number of the point's bonds that have broken since the start.
     BrokenBonds,
+    /// Number of the point's bonds that have broken since the last output.
+    NewlyBrokenBonds,
     /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt of points of a law that flows, else 0.
     PlasticStrainEquivalent,
     /// 1 where a point has too few bonds left for its law and carries no force, else 0.
@@ -199,7 +208,7 @@ pub enum Field {
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -214,6 +223,7 @@ impl Field {
         Self::DeformationGradient,
         Self::Neighbours,
         Self::BrokenBonds,
+        Self::NewlyBrokenBonds,
         Self::PlasticStrainEquivalent,
         Self::Singular,
         Self::Rank,
@@ -236,6 +246,7 @@ impl Field {
             Self::DeformationGradient => "deformation_gradient",
             Self::Neighbours => "neighbours",
             Self::BrokenBonds => "broken_bonds",
+            Self::NewlyBrokenBonds => "newly_broken_bonds",
             Self::PlasticStrainEquivalent => "plastic_strain_equivalent",
             Self::Singular => "singular",
             Self::Rank => "rank",
@@ -254,6 +265,7 @@ impl Field {
             | Self::DeformationGradient
             | Self::Neighbours
             | Self::BrokenBonds
+            | Self::NewlyBrokenBonds
             | Self::PlasticStrainEquivalent
             | Self::Singular
             | Self::Rank => "1",

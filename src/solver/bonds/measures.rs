@@ -32,7 +32,11 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = L::Memory::COUNT > 0;
-    const WANTED: Wanted = wanted(L::LINEAR);
+    const HOT: bool = L::HOT;
+    const WANTED: Wanted = Wanted {
+        shortening: false,
+        ..wanted(L::LINEAR)
+    };
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {

@@ -166,6 +166,14 @@ fields! {
         output: Some(Field::BrokenBonds),
         ..STATE
     };
+    /// Number of a point's bonds that have broken since the last output; none without damage.
+    newly_broken_bonds: Option<Vec<f64>> = Description {
+        name: "newly_broken_bonds",
+        unit: "1",
+        birth: Birth::FoundAnew,
+        output: Some(Field::NewlyBrokenBonds),
+        ..STATE
+    };
     /// Energy that a point's share of bonds has set free by breaking, J; none without damage.
     freed_energy: Option<Vec<f64>> = Description {
         name: "freed_energy",
@@ -285,6 +293,7 @@ impl<const D: usize> Fields<D> {
             external_force: needs.loads.then(|| vector(owned)),
             reaction: needs.supports.then(|| vector(owned)),
             broken_bonds: needs.damage.then(scalar),
+            newly_broken_bonds: needs.damage.then(scalar),
             freed_energy: needs.damage.then(scalar),
             overshoot_energy: needs.damage.then(scalar),
             plastic_strain: needs.plasticity.then(|| std::array::from_fn(|_| scalar())),
@@ -350,8 +359,9 @@ impl<const D: usize> Fields<D> {
     /// nor energy depends on the step to first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
         let velocity = &self.velocity;
-        let (Some(count), Some(freed), Some(overshoot)) = (
+        let (Some(count), Some(new), Some(freed), Some(overshoot)) = (
             &mut self.broken_bonds,
+            &mut self.newly_broken_bonds,
             &mut self.freed_energy,
             &mut self.overshoot_energy,
         ) else {
@@ -361,8 +371,16 @@ impl<const D: usize> Fields<D> {
             let point = broken.point;
             let power: f64 = (0..D).map(|d| broken.force[d] * velocity[d][point]).sum();
             count[point] += broken.count as f64;
+            new[point] += broken.count as f64;
             freed[point] += broken.energy + 0.5 * step * model.volume[point] * power;
             overshoot[point] += broken.overshoot;
+        }
+    }
+
+    /// Counts bonds that break from now on as new.
+    pub fn forget_newly_broken(&mut self) {
+        if let Some(new) = &mut self.newly_broken_bonds {
+            new.fill(0.0);
         }
     }
 
@@ -390,6 +408,6 @@ mod tests {
                 offered += 1;
             }
         }
-        assert_eq!(offered, 5);
+        assert_eq!(offered, 6);
     }
 }

@@ -14,10 +14,15 @@ impl Schedule {
         if clock.number() == 0 || clock.is_over() {
             return true;
         }
+        let passed =
+            |seconds, before| multiples(clock.time(), seconds) > multiples(before, seconds);
         match self.0 {
             Interval::Steps(steps) => clock.number().is_multiple_of(steps),
-            Interval::Seconds(seconds) => {
-                multiples(clock.time(), seconds) > multiples(clock.time_before(), seconds)
+            Interval::Seconds(seconds) => passed(seconds, clock.time_before()),
+            Interval::Seldom { seconds, steps } => {
+                // Where steps change, as long before as it would be with the present one.
+                let before = clock.time() - steps as f64 * clock.step();
+                clock.number().is_multiple_of(steps) && passed(seconds, before)
             }
         }
     }
@@ -28,6 +33,10 @@ impl Schedule {
         let multiples = |number: u64| match self.0 {
             Interval::Steps(steps) => (number / steps) as f64,
             Interval::Seconds(seconds) => multiples(number as f64 * clock.step(), seconds),
+            Interval::Seldom { seconds, steps } => {
+                let rounds = (number / steps) as f64;
+                multiples(rounds * steps as f64 * clock.step(), seconds).min(rounds)
+            }
         };
         let [whole, before] = [last, last - 1].map(multiples);
         // At the end as well, which may be a multiple itself.
@@ -64,5 +73,9 @@ mod tests {
         assert_eq!(due(Interval::Seconds(0.25), 0.1, 10), [0, 3, 5, 8, 10]);
         assert_eq!(due(Interval::Steps(4), 0.1, 10), [0, 4, 8, 10]);
         assert_eq!(due(Interval::Seconds(0.01), 0.1, 3), [0, 1, 2, 3]);
+        let seldom = |seconds| Interval::Seldom { seconds, steps: 4 };
+        assert_eq!(due(seldom(0.01), 0.1, 10), [0, 4, 8, 10]);
+        assert_eq!(due(seldom(0.01), 0.1, 8), [0, 4, 8]);
+        assert_eq!(due(seldom(0.6), 0.1, 20), [0, 8, 12, 20]);
     }
 }

@@ -107,7 +107,9 @@ impl Snapshot {
             Field::Singular => simulation.forces.singular(model),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
             // Where no bonds can break, and no points flow.
-            Field::BrokenBonds | Field::PlasticStrainEquivalent => vec![0.0; count],
+            Field::BrokenBonds | Field::NewlyBrokenBonds | Field::PlasticStrainEquivalent => {
+                vec![0.0; count]
+            }
             Field::Displacement | Field::Velocity | Field::ForceDensity => {
                 unreachable!("one of the points' own fields")
             }
