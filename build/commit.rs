@@ -24,9 +24,10 @@ pub fn tell() {
     };
     let source = ["src", "build", "Cargo.toml", "Cargo.lock"];
     let changes = git(&[&["status", "--porcelain", "--"], &source[..]].concat());
-    let changed = match changes.is_some_and(|changes| !changes.is_empty()) {
-        true => " with changes",
-        false => "",
+    let changed = if changes.is_some_and(|changes| !changes.is_empty()) {
+        " with changes"
+    } else {
+        ""
     };
     println!("cargo::rustc-env=FISSURE_COMMIT={commit}{changed}");
     for path in source {

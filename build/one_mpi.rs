@@ -55,15 +55,17 @@ pub fn check() -> Result<Mpi, String> {
 
 /// Where Debian and its kin keep the HDF5 of this MPI, if it is installed.
 fn example(linked: &[String]) -> String {
-    let family = match linked.iter().any(|name| name.starts_with("libmpich")) {
-        true => "mpich",
-        false => "openmpi",
+    let family = if linked.iter().any(|name| name.starts_with("libmpich")) {
+        "mpich"
+    } else {
+        "openmpi"
     };
     let machine = std::env::consts::ARCH;
     let folder = format!("/usr/lib/{machine}-linux-gnu/hdf5/{family}");
-    match Path::new(&folder).exists() {
-        true => format!(" (HDF5_DIR={folder})"),
-        false => String::new(),
+    if Path::new(&folder).exists() {
+        format!(" (HDF5_DIR={folder})")
+    } else {
+        String::new()
     }
 }
 

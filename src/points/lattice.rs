@@ -106,17 +106,23 @@ impl<'a> LatticeBody<'a> {
 
     /// A place (m) in steps, so many an edge, from the centre of cell 0.
     pub fn place_at(&self, place: [f64; 3], steps: f64) -> [i64; 3] {
-        std::array::from_fn(|k| match k < self.dimension {
-            true => (steps * ((place[k] - self.origin[k]) / self.spacing[k] - 0.5)).round() as i64,
-            false => 0,
+        std::array::from_fn(|k| {
+            if k < self.dimension {
+                (steps * ((place[k] - self.origin[k]) / self.spacing[k] - 0.5)).round() as i64
+            } else {
+                0
+            }
         })
     }
 
     /// The place (m) that lies so many edges from the centre of cell 0.
     pub fn place(&self, edges: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|k| match k < self.dimension {
-            true => self.origin[k] + (edges[k] + 0.5) * self.spacing[k],
-            false => 0.0,
+        std::array::from_fn(|k| {
+            if k < self.dimension {
+                self.origin[k] + (edges[k] + 0.5) * self.spacing[k]
+            } else {
+                0.0
+            }
         })
     }
 

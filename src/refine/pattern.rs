@@ -158,9 +158,12 @@ impl Pattern {
             return false;
         }
         let here = place.map(|x| x >> (self.finest() - level));
-        let steps = |k: usize| match k < self.dimension {
-            true => (reach / edges[k]).floor() as i64,
-            false => 0,
+        let steps = |k: usize| {
+            if k < self.dimension {
+                (reach / edges[k]).floor() as i64
+            } else {
+                0
+            }
         };
         let low = std::array::from_fn(|k| -steps(k));
         let high = std::array::from_fn(steps);
