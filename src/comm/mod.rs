@@ -89,6 +89,13 @@ pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
     values
 }
 
+/// The values of all ranks, one after the other in rank order; ranks may have different numbers of them.
+pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
+    let bytes: &[u8] = bytemuck::cast_slice(own);
+    let all = comm.all_to_all(vec![bytes.to_vec(); comm.size()]).concat();
+    bytemuck::pod_collect_to_vec(&all)
+}
+
 /// The sum of `value` over the ranks before this one, and over all.
 pub fn scan(comm: &dyn Communicator, value: u64) -> (u64, u64) {
     let values = all_gather(comm, value);
@@ -146,6 +153,17 @@ mod tests {
         for error in messages {
             assert_eq!(error.message, "rank 2 failed");
             assert_eq!(error.kind, ErrorKind::Input);
+        }
+    }
+
+    #[test]
+    fn gathered_values_are_in_rank_order() {
+        let gathered = threads::run(3, |comm| {
+            let own = vec![[comm.rank() as f64, 0.5]; comm.rank()];
+            all_gather_many(comm, &own)
+        });
+        for all in gathered {
+            assert_eq!(all, [[1.0, 0.5], [2.0, 0.5], [2.0, 0.5]]);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::comm::{Communicator, agree};
+use crate::comm::{Communicator, agree, all_gather_many};
 use crate::deck::plan::{Block, Kind, Plan, PreCrack};
 use crate::error::Result;
 use crate::families::cutoff;
@@ -91,7 +91,7 @@ impl<'a> Grids<'a> {
                         }
                     });
                 }
-                let all = gather(comm, &picks);
+                let all = all_gather_many(comm, &picks);
                 if all.is_empty() {
                     let message = format!(
                         "[refinement.region.{}] where: there is no point of a body given as a shape",
@@ -323,11 +323,4 @@ impl BodyGrid<'_> {
             }
         }
     }
-}
-
-/// What all ranks have, rank by rank.
-pub fn gather<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
-    let bytes: &[u8] = bytemuck::cast_slice(own);
-    let all = comm.all_to_all(vec![bytes.to_vec(); comm.size()]).concat();
-    bytemuck::pod_collect_to_vec(&all)
 }

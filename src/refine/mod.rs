@@ -11,7 +11,7 @@ mod pattern;
 mod place;
 mod shares;
 
-pub use grids::{Grids, Pick, gather};
+pub use grids::{Grids, Pick};
 pub use pattern::{Node, Pattern};
 pub use place::Place;
 pub use shares::Shares;

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::comm;
+use crate::comm::all_gather_many;
 use crate::deck::plan;
 use crate::error::Result;
 use crate::solver::Simulation;
@@ -85,7 +85,7 @@ impl CrackPath {
             })
         };
         let own: Vec<Found> = self.points.iter().filter_map(found).collect();
-        let mut found = gather(comm, &own);
+        let mut found = all_gather_many(comm, &own);
         found.sort_unstable_by_key(|found| found.id);
         let damaged: Vec<Damaged> = found
             .into_iter()
@@ -96,12 +96,4 @@ impl CrackPath {
             .collect();
         branches(self.rule.from, &damaged, self.reach)
     }
-}
-
-/// What all ranks have, on each of them. Collective.
-fn gather(comm: &dyn comm::Communicator, own: &[Found]) -> Vec<Found> {
-    let bytes = bytemuck::cast_slice(own).to_vec();
-    let incoming = comm.all_to_all(vec![bytes; comm.size()]);
-    let found = |bytes: Vec<u8>| bytemuck::pod_collect_to_vec::<u8, Found>(&bytes);
-    incoming.into_iter().flat_map(found).collect()
 }

@@ -1,7 +1,7 @@
 //! The faces along which cracks have parted the points of a grid.
 
+use crate::comm::all_gather_many;
 use crate::points::bins::Bins;
-use crate::refine::gather;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 
@@ -46,7 +46,7 @@ impl Facets {
                 });
             }
         });
-        let all: Vec<Facet> = gather(comm, &own);
+        let all = all_gather_many(comm, &own);
         let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
         let centres: Vec<[f64; 3]> = all.iter().map(|facet| facet.centre).collect();
         let widest = all.iter().flat_map(|facet| facet.edges[..D].iter());

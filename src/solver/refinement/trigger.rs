@@ -1,10 +1,11 @@
 //! Which points are refined during a run, and when.
 
+use crate::comm::all_gather_many;
 use crate::deck::expression::Expression;
 use crate::deck::plan::{Action, Plan, Selector, Trigger};
 use crate::error::Result;
 use crate::points::bins::Bins;
-use crate::refine::{Pick, gather};
+use crate::refine::Pick;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
@@ -65,7 +66,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// The nodes that are to be refined now, of all ranks. Collective.
     pub(super) fn picks(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<Pick> {
         let sources = self.sources(trigger, snapshot);
-        gather(self.comm, &self.visible(&sources))
+        all_gather_many(self.comm, &self.visible(&sources))
     }
 
     /// The triggers of all ranks.
@@ -102,7 +103,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 horizon: self.plan.block(usize::from(model.block[point])).horizon,
             })
             .collect();
-        gather(self.comm, &own)
+        all_gather_many(self.comm, &own)
     }
 
     /// The nodes of this rank that are to be refined: points that can be, within the horizon of a trigger.
