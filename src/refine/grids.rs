@@ -9,7 +9,7 @@ use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
 
 use super::pattern::{Node, Pattern};
-use super::place::{Place, born, parents};
+use super::place::{Place, born, numbered, parents};
 
 /// The grids of all bodies, by body; the same on all ranks.
 #[derive(Clone)]
@@ -66,8 +66,8 @@ impl<'a> Grids<'a> {
         self.coarsest
     }
 
-    /// Refines what the plan wants from the start, but for nodes between places that a pre-crack parts; `coarse`
-    /// are this rank's points of level 0. Collective.
+    /// Refines what the plan wants from the start, but for nodes between places that a pre-crack parts;
+    /// `coarse` are this rank's points of level 0. Collective.
     ///
     /// # Errors
     /// When there is no point in a region; the same on all ranks.
@@ -235,7 +235,7 @@ impl<'a> Grids<'a> {
             let cell_volume = point.volume;
             if grid.pattern.touches(cell) {
                 for part in 1..1_u64 << (self.finest as usize * self.plan.dimension.count()) {
-                    let place = self.place(origin, part);
+                    let place = numbered(origin, self.finest, part);
                     if let Some(node) = grid.node(place) {
                         let id = point.id + self.coarsest * part;
                         let block = self.block(body, grid, place, &node);
@@ -253,12 +253,6 @@ impl<'a> Grids<'a> {
         }
         coarse.extend(finer);
         coarse
-    }
-
-    /// The place in steps of the finest level with this number in a cell, from 0: x fastest.
-    fn place(&self, origin: Place, part: u64) -> Place {
-        let mask = (1 << self.finest) - 1;
-        std::array::from_fn(|k| origin[k] + (part >> (k as u32 * self.finest) & mask) as i64)
     }
 
     /// The block of a node of a body.
@@ -311,14 +305,10 @@ impl BodyGrid<'_> {
         } else {
             1
         };
-        let mask = (1_u64 << level) - 1;
+        let body = |cell| cells.has_cell(cell);
         for part in 0..parts {
-            let place =
-                std::array::from_fn(|k| origin[k] + (part >> (k as u32 * level) & mask) as i64);
-            if self
-                .pattern
-                .exists(&|cell| cells.has_cell(cell), level, place)
-            {
+            let place = numbered(origin, level, part);
+            if self.pattern.exists(&body, level, place) {
                 found(place, self.position(level, place));
             }
         }

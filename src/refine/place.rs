@@ -31,6 +31,13 @@ pub(super) fn around(place: Place, dimension: usize) -> impl Iterator<Item = Pla
     between(low, high).filter(move |other| *other != middle)
 }
 
+/// The place with this number in a cell of level 0, in steps of a level; `origin` is that of the cell's
+/// centre, which has number 0, and x is fastest.
+pub(super) fn numbered(origin: Place, level: u32, number: u64) -> Place {
+    let mask = (1 << level) - 1;
+    std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)
+}
+
 /// In how many directions a place lies half-way between nodes of the next coarser level.
 pub(super) fn halves(place: Place) -> u32 {
     place.iter().map(|x| (x & 1) as u32).sum()
@@ -54,6 +61,17 @@ mod tests {
         for (dimension, count) in [(1, 2), (2, 8), (3, 26)] {
             assert_eq!(around([3, 0, 0], dimension).count(), count);
         }
+    }
+
+    #[test]
+    fn places_of_a_cell_are_numbered_with_x_fastest() {
+        let places: Vec<Place> = (0..16).map(|k| numbered([8, -4, 0], 2, k)).collect();
+        assert_eq!(
+            places[..5],
+            [[8, -4, 0], [9, -4, 0], [10, -4, 0], [11, -4, 0], [8, -3, 0]]
+        );
+        assert_eq!(places[15], [11, -1, 0]);
+        assert_eq!(numbered([0; 3], 1, 6), [0, 1, 1]);
     }
 
     #[test]
