@@ -268,8 +268,7 @@ impl HistoryObserver {
         let (work, dissipated, overshoot) = (*work, *dissipated, *overshoot);
 
         let cracked = Cracked::new(simulation, snapshot);
-        let neighbours = snapshot.stored.neighbours.iter();
-        let intact: u64 = neighbours.map(|count| *count as u64).sum();
+        let intact = snapshot.intact();
         let singular = simulation.forces.can_be_singular().then(|| {
             let all = simulation.forces.singular(model);
             all.iter().filter(|value| **value > 0.0).count() as u64
@@ -382,8 +381,8 @@ fn sum(values: &[f64]) -> ExactSum {
     sum
 }
 
-/// Kinetic, strain and fracture energy (J), then momentum by component (kg m/s).
-fn point_sums<const D: usize>(
+/// Kinetic, strain and fracture energy (J), then momentum by component (kg m/s), of the owned points.
+pub(in crate::solver) fn point_sums<const D: usize>(
     simulation: &Simulation<'_, D>,
     snapshot: &Snapshot,
 ) -> Vec<ExactSum> {

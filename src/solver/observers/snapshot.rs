@@ -38,6 +38,12 @@ impl Snapshot {
         }
     }
 
+    /// Number of intact bonds of the owned points; summed over the ranks each counts from both ends.
+    pub fn intact(&self) -> u64 {
+        let counts = self.stored.neighbours.iter();
+        counts.map(|count| *count as u64).sum()
+    }
+
     /// A field over the owned points, row-major with [`Field::components`] entries a point; of the
     /// moment of the snapshot.
     pub fn field<const D: usize>(

@@ -9,7 +9,7 @@
 use std::cell::OnceCell;
 use std::time::Instant;
 
-use crate::comm::sum::{ExactSum, reduce};
+use crate::comm::sum::reduce;
 use crate::comm::{self, IdOrder, agree};
 use crate::deck::plan::StepRule;
 use crate::error::Result;
@@ -24,6 +24,7 @@ use super::Simulation;
 use super::assign::cutoffs;
 use super::motion::fields::Birth;
 use super::observers::Snapshot;
+use super::observers::history::point_sums;
 use facets::Facets;
 use past::{NOWHERE, Past};
 pub use trigger::is_possible;
@@ -93,35 +94,25 @@ impl<'a, const D: usize> Simulation<'a, D> {
         grids.part(&self.grids, &|a, b| {
             facets.lie_between(&facets.near(a), a, b)
         });
-        let [energy, bonds] = self.held(&snapshot);
+        let (energy, bonds) = self.held(&snapshot);
         let before = self.model.total;
         self.regrid(grids, &facets)?;
         let snapshot = Snapshot::new(self);
-        let [new_energy, new_bonds] = self.held(&snapshot);
+        let (new_energy, new_bonds) = self.held(&snapshot);
         self.refined.energy += new_energy - energy;
         self.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
         Ok(self.model.total - before)
     }
 
-    /// Kinetic and strain energy (J), and intact bonds from both ends, over all ranks.
-    fn held(&self, snapshot: &Snapshot) -> [f64; 2] {
-        let model = &self.model;
-        let mut sum = [ExactSum::ZERO];
-        for point in 0..model.owned() {
-            let mass = model.density_of(point) * model.volume[point];
-            let square: f64 = (0..D).map(|d| self.fields.velocity[d][point].powi(2)).sum();
-            sum[0].add(0.5 * mass * square);
-            sum[0].add(snapshot.stored.energy[point] * model.volume[point]);
-        }
-        let own = snapshot
-            .stored
-            .neighbours
-            .iter()
-            .map(|count| *count as u64)
-            .sum();
-        let energy = reduce(self.comm, &mut sum)[0];
-        [energy, comm::total(self.comm, own) as f64]
+    /// Kinetic and strain energy (J) together, and intact bonds from both ends, over all ranks.
+    fn held(&self, snapshot: &Snapshot) -> (f64, u64) {
+        let sums = point_sums(self, snapshot);
+        // Both in one sum, which is rounded once.
+        let mut energy = [sums[0].clone()];
+        energy[0].merge(&sums[1]);
+        let energy = reduce(self.comm, &mut energy)[0];
+        (energy, comm::total(self.comm, snapshot.intact()))
     }
 
     /// Puts the run on other grids, with everything that points and bonds have. Collective.
