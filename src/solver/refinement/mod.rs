@@ -59,13 +59,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// # Errors
     /// When bonds remember what they went through.
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
-        let Some(trigger) = self.trigger().filter(|_| self.forces.remember()) else {
-            return agree(self.comm, Ok(()));
-        };
         let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
                        have not; refine `[refinement.region]` from the start";
-        let error = self.plan.source.error(trigger.span.clone(), message);
-        agree(self.comm, Err(error))
+        let trigger = self.trigger().filter(|_| self.forces.remember());
+        let error = trigger.map(|trigger| self.plan.source.error(trigger.span.clone(), message));
+        agree(self.comm, error.map_or(Ok(()), Err))
     }
 
     /// Whether it is time to look for points to be refined.
