@@ -19,9 +19,10 @@ pub const NOBODY: u32 = u32::MAX;
 /// Below this many cells a part recursive bisection is used: the k-way method leaves parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// The rank of each cell, [`NOBODY`] where there is no point, given the number of points in each. A cell's weight is the bonds of its
-/// points, an edge's weight the bonds across. Where it is known what the cells cost, their weights are
-/// corrected by that, and parts are numbered so that most points stay on their ranks.
+/// The rank of each cell, [`NOBODY`] where there is no point, given the number of points in each. A cell's
+/// weight is the bonds of its points, an edge's weight the bonds across. Where it is known what the cells
+/// cost, their weights are corrected by that, and parts are numbered so that most points stay on their
+/// ranks.
 ///
 /// # Errors
 /// When METIS fails.

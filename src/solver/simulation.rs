@@ -137,7 +137,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Distributes and bonds the points of grids, and evaluates the forces at time 0. `cost` is what this rank's points cost, if that is known; see [`Self::set_up`].
+    /// Distributes and bonds the points of grids, and evaluates the forces at time 0. `cost` is what this
+    /// rank's points cost, if that is known; see [`Self::set_up`].
     pub(super) fn of_points(
         plan: &'a Plan,
         comm: &'a dyn Communicator,
