@@ -251,6 +251,16 @@ fn same_everywhere(name: &str, text: &str, must_break: bool) {
     }
 }
 
+fn listed(deck: &str) -> String {
+    deck.replace("[grid]", "[grid]\nfamily = 'list'")
+}
+
+/// With bonds of lattices and in lists.
+fn same_with_either_family(name: &str, text: &str) {
+    same_everywhere(name, text, true);
+    same_everywhere(&format!("{name}-listed"), &listed(text), true);
+}
+
 #[test]
 fn a_plate_of_two_materials() {
     same_everywhere("plate", PLATE, true);
@@ -258,8 +268,7 @@ fn a_plate_of_two_materials() {
 
 #[test]
 fn a_plate_of_two_materials_with_listed_bonds() {
-    let deck = PLATE.replace("[grid]", "[grid]\nfamily = 'list'");
-    same_everywhere("listed", &deck, true);
+    same_everywhere("listed", &listed(PLATE), true);
 }
 
 #[test]
@@ -346,28 +355,22 @@ fn blocks_of_bond_associated_correspondence() {
     let law =
         "bond_associated_correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
     let deck = with_one_law(law).replace("brittle.critical_stretch", "brittle.energy");
-    same_everywhere("associated", &deck, true);
-    let deck = deck.replace("[grid]", "[grid]\nfamily = 'list'");
-    same_everywhere("associated-listed", &deck, true);
+    same_with_either_family("associated", &deck);
 }
 
 #[test]
 fn blocks_of_a_law_whose_points_flow() {
-    let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, yield_stress = 0.05, hardening_modulus = 0.2 }";
+    let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, \
+               yield_stress = 0.05, hardening_modulus = 0.2 }";
     let deck = with_one_law(law).replace("brittle.critical_stretch", "brittle.energy");
     let deck = deck.replace("'stress'", "'stress', 'plastic_strain_equivalent'");
-    same_everywhere("flowing", &deck, true);
-    let deck = deck.replace("[grid]", "[grid]\nfamily = 'list'");
-    same_everywhere("flowing-listed", &deck, true);
+    same_with_either_family("flowing", &deck);
 }
 
 #[test]
 fn blocks_of_a_law_whose_bonds_remember() {
     let law = "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.01 }";
-    let deck = with_one_law(law);
-    same_everywhere("plastic", &deck, true);
-    let deck = deck.replace("[grid]", "[grid]\nfamily = 'list'");
-    same_everywhere("plastic-listed", &deck, true);
+    same_with_either_family("plastic", &with_one_law(law));
 }
 
 #[test]

@@ -166,21 +166,47 @@ mod tests {
     use crate::comm::threads;
     use crate::points::Point;
 
+    /// 100 × 40 points and their cells, of one rank.
+    struct Plate {
+        points: Vec<Point>,
+        cells: Cells,
+        occupation: Vec<u64>,
+    }
+
+    impl Plate {
+        fn new() -> Self {
+            let points: Vec<Point> = (0..4000)
+                .map(|k| Point::new(k, [(k % 100) as f64, (k / 100) as f64, 0.0], 1.0, 0))
+                .collect();
+            let comm = threads::alone();
+            let cells = Cells::new(&comm, &points, 4000, 3.0, 4000);
+            Self {
+                occupation: cells.occupation(&comm, &points),
+                points,
+                cells,
+            }
+        }
+
+        fn deal(&self, present: Option<&Present>, ranks: usize) -> Vec<u32> {
+            partition(&self.cells, &self.occupation, present, ranks).unwrap()
+        }
+
+        /// Number of points by rank.
+        fn sizes(&self, owner: &[u32], ranks: usize) -> Vec<u32> {
+            let mut sizes = vec![0; ranks];
+            for point in &self.points {
+                sizes[owner[self.cells.of(point.position)] as usize] += 1;
+            }
+            sizes
+        }
+    }
+
     #[test]
     fn parts_are_balanced_and_none_is_empty() {
-        let points: Vec<Point> = (0..4000)
-            .map(|k| Point::new(k, [(k % 100) as f64, (k / 100) as f64, 0.0], 1.0, 0))
-            .collect();
-        let comm = threads::alone();
-        let cells = Cells::new(&comm, &points, 4000, 3.0, 4000);
-        let occupation = cells.occupation(&comm, &points);
+        let plate = Plate::new();
         for ranks in [2, 3, 4, 7, 64] {
-            let owner = partition(&cells, &occupation, None, ranks).unwrap();
-            let mut sizes = vec![0; ranks];
-            for point in &points {
-                sizes[owner[cells.of(point.position)] as usize] += 1;
-            }
-            let largest = *sizes.iter().max().unwrap();
+            let sizes = plate.sizes(&plate.deal(None, ranks), ranks);
+            let largest = *sizes.iter().max().unwrap() as usize;
             assert!(sizes.iter().all(|size| *size > 0), "{ranks}: {sizes:?}");
             assert!(largest <= 3 * 4000 / ranks / 2 + 20, "{ranks}: {sizes:?}");
         }
@@ -188,42 +214,24 @@ mod tests {
 
     #[test]
     fn cells_that_cost_more_are_fewer_and_most_stay() {
-        let points: Vec<Point> = (0..4000)
-            .map(|k| Point::new(k, [(k % 100) as f64, (k / 100) as f64, 0.0], 1.0, 0))
-            .collect();
-        let comm = threads::alone();
-        let cells = Cells::new(&comm, &points, 4000, 3.0, 4000);
-        let occupation = cells.occupation(&comm, &points);
-        let mut present = cells.present(&comm, &points, 10);
-        let first = partition(&cells, &occupation, None, 2).unwrap();
+        let plate = Plate::new();
+        let mut present = plate.cells.present(&threads::alone(), &plate.points, 10);
+        let first = plate.deal(None, 2);
         for (rank, owner) in present.ranks.iter_mut().zip(&first) {
             // Those of the other part.
             *rank = f64::from(1 - *owner);
         }
-        let count = |owner: &[u32]| {
-            let mut sizes = [0; 2];
-            for point in &points {
-                sizes[owner[cells.of(point.position)] as usize] += 1;
-            }
-            sizes
-        };
-        let same = partition(&cells, &occupation, Some(&present), 2).unwrap();
-        let moved = first
-            .iter()
-            .zip(&same)
-            .filter(|(a, b)| **a != 1 - **b)
-            .count();
-        assert!(
-            moved < cells.count() / 5,
-            "{moved} of {} cells",
-            cells.count()
-        );
+        let same = plate.deal(Some(&present), 2);
+        let pairs = first.iter().zip(&same);
+        let moved = pairs.filter(|(a, b)| **a != 1 - **b).count();
+        let all = plate.cells.count();
+        assert!(moved < all / 5, "{moved} of {all} cells");
         for (cost, rank) in present.costs.iter_mut().zip(&present.ranks) {
             *cost *= if *rank == 0.0 { 3 } else { 1 };
         }
-        let [dear, cheap] = count(&partition(&cells, &occupation, Some(&present), 2).unwrap());
-        let ratio = f64::from(cheap) / f64::from(dear);
-        assert!((1.5..3.5).contains(&ratio), "{dear} {cheap}");
+        let sizes = plate.sizes(&plate.deal(Some(&present), 2), 2);
+        let ratio = f64::from(sizes[1]) / f64::from(sizes[0]);
+        assert!((1.5..3.5).contains(&ratio), "{sizes:?}");
     }
 
     #[test]

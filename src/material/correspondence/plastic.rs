@@ -244,21 +244,24 @@ mod tests {
     const YIELD: f64 = 0.01;
     const HARDENING_MODULUS: f64 = 0.3;
 
-    fn law(dimension: Dimension) -> Plastic {
-        let mut values = Values::defaults(super::super::KEYS);
-        values.set(YIELD_STRESS.name, YIELD.into());
-        values.set(HARDENING.name, HARDENING_MODULUS.into());
-        let given = Given {
+    fn given(dimension: Dimension, values: &Values) -> Given<'_> {
+        Given {
             dimension,
             elastic: Isotropic {
                 youngs_modulus: 3.0,
                 poisson_ratio: 0.3,
             },
             horizon: 1.0,
-            values: &values,
+            values,
             from_fracture_energy: false,
-        };
-        Plastic::of(&given).unwrap()
+        }
+    }
+
+    fn law(dimension: Dimension) -> Plastic {
+        let mut values = Values::defaults(super::super::KEYS);
+        values.set(YIELD_STRESS.name, YIELD.into());
+        values.set(HARDENING.name, HARDENING_MODULUS.into());
+        Plastic::of(&given(dimension, &values)).unwrap()
     }
 
     /// Gradients of a walk in all directions, some steps of which are large.
@@ -353,16 +356,7 @@ mod tests {
         ] {
             let law = law(dimension);
             let values = Values::defaults(super::super::KEYS);
-            let given = Given {
-                dimension,
-                elastic: Isotropic {
-                    youngs_modulus: 3.0,
-                    poisson_ratio: 0.3,
-                },
-                horizon: 1.0,
-                values: &values,
-                from_fracture_energy: false,
-            };
+            let given = given(dimension, &values);
             let hooke = hooke::Hooke::of(&given).unwrap();
             let elastic = super::super::Stress::of("st-venant-kirchhoff", &given, hooke);
             let gradient = Matrix2::new(1e-3, 2e-3, -5e-4, 1e-3);
