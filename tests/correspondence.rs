@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Rotation3, Vector3};
 
 use crate::support::{displace, forces, simulate};
 
-/// The laws of this file.
 const LAWS: [&str; 2] = ["correspondence", "bond_associated_correspondence"];
 
 fn deck(dimension: &str, law: &str, size: usize, horizon: f64) -> String {

@@ -43,7 +43,6 @@ impl Case {
         plan.bodies[0].material.law.fault(line).is_none()
     }
 
-    /// Whether bonds can break.
     fn can_break(&self) -> bool {
         !self.damages(0.0).is_empty()
     }
@@ -62,7 +61,6 @@ impl Case {
         stretch.into_iter().chain(energy).collect()
     }
 
-    /// What holds for it.
     fn invariants(&self) -> Invariants {
         let plan = plan(&deck("plane-stress", &self.table(), "none", ""));
         (self.law.invariants)(&plan.bodies[0].material.law.values)
@@ -73,7 +71,6 @@ impl Case {
     }
 }
 
-/// Every volume correction.
 const CORRECTIONS: [&str; 3] = ["none", "linear", "exact"];
 
 /// A law for tests that are about something else.

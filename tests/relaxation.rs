@@ -134,7 +134,6 @@ fn static_solution(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
     u
 }
 
-/// Displacements by point.
 fn displacements(simulation: &Simulation<2>) -> Vec<[f64; 2]> {
     let u = &simulation.fields.displacement;
     (0..simulation.model.owned())

@@ -255,7 +255,6 @@ impl<'a> Grids<'a> {
         coarse
     }
 
-    /// The block of a node of a body.
     fn block(&self, body: usize, grid: &BodyGrid, place: Place, node: &Node) -> usize {
         let number = |kind| self.plan.block_number(body, node.level, kind);
         let kind = if grid.is_at_coarser(self.plan.block(number(Kind::Whole)), place) {

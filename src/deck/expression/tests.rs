@@ -3,7 +3,6 @@
 use super::{Expression, ExpressionError, Variable};
 use proptest::prelude::*;
 
-/// Every variable.
 const ALL: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
 
 /// Parses with the parameters `dx` = 0.5 and `fo` = 3 and all variables.
@@ -565,7 +564,6 @@ fn lesser(left: f64, right: f64) -> f64 {
     }
 }
 
-/// Any tree.
 fn trees() -> impl Strategy<Value = Tree> {
     let number = prop_oneof![
         (0..20u8).prop_map(f64::from),
