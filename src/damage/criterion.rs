@@ -57,6 +57,16 @@ impl Criterion {
         }
     }
 
+    /// Whether all bonds that break are marked, of laws that may scale thresholds.
+    #[inline(always)]
+    pub fn marks_all(self, scaled: bool) -> bool {
+        match self {
+            Self::Never => true,
+            Self::Stretch(_) => !scaled,
+            Self::Thresholds(_) | Self::Work(_) | Self::WorkThresholds => false,
+        }
+    }
+
     /// A bit for each bond that breaks; `work` is in J/m⁶, and read only if it is asked for.
     #[inline(always)]
     pub fn met<S: Simd, L: Law<D>, const D: usize>(

@@ -124,9 +124,10 @@ pub struct Wanted {
 }
 
 /// Bonds whose far ends have moved by η (m) relative to the own ones; stretches are those of the bonds
-/// whose bit is set. `limit`, at most [`NEAR`], is the |x| beyond which bonds are marked.
+/// whose bit is set. `limit`, at most [`NEAR`], is the |x| beyond which bonds are marked; with `ONLY_NEAR` the
+/// stretches of marked bonds mean nothing.
 #[inline(always)]
-pub fn deform<S: Simd, const D: usize>(
+pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     simd: S,
     reference: &Reference<D>,
     eta: [Lanes; D],
@@ -166,13 +167,21 @@ pub fn deform<S: Simd, const D: usize>(
     let (mut stretch, mut shortening) = (growth, growth);
     if wanted.stretch {
         let near = series(simd, growth, &STRETCH);
-        stretch = with_far(simd, growth, marked, near, |_| {
-            (Lanes::splat(1.0), Lanes::splat(0.0))
-        });
+        stretch = if ONLY_NEAR {
+            simd.whole(near)
+        } else {
+            with_far(simd, growth, marked, near, |_| {
+                (Lanes::splat(1.0), Lanes::splat(0.0))
+            })
+        };
     }
     if wanted.shortening {
         let near = series(simd, growth, &SHORTENING);
-        shortening = with_far(simd, growth, marked, near, |square| square);
+        shortening = if ONLY_NEAR {
+            simd.whole(near)
+        } else {
+            with_far(simd, growth, marked, near, |square| square)
+        };
     }
     Bond {
         reference: xi,
@@ -274,7 +283,7 @@ mod tests {
             inverse_square: Lanes(growth),
         };
         // γ = η (0 + η) = 1, and 1/|ξ|² stands for x.
-        deform(simd, &reference, [one], u8::MAX, NEAR, ALL)
+        deform::<_, false, 1>(simd, &reference, [one], u8::MAX, NEAR, ALL)
     }
 
     fn bond(xi: [f64; 2], eta: [f64; 2]) -> Bond<2> {
@@ -285,7 +294,7 @@ mod tests {
             inverse: Lanes::splat(1.0 / square.sqrt()),
             inverse_square: Lanes::splat(1.0 / square),
         };
-        deform(
+        deform::<_, false, 2>(
             Portable,
             &reference,
             eta.map(Lanes::splat),

@@ -105,6 +105,10 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const HOT: bool = L::HOT;
+    const NEAR: bool = L::HOT
+        && !L::LINEAR
+        && L::Memory::COUNT == 0
+        && (L::FORCE_READS_STRETCH || L::FORCE_READS_SHORTENING);
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::FORCE_READS_STRETCH,
@@ -136,6 +140,17 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         let total = self.weighted(simd, group, group.weights);
         let work = self.work(simd, group, total);
         group.intact &= !self.breaks(simd, group, work);
+        total.add(simd, &group.bond, group.volume, group.intact, force);
+    }
+
+    #[inline(always)]
+    fn is_plain_near(&self) -> bool {
+        self.criterion.marks_all(L::SCALED)
+    }
+
+    #[inline(always)]
+    fn add_near<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
+        let total = self.weighted(simd, group, group.weights);
         total.add(simd, &group.bond, group.volume, group.intact, force);
     }
 

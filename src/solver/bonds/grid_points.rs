@@ -135,8 +135,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// As for [`Self::numbers`].
     #[inline(always)]
-    unsafe fn thresholds(&self, place: usize) -> Lanes {
-        if self.with_thresholds {
+    unsafe fn thresholds<const ONLY_NEAR: bool>(&self, place: usize) -> Lanes {
+        if !ONLY_NEAR && self.with_thresholds {
             // SAFETY: `new` has checked the length.
             unsafe { eight(self.thresholds, place) }
         } else {
@@ -155,17 +155,18 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             Here {
                 displacement: Numbers::each(|d| eight(self.displacement[d], place)),
                 numbers: self.numbers(place),
-                threshold: self.thresholds(place),
+                threshold: self.thresholds::<false>(place),
             }
         }
     }
 
-    /// The bonds of a vector at one offset.
+    /// The bonds of a vector at one offset; with `ONLY_NEAR` less of those that are marked, nothing of what
+    /// makes bonds break.
     ///
     /// # Safety
     /// The vector must be one of the grid, the offset one of its.
     #[inline(always)]
-    pub unsafe fn load<'h, S: Simd>(
+    pub unsafe fn load<'h, S: Simd, const ONLY_NEAR: bool>(
         &self,
         simd: S,
         here: &'h Here<K::Point, D>,
@@ -178,7 +179,11 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         let (displacement, numbers, threshold) = unsafe {
             let component = |d| eight(self.displacement[d], far);
             let displacement: [Lanes; D] = Numbers::each(component);
-            (displacement, self.far_numbers(far), self.thresholds(far))
+            (
+                displacement,
+                self.far_numbers(far),
+                self.thresholds::<ONLY_NEAR>(far),
+            )
         };
         let eta = Numbers::each(|d: usize| displacement[d] - here.displacement[d]);
         let reference = Reference {
@@ -189,7 +194,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         };
         let intact = vector.groups.intact[o];
         Group {
-            bond: deform(simd, &reference, eta, intact, self.limit, K::WANTED),
+            bond: deform::<_, ONLY_NEAR, D>(simd, &reference, eta, intact, self.limit, K::WANTED),
             own_volume: self.volumes[0],
             volume: self.volumes[1],
             weights: match vector.weighted {
@@ -203,7 +208,10 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             memory: load_memory::<K::Memory>(&mut vector.groups, o),
             intact,
             whole: 0,
-            breakable: vector.groups.breakable.map_or(u8::MAX, |bits| bits[o]),
+            breakable: match vector.groups.breakable {
+                Some(bits) if !ONLY_NEAR => bits[o],
+                _ => u8::MAX,
+            },
         }
     }
 }

@@ -94,6 +94,9 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether it is worth a version for each set of vector instructions.
     const HOT: bool = false;
 
+    /// Whether it is worth a loop for bonds none of which is marked.
+    const NEAR: bool = false;
+
     /// Whether it wants to know of broken bonds.
     const WHOLE: bool = false;
 
@@ -123,6 +126,18 @@ pub trait Kernel<const D: usize>: Copy + Sync {
 
     /// Adds eight bonds but for those that break, whose bits it clears; may change what bonds keep.
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
+
+    /// Whether no bond breaks or remembers but marked ones; only asked with [`Self::NEAR`].
+    #[inline(always)]
+    fn is_plain_near(&self) -> bool {
+        true
+    }
+
+    /// Adds eight bonds none of which is marked, if [`Self::is_plain_near`].
+    #[inline(always)]
+    fn add_near<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
+        self.add(simd, group, sums);
+    }
 
     /// Clears the bits of those of eight bonds that break, and adds them. Groups come here after
     /// [`Self::add`], if it has broken any bond of the same point or vector: what is rarely done takes no

@@ -205,7 +205,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             unsafe { (self.far_numbers(neighbours), self.thresholds(neighbours)) };
         let intact = row.groups.intact[group];
         Group {
-            bond: deform(simd, &reference, eta, intact, self.limit, K::WANTED),
+            bond: deform::<_, false, D>(simd, &reference, eta, intact, self.limit, K::WANTED),
             own_volume: here.volume,
             volume: columns[VOLUME],
             weights: match row.weights {

@@ -29,6 +29,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const HOT: bool = L::HOT;
+    const NEAR: bool = L::HOT && !L::LINEAR && L::Memory::COUNT == 0 && L::SUM_READS_STRETCH;
     const READS_FAR: bool = false;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,

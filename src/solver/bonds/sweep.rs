@@ -324,6 +324,109 @@ fn note_vector(told: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MOST_B
     }
 }
 
+/// After a vector with marked bonds so many are not tried without: those around it mostly have some too.
+const PATIENCE: usize = 7;
+
+/// Which loop the next vector goes through. In lists a loop of its own gains nothing: there the time goes into
+/// fetching the far ends.
+struct Turns {
+    /// Whether there is a loop for vectors without marked bonds.
+    near: bool,
+    /// How many are not to be tried by it.
+    waiting: usize,
+}
+
+impl Turns {
+    fn new<K: Kernel<D>, const D: usize>(kernel: &K) -> Self {
+        Self {
+            near: kernel.is_plain_near(),
+            waiting: 0,
+        }
+    }
+
+    /// The sums over the bonds of a vector, by `near` if none of them is marked, else by `whole`; and
+    /// the bits of bonds that break.
+    #[inline(always)]
+    fn sum<'b, K: Kernel<D>, S: Simd, const D: usize>(
+        &mut self,
+        simd: S,
+        vector: &mut Adjacent<'b>,
+        near: impl FnOnce(&mut Adjacent<'b>) -> Option<K::Sums>,
+        whole: impl FnOnce(&mut Adjacent<'b>) -> (K::Sums, u8),
+    ) -> (K::Sums, u8) {
+        if const { !K::NEAR } {
+            return whole(vector);
+        }
+        if self.near && self.waiting == 0 {
+            if let Some(sums) = near(vector) {
+                return (sums, 0);
+            }
+            self.waiting = PATIENCE;
+        } else {
+            self.waiting = self.waiting.saturating_sub(1);
+        }
+        simd.aside(|| whole(vector))
+    }
+}
+
+/// The sums over the bonds of a vector; nothing if one is marked.
+///
+/// # Safety
+/// The vector must be one of the grid that `points` was made for.
+#[inline(always)]
+unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
+    simd: S,
+    kernel: K,
+    points: GridPoints<'_, K, D>,
+    vector: &mut Adjacent<'_>,
+) -> Option<K::Sums> {
+    let mut sums = kernel.start();
+    // SAFETY: passed on to the caller.
+    let here = unsafe { points.here(vector.place) };
+    for o in 0..vector.offsets.len() {
+        // SAFETY: as above.
+        let mut bonds = unsafe { points.load::<S, true>(simd, &here, vector, o) };
+        if bonds.bond.marked != 0 {
+            return None;
+        }
+        kernel.add_near(simd, &mut bonds, &mut sums);
+    }
+    Some(sums)
+}
+
+/// The sums over the bonds of a vector, and the bits of those that break; `whole` are the bits of all, if the
+/// kernel wants them.
+///
+/// # Safety
+/// As for [`near_vector`].
+#[inline(always)]
+unsafe fn whole_vector<K: Kernel<D>, S: Simd, const D: usize>(
+    simd: S,
+    kernel: K,
+    points: GridPoints<'_, K, D>,
+    whole: Option<&[u8]>,
+    vector: &mut Adjacent<'_>,
+) -> (K::Sums, u8) {
+    let mut sums = kernel.start();
+    let mut gone = 0;
+    // SAFETY: passed on to the caller.
+    let here = unsafe { points.here(vector.place) };
+    for o in 0..vector.offsets.len() {
+        // SAFETY: as above.
+        let mut bonds = unsafe { points.load::<S, false>(simd, &here, vector, o) };
+        if K::WHOLE {
+            bonds.whole = whole.map_or(0, |bits| bits[o]);
+        }
+        let before = bonds.intact;
+        kernel.add(simd, &mut bonds, &mut sums);
+        gone |= before ^ bonds.intact;
+        if K::Memory::COUNT > 0 && kernel.remembers() {
+            store_memory(vector.groups.numbers(o), &bonds.memory, before);
+        }
+    }
+    (sums, gone)
+}
+
 struct OverRows<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: ListPoints<'a, K, D>,
@@ -410,26 +513,17 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         let mut told = Vec::new();
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
+        let mut turns = Turns::new(&kernel);
         for k in 0..vectors.len() {
             let mut vector: Adjacent<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
-            let mut sums = kernel.start();
-            let mut gone = 0;
-            // SAFETY: the vectors are those of the grid that `points` was made for.
-            let here = unsafe { points.here(vector.place) };
-            for o in 0..vector.offsets.len() {
-                // SAFETY: as above.
-                let mut bonds = unsafe { points.load(simd, &here, &mut vector, o) };
-                if K::WHOLE {
-                    bonds.whole = whole.map_or(0, |bits| bits[o]);
-                }
-                let before = bonds.intact;
-                kernel.add(simd, &mut bonds, &mut sums);
-                gone |= before ^ bonds.intact;
-                if K::Memory::COUNT > 0 && kernel.remembers() {
-                    store_memory(vector.groups.numbers(o), &bonds.memory, before);
-                }
-            }
+            let (sums, gone) = turns.sum::<K, S, D>(
+                simd,
+                &mut vector,
+                // SAFETY: the vectors are those of the grid that `points` was made for.
+                |vector| unsafe { near_vector(simd, kernel, points, vector) },
+                |vector| unsafe { whole_vector(simd, kernel, points, whole, vector) },
+            );
             let first = vector.point - base;
             for quantity in 0..K::Sums::COUNT {
                 let column = K::Sums::column_mut(&mut results, quantity);
@@ -448,7 +542,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                     let here = unsafe { points.here(vector.place) };
                     for o in 0..vector.offsets.len() {
                         // SAFETY: as above.
-                        let mut bonds = unsafe { points.load(simd, &here, &mut vector, o) };
+                        let mut bonds =
+                            unsafe { points.load::<S, false>(simd, &here, &mut vector, o) };
                         kernel.add_broken(simd, &mut bonds, &mut broken);
                         vector.groups.intact[o] = bonds.intact;
                     }
