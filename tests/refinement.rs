@@ -200,6 +200,7 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     let [least, _] = energies(&format!("{none}\nrefinement.interface_factor = 1"), patch);
     assert!(least < 0.5, "{least}");
     let [least, most] = energies("", patch);
+    // No theory gives these: measured were 0.930 and 1.083, as docs/refinement.md has it.
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
 }
 
@@ -372,16 +373,16 @@ fn loads<const D: usize>(text: &str) -> [f64; D] {
 fn a_load_keeps_its_sum_on_a_refined_layer() {
     let pulled = plate(
         "set.top.where = 'y > 15'
-        condition.pull = { set = 'top', traction = [3, 'if(x < 10, 7, -2)'] }
+        condition.pull = { set = 'top', traction = [3, 7] }
         condition.side = { set = 'side', force = [0, 11] }
         set.side.where = 'x < 2'",
     );
     for layer in ["y > 12 && x < 9", "x < 9", "y > 15 && x > 3"] {
         let text = pulled.replace("(x - 13)^2 + (y - 8)^2 < 9", layer);
         let [x, y] = loads::<2>(&text);
-        // Area 20 m × 0.5 m; the load changes its sign midway.
+        // 3 and 7 Pa on 20 m × 0.5 m, and the 11 N of the side.
         assert!((x - 30.0).abs() < 1e-12, "{layer}: {x}");
-        assert!((y - 36.0).abs() < 1.0, "{layer}: {y}");
+        assert!((y - 81.0).abs() < 1e-12, "{layer}: {y}");
     }
     let block = format!(
         "{BLOCK}
