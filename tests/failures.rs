@@ -324,6 +324,31 @@ fn a_load_that_loses_its_value_is_named() {
 }
 
 #[test]
+fn energy_that_breaking_seems_to_give_hides_no_gain() {
+    // Families that have lost bonds are stiffer than those that the step was chosen for.
+    let folder = Folder::new("torn");
+    let deck = folder.write(
+        "deck.toml",
+        "dimension = 'plane-stress'
+        grid = { spacing = 1e-3, horizon = 3e-3 }
+        material.glass.correspondence = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.22 }
+        damage.brittle.energy = { fracture_energy = 135 }
+        body.plate = { material = 'glass', damage = 'brittle', shape.box = { lower = [0, -0.02], upper = [0.1, 0.02] } }
+        crack.notch.segment = { from = [-1, 0], to = [0.05, 0] }
+        set.top.where = 'y > 0.019'
+        set.bottom.where = 'y < -0.019'
+        condition.up = { set = 'top', traction = [0, 14e6] }
+        condition.down = { set = 'bottom', traction = [0, -14e6] }
+        time.end = 40e-6
+        ",
+    );
+    let out = folder.join("out");
+    let mut command = fissure(1);
+    command.arg("run").arg(deck).arg("--output").arg(&out);
+    failing(&mut command, "are the steps too large?", 1);
+}
+
+#[test]
 fn a_run_that_blows_up_is_an_error_while_its_numbers_are_still_finite() {
     let folder = Folder::new("blow-up");
     let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";

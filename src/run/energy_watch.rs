@@ -61,7 +61,9 @@ impl EnergyWatch {
     /// # Errors
     /// When the energy has grown beyond doubt, or is not finite.
     pub fn look(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
-        let (start, work, gain) = (row.first_energy, row.energies.work, row.energies.error);
+        let (start, work) = (row.first_energy, row.energies.work);
+        // Bonds that were seen to give energy by breaking hide what has been gained.
+        let gain = row.energies.error - row.energies.fracture.min(0.0);
         self.put_in = self.put_in.max(start.abs() + work.abs());
         let share = gain / self.put_in.max(self.floor);
         let text = || {
