@@ -288,7 +288,7 @@ fn a_plate_with_refined_parts() {
 
 /// A plate that gets finer where it is strained and torn, up to twice.
 fn growing() -> String {
-    let plate = PLATE.replace("end = 12e-6", "end = 3e-6");
+    let plate = PLATE.replace("end = 12e-6", "end = 2e-6");
     let plate = plate.replace("fracture_energy = 20", "fracture_energy = 0.5");
     format!(
         "{plate}

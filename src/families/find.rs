@@ -47,7 +47,7 @@ pub fn find(
         .iter()
         .map(layout)
         .collect::<Result<Vec<_>, Fault>>()?;
-    // No two points are as close as that, but those at the same place are found all the same.
+    // Points of one grid that lie at the same place have been found with its layout.
     let listed: Vec<f64> = cutoffs
         .iter()
         .enumerate()

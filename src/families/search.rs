@@ -33,7 +33,9 @@ struct Order {
     local: Vec<u32>,
     /// The first place of each block, and the number of places.
     first: Vec<u32>,
-    bins: Bins,
+    /// The places of each block from its first one on. Where few points of a block have bonds to another
+    /// one, the others do not even see each other.
+    bins: Vec<Bins>,
 }
 
 impl Order {
@@ -45,20 +47,19 @@ impl Order {
             .collect();
         keys.par_sort_unstable();
         let before = |block: u32| keys.partition_point(|key| key.0 < block) as u32;
-        let first = (0..=blocks as u32).map(before).collect();
+        let first: Vec<u32> = (0..=blocks as u32).map(before).collect();
         let local: Vec<u32> = keys.iter().map(|key| key.2).collect();
         drop(keys);
-        let positions: Vec<[f64; 3]> = local.iter().map(|k| points[*k as usize].position).collect();
+        let bins = first.windows(2).map(|ends| {
+            let places = local[ends[0] as usize..ends[1] as usize].iter();
+            let positions: Vec<[f64; 3]> = places.map(|k| points[*k as usize].position).collect();
+            Bins::new(&positions, longest)
+        });
         Self {
-            bins: Bins::new(&positions, longest),
+            bins: bins.collect(),
             local,
             first,
         }
-    }
-
-    /// The block of a place.
-    fn block(&self, place: u32) -> usize {
-        self.first.partition_point(|first| *first <= place) - 1
     }
 }
 
@@ -131,39 +132,44 @@ impl Chunk {
         let blocks = order.first.len() - 1;
         for index in range {
             let here = &domain.points[index];
-            let squares = &squares[here.block as usize * blocks..];
-            let mut coincident = None;
-            self.places.clear();
-            order.bins.within(here.position, |place, squared| {
-                if squared == 0.0 {
-                    let other = order.local[place as usize] as usize;
-                    if other != index {
-                        coincident = Some(other);
-                    }
-                } else if blocks == 1 || squared <= squares[order.block(place)] {
-                    self.places.push(place);
+            let squares = &squares[here.block as usize * blocks..][..blocks];
+            let mut neighbours = 0;
+            for (there, square) in squares.iter().enumerate() {
+                if *square == 0.0 {
+                    continue;
                 }
-            });
-            if let Some(other) = coincident {
-                return Err(Fault::SamePlace([*here, domain.points[other]]));
-            }
-            if self.places.len() as f64 > MOST_NEIGHBOURS {
-                return Err(Fault::TooManyNeighbours {
-                    blocks: [here.block as usize; 2],
-                    neighbours: None,
-                    spacings: None,
+                let first = order.first[there];
+                let mut coincident = None;
+                self.places.clear();
+                order.bins[there].within(here.position, |place, squared| {
+                    let place = first + place;
+                    if squared == 0.0 {
+                        let other = order.local[place as usize] as usize;
+                        if other != index {
+                            coincident = Some(other);
+                        }
+                    } else if squared <= *square {
+                        self.places.push(place);
+                    }
                 });
-            }
-            self.places.sort_unstable();
-            let mut rest = &self.places[..];
-            while let Some(first) = rest.first() {
-                let there = order.block(*first);
-                let end = order.first[there + 1];
-                let (row, others) = rest.split_at(rest.partition_point(|place| *place < end));
-                rest = others;
-                let groups = row.len().div_ceil(WIDTH) as u32;
+                if let Some(other) = coincident {
+                    return Err(Fault::SamePlace([*here, domain.points[other]]));
+                }
+                neighbours += self.places.len();
+                if neighbours as f64 > MOST_NEIGHBOURS {
+                    return Err(Fault::TooManyNeighbours {
+                        blocks: [here.block as usize; 2],
+                        neighbours: None,
+                        spacings: None,
+                    });
+                }
+                if self.places.is_empty() {
+                    continue;
+                }
+                self.places.sort_unstable();
+                let groups = self.places.len().div_ceil(WIDTH) as u32;
                 self.rows.push((index as u32, there as u32, groups));
-                for group in row.chunks(WIDTH) {
+                for group in self.places.chunks(WIDTH) {
                     let mut neighbours = [index as u32; WIDTH];
                     for (slot, place) in neighbours.iter_mut().zip(group) {
                         *slot = order.local[*place as usize];

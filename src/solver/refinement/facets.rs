@@ -57,6 +57,11 @@ impl Facets {
         }
     }
 
+    /// Whether there is none; the same on all ranks.
+    pub fn are_none(&self) -> bool {
+        self.all.is_empty()
+    }
+
     /// Those that a bond of a point at a position (m) may cross, by index.
     pub fn near(&self, position: [f64; 3]) -> Vec<u32> {
         let mut near = Vec::new();

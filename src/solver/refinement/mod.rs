@@ -198,6 +198,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (lengths, broken): (&[u32], &[u64]),
         facets: &Facets,
     ) {
+        if comm::total(self.comm, broken.len() as u64) == 0 && facets.are_none() {
+            return;
+        }
         let model = &self.model;
         let mut was: Vec<f64> = rows
             .iter()
