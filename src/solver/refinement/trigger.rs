@@ -17,14 +17,36 @@ struct Source {
     horizon: f64,
 }
 
+/// More places within the horizon of a finer point are not looked at for coarser ones.
+const MOST_PLACES: f64 = 1e4;
+
 /// Whether a run can refine as its plan wants.
 ///
 /// # Errors
-/// With loads on sets given by ids; during a run with relaxation and steps that are undone.
+/// With horizons of very many spacings; with loads on sets given by ids; during a run with relaxation and
+/// steps that are undone.
 pub fn is_possible(plan: &Plan) -> Result<()> {
     let Some(refinement) = &plan.refinement else {
         return Ok(());
     };
+    let dimension = plan.dimension.count();
+    for block in plan.blocks().filter(|block| block.level > 0) {
+        let Some(edges) = block.spacing() else {
+            continue;
+        };
+        let places = edges[..dimension]
+            .iter()
+            .map(|edge| 2.0 * (block.horizon / edge).floor() + 1.0);
+        if places.product::<f64>() > MOST_PLACES {
+            let spacings = block.horizon / edges[0];
+            let message = format!(
+                "[grid] horizon: {spacings:.4e} spacings of level {} are too many for a refined grid; is it in \
+                 metres?",
+                block.level
+            );
+            return Err(plan.source.error(plan.places.horizon.clone(), message));
+        }
+    }
     let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
     let is_by_ids = |set: usize| matches!(plan.sets[set].selector, Selector::Ids { .. });
     let mut conditions = plan.conditions.iter();
