@@ -325,7 +325,7 @@ fn a_load_that_loses_its_value_is_named() {
 
 #[test]
 fn energy_that_breaking_seems_to_give_hides_no_gain() {
-    // Families that have lost bonds are stiffer than those that the step was chosen for.
+    // Four times the stable step tears all to dust, and bonds that are far beyond equilibrium break.
     let folder = Folder::new("torn");
     let deck = folder.write(
         "deck.toml",
@@ -339,7 +339,7 @@ fn energy_that_breaking_seems_to_give_hides_no_gain() {
         set.bottom.where = 'y < -0.019'
         condition.up = { set = 'top', traction = [0, 14e6] }
         condition.down = { set = 'bottom', traction = [0, -14e6] }
-        time.end = 40e-6
+        time = { end = 40e-6, step = 8e-7 }
         ",
     );
     let out = folder.join("out");

@@ -183,7 +183,9 @@ impl<const D: usize> Law<D> for BondAssociated {
         let singular = Places::singular::<D>();
         if stage == 0 {
             numbers[Places::WEIGHT..=singular].fill(0.0);
-            let Some(inverse_shape) = ShapeTensor::<D>::new(sums).inverse() else {
+            let shape = ShapeTensor::<D>::new(sums);
+            let modulus = self.stress.largest_modulus();
+            let Some(inverse_shape) = shape.inverse_of_rest(modulus, numbers[0]) else {
                 numbers[singular] = 1.0;
                 return;
             };

@@ -9,6 +9,10 @@ use crate::lanes::{Lanes, Numbers};
 /// size that looks alike in all directions.
 const SINGULAR: f64 = 1e-2;
 
+/// What is left of a family carries no force where it is so many times as stiff as the whole family: the time
+/// step is that of whole families. Torn plates ran away without a bound, and not with one of 16.
+const STIFFEST: f64 = 8.0;
+
 /// The mixed entries of a symmetric tensor in the order in which they are kept: yz, xz, xy in space and
 /// xy in the plane.
 #[inline(always)]
@@ -113,6 +117,15 @@ impl<const D: usize> ShapeTensor<D> {
         } else {
             None
         }
+    }
+
+    /// K⁻¹ (m⁻⁵) of what is left of a family, unless K is nearly singular or the family too stiff, with the largest
+    /// modulus of its solid (Pa) and the spring constant of the whole family (N/m⁷).
+    pub fn inverse_of_rest(&self, modulus: f64, whole: f64) -> Option<SMatrix<f64, D, D>> {
+        let least = SMatrix::from_diagonal_element(modulus / (STIFFEST * whole));
+        // Whether all eigenvalues are larger.
+        let is_soft = (self.0 - least).cholesky().is_some();
+        if is_soft { self.inverse() } else { None }
     }
 
     /// The smallest eigenvalue, m⁵.

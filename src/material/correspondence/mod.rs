@@ -223,7 +223,9 @@ impl<const D: usize> Law<D> for Correspondence {
         let own = D * D + 2 * D;
         found[..own + OWN].fill(0.0);
         let moved = from_rows::<D>(&sums[2 * D..]);
-        let stress = shape.inverse().and_then(|inverse| {
+        let modulus = self.stress.largest_modulus();
+        let inverse = shape.inverse_of_rest(modulus, constants[0]);
+        let stress = inverse.and_then(|inverse| {
             let gradient = moved * inverse;
             let (stress, energy) = match &self.plastic {
                 Some(plastic) => plastic.at(&gradient, state),
