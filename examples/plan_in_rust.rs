@@ -77,7 +77,7 @@ pub fn plate(end: f64) -> Result<Plan> {
         let pull = vec![None, Some(Expression::of(velocity)?)];
         plan.add_condition(name, set, Action::Velocity(pull));
     }
-    plan.history.every = Interval::Steps(50);
+    plan.history.every = Some(Interval::Steps(50));
     Ok(plan)
 }
 

@@ -61,10 +61,7 @@ impl Plan {
                 set: None,
             },
             history: History {
-                every: Interval::Seldom {
-                    seconds: end / ROWS,
-                    steps: STEPS_A_ROW,
-                },
+                every: None,
                 reactions: Vec::new(),
                 support_forces: Vec::new(),
                 damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
@@ -164,6 +161,18 @@ impl Plan {
     pub fn relaxes(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.is_relaxation())
+    }
+
+    /// When rows of the history are written.
+    pub fn row_interval(&self) -> Interval {
+        let seconds = self.time.end / ROWS;
+        let default = if self.relaxes() {
+            Interval::Seconds(seconds)
+        } else {
+            let steps = STEPS_A_ROW;
+            Interval::Seldom { seconds, steps }
+        };
+        self.history.every.unwrap_or(default)
     }
 
     /// Whether the step of any stage follows the number of bonds that break in it.

@@ -93,12 +93,9 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         checkpoint.every.get_or_insert_with(text);
     }
     let history = deck.history.get_mut();
-    fill_interval(
-        &mut history.every,
-        history.every_steps.is_some(),
-        plan.history.every,
-    );
-    if let Interval::Seldom { seconds, steps } = plan.history.every {
+    let rows = plan.row_interval();
+    fill_interval(&mut history.every, history.every_steps.is_some(), rows);
+    if let Interval::Seldom { seconds, steps } = rows {
         history.every.get_or_insert_with(|| default_number(seconds));
         let steps = || Spanned::new(0..0, Count::new(steps));
         history.every_steps.get_or_insert_with(steps);

@@ -5,7 +5,6 @@ use serde_spanned::Spanned;
 use super::grammar::{self, Deck, Text};
 use super::names::suits_a_column;
 use super::number::{Number, Vector};
-use super::outputs::{ROWS, STEPS_A_ROW, interval};
 use super::plan::{self, Field, Interval};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::find_set;
@@ -14,8 +13,7 @@ use crate::error::Result;
 /// Damage above which a point counts as cracked if the deck does not say.
 pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
-/// Validates what is written to the history; `end` (s) is the end of the run, which may be explicit in all its
-/// steps, `horizon` (m) that of the grid.
+/// Validates what is written to the history; `horizon` (m) is that of the grid.
 ///
 /// # Errors
 /// On an unknown set or field, a wrong place or number.
@@ -23,7 +21,6 @@ pub fn history(
     scope: &Scope,
     deck: &Deck,
     sets: &[plan::Set],
-    (end, explicit): (f64, bool),
     horizon: f64,
 ) -> Result<plan::History> {
     let history = deck.history.get_ref();
@@ -68,7 +65,7 @@ pub fn history(
         tip(scope, name, table, sets, damage_threshold)
     })?;
     Ok(plan::History {
-        every: rows(scope, history, end / ROWS, explicit)?,
+        every: rows(scope, history)?,
         reactions: history
             .reactions
             .iter()
@@ -83,23 +80,22 @@ pub fn history(
     })
 }
 
-/// When rows are written.
-fn rows(
-    scope: &Scope,
-    history: &grammar::History,
-    default: f64,
-    explicit: bool,
-) -> Result<Interval> {
-    let (every, every_steps) = (&history.every, &history.every_steps);
-    let seldom = |seconds, steps| Interval::Seldom { seconds, steps };
-    match (every, every_steps) {
-        (None, None) if explicit => Ok(seldom(default, STEPS_A_ROW)),
-        (Some(every), Some(steps)) => {
-            let seconds = scope.positive(every, "[history] every")?;
-            Ok(seldom(seconds, steps.get_ref().get()))
-        }
-        _ => interval(scope, "[history]", every, every_steps, default),
-    }
+/// When rows are written, if the deck says so.
+fn rows(scope: &Scope, history: &grammar::History) -> Result<Option<Interval>> {
+    let seconds = |every: &Number| scope.positive(every, "[history] every");
+    let steps = history
+        .every_steps
+        .as_ref()
+        .map(|steps| steps.get_ref().get());
+    Ok(match (&history.every, steps) {
+        (None, None) => None,
+        (None, Some(steps)) => Some(Interval::Steps(steps)),
+        (Some(every), None) => Some(Interval::Seconds(seconds(every)?)),
+        (Some(every), Some(steps)) => Some(Interval::Seldom {
+            seconds: seconds(every)?,
+            steps,
+        }),
+    })
 }
 
 /// The key of a table, if its name can be part of the names of columns.

@@ -3,35 +3,10 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Balance, Count, Deck};
-use super::number::Number;
 use super::plan;
 use super::resolve::{Scope, find};
 use super::sets::find_set;
 use crate::error::Result;
-
-/// How often something is written: one of two keys, or every `default` seconds.
-///
-/// # Errors
-/// When both are given, or a wrong number.
-pub fn interval(
-    scope: &Scope,
-    key: &str,
-    every: &Option<Number>,
-    every_steps: &Option<Spanned<Count>>,
-    default: f64,
-) -> Result<plan::Interval> {
-    match (every, every_steps) {
-        (None, None) => Ok(plan::Interval::Seconds(default)),
-        (Some(every), None) => scope
-            .positive(every, &format!("{key} every"))
-            .map(plan::Interval::Seconds),
-        (None, Some(steps)) => Ok(plan::Interval::Steps(steps.get_ref().get())),
-        (Some(_), Some(steps)) => Err(scope.error(
-            steps.span(),
-            format!("{key} every_steps: give either `every` or `every_steps`"),
-        )),
-    }
-}
 
 /// Validates what is written to the result; `end` (s) is the end of the run.
 ///
@@ -59,13 +34,7 @@ pub fn output(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Resul
         return Err(scope.error(place, message));
     }
     Ok(plan::Output {
-        every: interval(
-            scope,
-            "[output]",
-            &output.every,
-            &output.every_steps,
-            end / OUTPUTS,
-        )?,
+        every: every(scope, output, end)?,
         fields,
         single: output.precision == grammar::Precision::Single,
         set: match &output.set {
@@ -82,6 +51,22 @@ pub const DEFAULT_FIELDS: [plan::Field; 4] = [
     plan::Field::Damage,
     plan::Field::StrainEnergyDensity,
 ];
+
+/// When outputs are written.
+fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<plan::Interval> {
+    match (&output.every, &output.every_steps) {
+        (None, None) => Ok(plan::Interval::Seconds(end / OUTPUTS)),
+        (Some(every), None) => {
+            let seconds = scope.positive(every, "[output] every")?;
+            Ok(plan::Interval::Seconds(seconds))
+        }
+        (None, Some(steps)) => Ok(plan::Interval::Steps(steps.get_ref().get())),
+        (Some(_), Some(steps)) => {
+            let message = "[output] every_steps: give either `every` or `every_steps`";
+            Err(scope.error(steps.span(), message))
+        }
+    }
+}
 
 /// Outputs of a run whose deck does not say how many.
 pub const OUTPUTS: f64 = 50.0;

@@ -44,7 +44,6 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
     })?;
     let time = time::time(&scope, deck)?;
     let stages = time::stages(&scope, deck, &time)?;
-    let relaxes = time.is_relaxation() || stages.iter().any(|stage| stage.time.is_relaxation());
     Ok(Plan {
         source: source.clone(),
         warnings: Vec::new(),
@@ -66,7 +65,7 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
         stages,
         output: outputs::output(&scope, deck, &sets, time.end)?,
-        history: history::history(&scope, deck, &sets, (time.end, !relaxes), horizon)?,
+        history: history::history(&scope, deck, &sets, horizon)?,
         checkpoint: outputs::checkpoint(&scope, deck)?,
         balance: outputs::balance(&scope, deck)?,
         sets,

@@ -36,7 +36,7 @@ pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
         single: false,
         set: None,
     };
-    plan.history.every = Interval::Steps(1);
+    plan.history.every = Some(Interval::Steps(1));
     let history = plan.history.clone();
     plan.history.reactions.clear();
     plan.history.support_forces.clear();

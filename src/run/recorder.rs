@@ -78,7 +78,7 @@ impl<'a> Recorder<'a> {
         let order = simulation.id_order();
         let kept = kept(simulation, &order)?;
         let clock = &simulation.expected_clock();
-        let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.history.every));
+        let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.row_interval()));
         let layout = Layout::new(simulation, (&order, &kept), outputs.count(clock), metadata);
         let fixed = layout.fixed();
         let contents = layout.contents(&fixed);

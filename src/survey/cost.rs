@@ -190,7 +190,7 @@ fn saved_width(plan: &Plan) -> usize {
 
 fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
     let count = |every| Schedule(every).count(clock);
-    let (outputs, rows) = (count(plan.output.every), count(plan.history.every) as f64);
+    let (outputs, rows) = (count(plan.output.every), count(plan.row_interval()) as f64);
     let components: usize = plan
         .output
         .fields

@@ -52,8 +52,8 @@ pub struct Output {
 /// The history.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// How often.
-    pub every: Interval,
+    /// How often; without, [`Plan::row_interval`](super::Plan::row_interval) decides.
+    pub every: Option<Interval>,
     /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
     /// Forces of supports along a direction.
