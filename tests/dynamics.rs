@@ -513,3 +513,44 @@ fn a_reaction_knows_a_motion_better_than_its_rounded_places() {
         });
     }
 }
+
+#[test]
+fn two_points_that_are_thrown_apart_lose_the_energy_of_their_bond() {
+    const CRITICAL: f64 = 0.02;
+    let (modulus, section, horizon) = (5.0, 0.5, 1.5);
+    // c = 12E/(5δ²A), and ½ c s² |ξ| V² of a bond of 1 m between two points of 0.5 m³.
+    let micromodulus = 12.0 * modulus / (5.0 * horizon * horizon * section);
+    let bond = 0.5 * micromodulus * CRITICAL * CRITICAL * section * section;
+    let thrown = |step: f64| {
+        let text = format!(
+            "dimension = '1d'
+            cross_section = {section}
+            grid = {{ volume_correction = 'none', spacing = 1, horizon = {horizon} }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = {modulus} }}
+            damage.brittle.critical_stretch = {{ critical_stretch = {CRITICAL}, alpha = 0 }}
+            body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [2] }} }}
+            initial.throw.velocity = ['0.1*(x - 1)']
+            time = {{ end = 1, step = {step} }}"
+        );
+        simulate::<1, _>(&text, |mut simulation| {
+            let mut history = HistoryObserver::new(&simulation).unwrap();
+            let before = row(&mut history, &mut simulation).energies;
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            let after = row(&mut history, &mut simulation);
+            assert_eq!(after.broken, 1);
+            assert_eq!(after.energies.strain, 0.0);
+            (before.kinetic - after.energies.kinetic, after.energies)
+        })
+    };
+    // However late the bond is seen to break, what is lost is what breaking has taken.
+    for step in [0.04, 0.02, 0.01, 0.005, 0.0025, 1e-4] {
+        let (lost, energies) = thrown(step);
+        let error = (lost / energies.fracture - 1.0).abs();
+        assert!(error < 1e-12, "{step}: {lost} {energies:?}");
+        // It breaks within a step of the critical stretch, which takes 0.2 s.
+        let late = (lost / bond - 1.0).abs();
+        assert!(late < 2.0 * step / 0.2, "{step}: {lost} {bond}");
+    }
+}

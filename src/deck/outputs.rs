@@ -2,7 +2,7 @@
 
 use serde_spanned::Spanned;
 
-use super::grammar::{self, Balance, Count, Deck};
+use super::grammar::{self, Balance, Deck};
 use super::plan;
 use super::resolve::{Scope, find};
 use super::sets::find_set;

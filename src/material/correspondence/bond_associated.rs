@@ -35,6 +35,8 @@ use crate::lanes::{Lanes, Numbers};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BondAssociated {
     stress: Stress,
+    /// [`Stress::largest_modulus`], Pa.
+    modulus: f64,
 }
 
 const KEYS: &[Key] = hooke::keys_with_hooke![STRESS];
@@ -65,8 +67,10 @@ impl Declared for BondAssociated {
 
 fn build(given: &Given) -> Built {
     let hooke = Hooke::of(given).expect("the constants have been looked at");
+    let stress = Stress::of(given.values.word(STRESS.name), given, hooke);
     Built::plain(BondAssociated {
-        stress: Stress::of(given.values.word(STRESS.name), given, hooke),
+        stress,
+        modulus: stress.largest_modulus(),
     })
 }
 
@@ -145,10 +149,9 @@ impl<const D: usize> Law<D> for BondAssociated {
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         let shape = ShapeTensor::<D>::new(sums);
-        let largest = self.stress.largest_modulus();
         if shape.inverse().is_some() {
-            numbers[0] = largest / shape.smallest();
-            numbers[1] = largest / sums[2 * D];
+            numbers[0] = self.modulus / shape.smallest();
+            numbers[1] = self.modulus / sums[2 * D];
         }
     }
 
@@ -184,8 +187,7 @@ impl<const D: usize> Law<D> for BondAssociated {
         if stage == 0 {
             numbers[Places::WEIGHT..=singular].fill(0.0);
             let shape = ShapeTensor::<D>::new(sums);
-            let modulus = self.stress.largest_modulus();
-            let Some(inverse_shape) = shape.inverse_of_rest(modulus, numbers[0]) else {
+            let Some(inverse_shape) = shape.inverse_of_rest(self.modulus, numbers[0]) else {
                 numbers[singular] = 1.0;
                 return;
             };

@@ -123,9 +123,11 @@ impl<const D: usize> ShapeTensor<D> {
     /// modulus of its solid (Pa) and the spring constant of the whole family (N/m⁷).
     pub fn inverse_of_rest(&self, modulus: f64, whole: f64) -> Option<SMatrix<f64, D, D>> {
         let least = SMatrix::from_diagonal_element(modulus / (STIFFEST * whole));
-        // Whether all eigenvalues are larger.
-        let is_soft = (self.0 - least).cholesky().is_some();
-        if is_soft { self.inverse() } else { None }
+        if is_positive_definite(&(self.0 - least)) {
+            self.inverse()
+        } else {
+            None
+        }
     }
 
     /// The smallest eigenvalue, m⁵.
@@ -145,6 +147,12 @@ pub fn extremes<const D: usize>(m: &SMatrix<f64, D, D>) -> [f64; 2] {
     }
     let all = whole.symmetric_eigenvalues();
     [all.min(), all.max()]
+}
+
+/// Whether all eigenvalues of a symmetric matrix of at most three rows are above 0, by Sylvester's criterion.
+fn is_positive_definite<const D: usize>(m: &SMatrix<f64, D, D>) -> bool {
+    let of_two = D < 2 || m[(0, 0)] * m[(1, 1)] > m[(0, 1)] * m[(1, 0)];
+    m[(0, 0)] > 0.0 && of_two && determinant(m) > 0.0
 }
 
 /// The determinant of a matrix of at most three rows.

@@ -39,6 +39,8 @@ use stress::Stress;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correspondence {
     stress: Stress,
+    /// [`Stress::largest_modulus`], Pa.
+    modulus: f64,
     control: Control,
     plastic: Option<Plastic>,
 }
@@ -113,8 +115,10 @@ fn of_stress(values: &Values) -> Invariants {
 
 fn build(given: &Given) -> Built {
     let hooke = Hooke::of(given).expect("the constants have been looked at");
+    let stress = Stress::of(given.values.word(STRESS.name), given, hooke);
     Built::plain(Correspondence {
-        stress: Stress::of(given.values.word(STRESS.name), given, hooke),
+        stress,
+        modulus: stress.largest_modulus(),
         control: Control::of(given, hooke),
         plastic: Plastic::of(given),
     })
@@ -207,7 +211,7 @@ impl<const D: usize> Law<D> for Correspondence {
             Some(inverse) => {
                 let control = self.control.matrix(&inverse, numbers[1]);
                 let [_, largest] = extremes(&control);
-                (self.stress.largest_modulus() / shape.smallest()).max(largest)
+                (self.modulus / shape.smallest()).max(largest)
             }
         };
     }
@@ -223,8 +227,7 @@ impl<const D: usize> Law<D> for Correspondence {
         let own = D * D + 2 * D;
         found[..own + OWN].fill(0.0);
         let moved = from_rows::<D>(&sums[2 * D..]);
-        let modulus = self.stress.largest_modulus();
-        let inverse = shape.inverse_of_rest(modulus, constants[0]);
+        let inverse = shape.inverse_of_rest(self.modulus, constants[0]);
         let stress = inverse.and_then(|inverse| {
             let gradient = moved * inverse;
             let (stress, energy) = match &self.plastic {

@@ -117,12 +117,18 @@ impl PointNumbers {
                     continue;
                 }
                 let get = |column: usize| columns[column].get(k).copied().unwrap_or(0.0);
-                let mut numbers: [f64; NUMBERS] = std::array::from_fn(get);
-                let sums: [f64; MOST.sum] = std::array::from_fn(|s| get(NUMBERS + s));
+                let found = counts.point + counts.own;
+                let mut numbers = [0.0; NUMBERS];
+                for (column, number) in numbers[..found].iter_mut().enumerate() {
+                    *number = get(column);
+                }
+                let mut sums = [0.0; MOST.sum];
+                for (column, sum) in sums[..counts.sum].iter_mut().enumerate() {
+                    *sum = get(NUMBERS + column);
+                }
                 let before = PlasticState::of(std::array::from_fn(|p| get(PLASTIC + p)));
                 let mut after = before;
                 Law::<D>::point(law, stage, &sums[..counts.sum], &mut numbers, &mut after);
-                let found = counts.point + counts.own;
                 for (column, number) in columns.iter_mut().zip(numbers).take(found) {
                     column[k] = number;
                 }
