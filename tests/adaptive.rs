@@ -1,6 +1,7 @@
 //! The adaptive step: no step breaks more bonds of a point than the rule has it, what it dissipates depends
 //! less on the step, and it can be stopped at any step and goes on to the same bits on any ranks.
 
+use crate::support::command::{Folder, finish, fissure, text};
 use crate::support::saved::{state, whole};
 use crate::support::{plan, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
@@ -73,6 +74,21 @@ fn no_step_breaks_more_bonds_of_a_point_than_it_may() {
     assert!(smallest <= 0.25 * largest, "{smallest} of {largest}");
     let raises = rows.windows(2).filter(|pair| pair[1][size] > pair[0][size]);
     assert!(raises.count() > 3);
+}
+
+#[test]
+fn steps_that_are_long_for_bonds_that_break_are_told() {
+    let folder = Folder::new("overshoot");
+    let warned = |time: &str| {
+        let deck = folder.write("deck.toml", &torn(time));
+        let mut command = fissure(1);
+        command.arg("run").arg(deck).arg("--overwrite");
+        let output = finish(command.arg("--output").arg(folder.join("out")));
+        assert!(output.status.success(), "{}", text(&output));
+        text(&output).contains("of the fracture energy and more than 10 %")
+    };
+    assert!(warned("safety = 0.8"));
+    assert!(!warned("safety = 0.02"));
 }
 
 #[test]

@@ -64,6 +64,9 @@ use watch::Watch;
 /// Kinetic energy as a share of the strain energy above which loading is not slow.
 const INERTIA_SHARE: f64 = 0.05;
 
+/// The share of the fracture energy above which bonds have broken late.
+const OVERSHOOT_SHARE: f64 = 0.1;
+
 /// The share of a run at its start in which little strain energy is there to compare with.
 const START_SHARE: f64 = 0.1;
 
@@ -304,6 +307,7 @@ impl<'a> Job<'a> {
                 });
             }
         }
+        self.warn_of_overshoot(recorder);
         Ok(Left::Complete)
     }
 
@@ -358,6 +362,25 @@ impl<'a> Job<'a> {
         );
         self.observer.message(&Message::Warning(text));
         true
+    }
+
+    /// Says of a run whose steps are those of the equation of motion that they were long for bonds that break.
+    fn warn_of_overshoot(&mut self, recorder: &Recorder<'a>) {
+        let Some(row) = recorder.last_row.as_ref() else {
+            return;
+        };
+        let (overshoot, fracture) = (row.energies.overshoot, row.energies.fracture);
+        if self.plan.relaxes() || fracture <= 0.0 || overshoot <= OVERSHOOT_SHARE * fracture {
+            return;
+        }
+        let text = format!(
+            "when they were seen to break, bonds held {overshoot:.3e} J above their criterion, {:.0} % of the fracture \
+             energy and more than {:.0} %: the steps are long for them; a smaller `safety` or \
+             [time.adaptive] shortens them",
+            100.0 * overshoot / fracture,
+            100.0 * OVERSHOOT_SHARE
+        );
+        self.observer.message(&Message::Warning(text));
     }
 
     fn begin_run<const D: usize>(
