@@ -145,25 +145,60 @@ fn nothing_at_rest_and_under_translation() {
     for_all_laws!(check);
 }
 
+/// Angles (rad) that bodies are turned by.
+const ANGLES: [f64; 3] = [0.3, 1.0, 2.5];
+
+/// Turns about z, then about x in 3-D.
+fn turn<const D: usize>(angle: f64, x: [f64; 3]) -> [f64; 3] {
+    let (sin, cos) = angle.sin_cos();
+    let once = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
+    if D < 3 {
+        return once;
+    }
+    let [x, y, z] = once;
+    [x, cos * y - sin * z, sin * y + cos * z]
+}
+
+#[test]
+fn a_body_that_is_turned_has_its_forces_turned() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        // Bonds that remember must come to all from the same past.
+        let mut kept = Kept::default();
+        simulation.keep(&mut kept);
+        displace(&mut simulation, wave);
+        let before = forces(&simulation);
+        let scale = largest_force(&simulation);
+        for angle in ANGLES {
+            simulation.undo(&kept);
+            displace(&mut simulation, |x| turn::<D>(angle, wave(x)));
+            for (before, after) in before.iter().zip(forces(&simulation)) {
+                let whole = std::array::from_fn(|d| before.get(d).copied().unwrap_or(0.0));
+                let wanted = turn::<D>(angle, whole);
+                for (after, wanted) in after.iter().zip(wanted) {
+                    let error = (after - wanted).abs();
+                    let deck = &simulation.plan.source.text;
+                    assert!(error < 1e-11 * scale, "{after} {wanted}: {deck}");
+                }
+            }
+        }
+    }
+    let objective = |case: &Case| !case.law.linear && case.invariants().objective;
+    for case in cases().filter(objective) {
+        for correction in CORRECTIONS {
+            let deck = |dimension| deck(dimension, &case.table(), correction, "");
+            simulate(&deck("plane-stress"), check::<2>);
+            simulate(&deck("plane-strain"), check::<2>);
+            simulate(&deck("3d"), check::<3>);
+        }
+    }
+}
+
 #[test]
 fn nothing_under_finite_rotation() {
     fn check<const D: usize>(mut simulation: Simulation<D>) {
         let scale = force_scale(&mut simulation);
-        for angle in [0.3_f64, 1.0, 2.5] {
-            let (sin, cos) = angle.sin_cos();
-            // About z, then about x in 3-D.
-            let turn = |x: [f64; 3]| {
-                let once = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
-                match D {
-                    3 => [
-                        once[0],
-                        cos * once[1] - sin * once[2],
-                        sin * once[1] + cos * once[2],
-                    ],
-                    _ => once,
-                }
-            };
-            displace(&mut simulation, turn);
+        for angle in ANGLES {
+            displace(&mut simulation, |x| turn::<D>(angle, x));
             let largest = largest_force(&simulation);
             let deck = &simulation.plan.source.text;
             assert!(largest < 1e-12 * scale, "{largest} of {scale}: {deck}");
@@ -215,41 +250,43 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
     sums
 }
 
+/// Forces add up to nothing, and do not turn the body where the law says so.
+fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
+    displace(&mut simulation, wave);
+    let laws = simulation.plan.bodies.iter().map(|body| &body.material.law);
+    let mut kept = laws.map(|law| (law.declaration.invariants)(&law.values));
+    let bound = if kept.all(|invariants| invariants.angular_momentum) {
+        1e-12
+    } else {
+        // The square of a strain, of the part that the family does not see.
+        1e-2
+    };
+    for [net, gross] in moments(&simulation) {
+        assert!(net.abs() <= bound * gross, "moment {net} of {gross}");
+    }
+    for d in 0..D {
+        let (mut net, mut gross) = (0.0_f64, 0.0);
+        for (force, volume) in forces(&simulation).iter().zip(&simulation.model.volume) {
+            net += force[d] * volume;
+            gross += force[d].abs() * volume;
+        }
+        assert!(gross > 0.0 && net.abs() < 1e-12 * gross, "{net} of {gross}");
+    }
+}
+
 #[test]
 fn forces_are_equal_and_opposite() {
-    fn check<const D: usize>(mut simulation: Simulation<D>) {
-        displace(&mut simulation, wave);
-        let laws = simulation.plan.bodies.iter().map(|body| &body.material.law);
-        let mut kept = laws.map(|law| (law.declaration.invariants)(&law.values));
-        let bound = if kept.all(|invariants| invariants.angular_momentum) {
-            1e-12
-        } else {
-            // The square of a strain, of the part that the family does not see.
-            1e-2
-        };
-        for [net, gross] in moments(&simulation) {
-            assert!(net.abs() <= bound * gross, "moment {net} of {gross}");
-        }
-        for d in 0..D {
-            let (mut net, mut gross) = (0.0_f64, 0.0);
-            for (force, volume) in forces(&simulation).iter().zip(&simulation.model.volume) {
-                net += force[d] * volume;
-                gross += force[d].abs() * volume;
-            }
-            assert!(gross > 0.0 && net.abs() < 1e-12 * gross, "{net} of {gross}");
-        }
-    }
-    for_all_laws!(check);
+    for_all_laws!(check_momentum);
     for case in cases().filter(Case::can_break) {
         for alpha in [0.0, 0.25] {
             let deck = deck("3d", &case.table(), "linear", ", damage = 'brittle'");
             for damage in case.damages(alpha) {
-                simulate(&format!("{deck}{damage}"), check::<3>);
+                simulate(&format!("{deck}{damage}"), check_momentum::<3>);
             }
         }
     }
     for deck in two_blocks() {
-        simulate(&deck, check::<2>);
+        simulate(&deck, check_momentum::<2>);
     }
 }
 
@@ -294,51 +331,78 @@ fn two_blocks() -> Vec<String> {
     decks
 }
 
-#[test]
-fn the_force_is_the_slope_of_the_energy() {
-    fn energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
-        simulation.evaluate(Evolution::None);
-        let stored = simulation.forces.stored(&simulation.model);
-        let energy = stored.energy.iter().zip(&simulation.model.volume);
-        energy.map(|(density, volume)| density * volume).sum()
-    }
-    fn check<const D: usize>(mut simulation: Simulation<D>) {
-        displace(&mut simulation, wave);
-        let before = forces(&simulation);
-        for point in [0, 7, 31] {
-            let volume = simulation.model.volume[point];
-            for d in 0..D {
-                let force = before[point][d] * volume;
-                let place = simulation.fields.displacement[d][point];
-                let step = 2e-5;
-                simulation.fields.displacement[d][point] = place + step;
-                let above = energy(&mut simulation);
-                simulation.fields.displacement[d][point] = place - step;
-                let below = energy(&mut simulation);
-                simulation.fields.displacement[d][point] = place;
-                let slope = -(above - below) / (2.0 * step);
-                let scale = force.abs().max(1e-3);
-                let deck = &simulation.plan.source.text;
-                assert!(
-                    (force - slope).abs() < 1e-5 * scale,
-                    "{force} {slope}: {deck}"
-                );
-            }
+/// Strain energy of the whole body, J.
+fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
+    simulation.evaluate(Evolution::None);
+    let stored = simulation.forces.stored(&simulation.model);
+    let energy = stored.energy.iter().zip(&simulation.model.volume);
+    energy.map(|(density, volume)| density * volume).sum()
+}
+
+/// Forces are the slope of the strain energy.
+fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
+    displace(&mut simulation, wave);
+    let before = forces(&simulation);
+    for point in [0, 7, 31] {
+        let volume = simulation.model.volume[point];
+        for d in 0..D {
+            let force = before[point][d] * volume;
+            let place = simulation.fields.displacement[d][point];
+            let step = 2e-5;
+            simulation.fields.displacement[d][point] = place + step;
+            let above = strain_energy(&mut simulation);
+            simulation.fields.displacement[d][point] = place - step;
+            let below = strain_energy(&mut simulation);
+            simulation.fields.displacement[d][point] = place;
+            let slope = -(above - below) / (2.0 * step);
+            let scale = force.abs().max(1e-3);
+            let deck = &simulation.plan.source.text;
+            assert!(
+                (force - slope).abs() < 1e-5 * scale,
+                "{force} {slope}: {deck}"
+            );
         }
     }
-    for_all_laws!(check, Case::is_conservative);
+}
+
+#[test]
+fn the_force_is_the_slope_of_the_energy() {
+    for_all_laws!(check_slope, Case::is_conservative);
     // With bonds that the motion has broken.
     let breakable = |case: &Case| case.can_break() && case.is_conservative();
     for case in cases().filter(breakable) {
         let body = |dimension| deck(dimension, &case.table(), "exact", ", damage = 'brittle'");
         for damage in case.damages(0.25) {
             let breaking = |dimension| body(dimension) + &damage;
-            simulate(&breaking("plane-stress"), check::<2>);
-            simulate(&breaking("3d"), check::<3>);
+            simulate(&breaking("plane-stress"), check_slope::<2>);
+            simulate(&breaking("3d"), check_slope::<3>);
         }
     }
     for deck in two_blocks() {
-        simulate(&deck, check::<2>);
+        simulate(&deck, check_slope::<2>);
+    }
+}
+
+#[test]
+fn anisotropic_solids_keep_momentum_and_follow_their_energy() {
+    let plane = "c11 = 9, c12 = 3, c16 = 0.7, c22 = 6, c26 = -0.5, c66 = 2.5, angle_1 = 23";
+    let orthotropic = "youngs_modulus_x = 9, youngs_modulus_y = 6, youngs_modulus_z = 5, \
+        poisson_ratio_xy = 0.3, poisson_ratio_yz = 0.2, poisson_ratio_xz = 0.25, \
+        shear_modulus_xy = 2, shear_modulus_yz = 1.5, shear_modulus_xz = 3, \
+        angle_1 = 23, angle_2 = -40, angle_3 = 63";
+    for name in ["correspondence", "bond_associated_correspondence"] {
+        for correction in CORRECTIONS {
+            let deck = |dimension, solid| {
+                let law = format!("{name} = {{ density = 2, {solid} }}");
+                deck(dimension, &law, correction, "")
+            };
+            for dimension in ["plane-stress", "plane-strain"] {
+                simulate(&deck(dimension, plane), check_momentum::<2>);
+                simulate(&deck(dimension, plane), check_slope::<2>);
+            }
+            simulate(&deck("3d", orthotropic), check_momentum::<3>);
+            simulate(&deck("3d", orthotropic), check_slope::<3>);
+        }
     }
 }
 
@@ -581,12 +645,23 @@ fn compression_of_a_neighbour_bond_raises_the_threshold() {
 
 #[test]
 fn bonds_of_a_no_failure_zone_hold() {
-    let text = format!(
-        "{}set.left.where = 'x < 8'
-        damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = 0.25, no_failure = ['left'] }}",
-        deck("plane-stress", PMB, "none", ", damage = 'brittle'")
-    );
-    for ranks in [1, 3] {
+    let stretch = "critical_stretch = { critical_stretch = 0.05, alpha = 0.25";
+    let energy = "energy = { fracture_energy = 0.004, alpha = 0.25";
+    let solid = "{ density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    let [ordinary, correspondence] =
+        ["ordinary", "correspondence"].map(|law| format!("{law} = {solid}"));
+    let cases = [
+        (PMB, stretch),
+        (PMB, energy),
+        (&ordinary, energy),
+        (&correspondence, energy),
+    ];
+    for ((law, damage), ranks) in cases.iter().flat_map(|case| [(case, 1), (case, 3)]) {
+        let text = format!(
+            "{}set.left.where = 'x < 8'
+            damage.brittle.{damage}, no_failure = ['left'] }}",
+            deck("plane-stress", law, "none", ", damage = 'brittle'")
+        );
         let parts = simulate_on::<2, _>(ranks, &text, |mut simulation| {
             displace(&mut simulation, |x| x.map(|x| 2.0 * x));
             intact_bonds(&mut simulation)

@@ -29,30 +29,31 @@ pub struct BondEnergy {
     pub stretch: f64,
 }
 
-impl BondEnergy {
-    /// w_c (J/m⁶) from the fracture energy G0 (J/m²) and the horizon δ (m): 3-D 4G0/(πδ⁴), in the
-    /// plane 3G0/(2δ³h), 1-D 2G0/(δ²A).
-    pub fn from_energy(
-        dimension: Dimension,
-        calibration: Calibration,
-        energy: f64,
-        horizon: f64,
-    ) -> f64 {
+impl Calibration {
+    /// The share of the fracture energy that a unit area costs.
+    pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
-        let share = match (dimension, calibration) {
-            (Space, _) => 4.0 / (PI * horizon.powi(4)),
-            (PlaneStress { thickness } | PlaneStrain { thickness }, Calibration::Energy) => {
-                1.5 / (horizon.powi(3) * thickness)
-            }
-            (PlaneStress { thickness } | PlaneStrain { thickness }, _) => {
-                3.0 / (PI * horizon.powi(3) * thickness)
-            }
-            (Line { cross_section }, _) => 2.0 / (horizon.powi(2) * cross_section),
-        };
-        match calibration {
-            Calibration::Energy => share * energy,
-            Calibration::Willberg2022 => 0.5 * share * energy,
+        match (self, dimension) {
+            (Self::Energy, _) => 1.0,
+            (Self::Willberg2022, PlaneStress { .. } | PlaneStrain { .. }) => 1.0 / PI,
+            (Self::Willberg2022, Space | Line { .. }) => 0.5,
         }
+    }
+}
+
+impl BondEnergy {
+    /// w_c (J/m⁶) from what a unit area costs, G0 (J/m²), and the horizon δ (m): 3-D 4G0/(πδ⁴), in the
+    /// plane 3G0/(2δ³h), 1-D 2G0/(δ²A).
+    pub fn from_energy(dimension: Dimension, energy: f64, horizon: f64) -> f64 {
+        use Dimension::{Line, PlaneStrain, PlaneStress, Space};
+        energy
+            * match dimension {
+                Space => 4.0 / (PI * horizon.powi(4)),
+                PlaneStress { thickness } | PlaneStrain { thickness } => {
+                    1.5 / (horizon.powi(3) * thickness)
+                }
+                Line { cross_section } => 2.0 / (horizon.powi(2) * cross_section),
+            }
     }
 
     /// The threshold (J/m⁶) of a point whose intact bonds have this smallest stretch: that of a stretch
@@ -71,7 +72,7 @@ mod tests {
     /// All bonds across a unit area, by the midpoint rule, over the fracture energy.
     fn taken(dimension: Dimension) -> f64 {
         let (horizon, energy, cells) = (3e-3, 135.0, 1500_u32);
-        let critical = BondEnergy::from_energy(dimension, Calibration::Energy, energy, horizon);
+        let critical = BondEnergy::from_energy(dimension, energy, horizon);
         let step = horizon / f64::from(cells);
         let middle = |k: u32| (f64::from(k) + 0.5) * step;
         let mut sum = 0.0;
@@ -103,6 +104,17 @@ mod tests {
             let taken = taken(dimension);
             assert!((taken - 1.0).abs() < 2e-3, "{dimension:?}: {taken}");
         }
+    }
+
+    #[test]
+    fn as_printed_bonds_are_weaker() {
+        // Eq. 18, 3G0/(πδ³h), of a work without the ½ of eq. 16.
+        let (energy, horizon, thickness) = (135.0, 3e-3, 0.01);
+        let printed = 3.0 * energy / (PI * horizon * horizon * horizon * thickness);
+        let plane = Dimension::PlaneStress { thickness };
+        let share = Calibration::Willberg2022.share(plane);
+        let critical = BondEnergy::from_energy(plane, share * energy, horizon);
+        assert!((critical / (0.5 * printed) - 1.0).abs() < 1e-15);
     }
 
     #[test]

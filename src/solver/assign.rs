@@ -61,33 +61,42 @@ pub fn laws_are_possible(plan: &Plan) -> Result<()> {
     Ok(())
 }
 
+/// Whether bonds of a body with this damage break by their work. That of bond-based laws follows from the stretch,
+/// so that theirs break at the one that costs as much.
+fn breaks_by_work(body: &Body, damage: &plan::Damage) -> bool {
+    let bond_based = !body.material.law.declaration.any_poisson_ratio;
+    damage.rule != DamageRule::CriticalStretch && !bond_based
+}
+
 /// An error if the bonds of a body break by their energy and something else is in the way of it.
 fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
     };
-    let by_energy = |damage: &plan::Damage| damage.rule != DamageRule::CriticalStretch;
+    let by_work = breaks_by_work(body, damage);
     let error = |message: String| {
         let message = format!("[body.{}] damage: {message}", body.name);
         Err(plan.source.error(body.span.clone(), message))
     };
     let meets = |other: &Body| plan.interface.between(body, other) != InterfaceRule::None;
     let of_other_kind = plan.bodies.iter().find(|other| {
-        let differs = |other: &plan::Damage| by_energy(other) != by_energy(damage);
+        let differs = |damage| breaks_by_work(other, damage) != by_work;
         other.damage.as_ref().is_some_and(differs) && meets(other)
     });
     if let Some(other) = of_other_kind {
         return error(format!(
-            "its bonds break by another rule than those of body `{}`, to which it may be bonded; give \
-             both the same rule, or set `[interface] rule = \"none\"`",
+            "its bonds break by another rule than those of body `{}`, to which it may be bonded (by work, as \
+             `energy` has it for laws that are not bond-based, or by stretch); give both the same rule, or set \
+             `[interface] rule = \"none\"`",
             other.name
         ));
     }
-    if !by_energy(damage) {
-        return Ok(());
-    }
-    if matches!(damage.toughness, Toughness::CriticalStretch(_)) {
+    let by_energy = damage.rule != DamageRule::CriticalStretch;
+    if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {
         return error("a critical stretch is no measure of energy".to_owned());
+    }
+    if !by_work {
+        return Ok(());
     }
     let block = Block::unrefined(body);
     let influenced = build(plan, body, constants(plan, &block, &block)).influence;
@@ -181,17 +190,19 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
             }));
         }
     };
-    let alpha = damage.alpha;
-    Some(match damage.rule {
-        DamageRule::CriticalStretch => DamageLaw::CriticalStretch(CriticalStretch {
-            critical: stretch(energy),
+    let energy = match damage.rule {
+        DamageRule::CriticalStretch => energy,
+        DamageRule::Energy(calibration) => energy * calibration.share(dimension),
+    };
+    let (critical, alpha) = (stretch(energy), damage.alpha);
+    Some(if breaks_by_work(body, damage) {
+        DamageLaw::BondEnergy(BondEnergy {
+            critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
             alpha,
-        }),
-        DamageRule::Energy(calibration) => DamageLaw::BondEnergy(BondEnergy {
-            critical: BondEnergy::from_energy(dimension, calibration, energy, constants.horizon),
-            alpha,
-            stretch: stretch(energy),
-        }),
+            stretch: critical,
+        })
+    } else {
+        DamageLaw::CriticalStretch(CriticalStretch { critical, alpha })
     })
 }
 

@@ -95,11 +95,13 @@ impl Declared for Correspondence {
 fn invariants(values: &Values) -> Invariants {
     let stress = of_stress(values);
     let yields = values.get(plastic::YIELD_STRESS.name).is_some();
+    // The control of Wan et al. has axes of its own where a family is not whole. They do not turn with the body, and it
+    // turns such points, by the square of z.
+    let has_axes = values.word(control::KIND.name) == "wan2019";
     Invariants {
         conservative: stress.conservative && !yields,
-        // The control of Wan et al. turns points whose family is not whole, by the square of z.
-        angular_momentum: values.word(control::KIND.name) != "wan2019",
-        ..stress
+        objective: stress.objective && !has_axes,
+        angular_momentum: stress.angular_momentum && !has_axes,
     }
 }
 

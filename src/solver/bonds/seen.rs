@@ -128,21 +128,26 @@ impl<const D: usize> Forces<D> {
             let entry = |k: usize| columns[k][point];
             let shape: Vec<f64> = (0..2 * D).map(entry).collect();
             let moved = SMatrix::from_fn(|a, b| entry(2 * D + D * a + b));
-            let inverse = ShapeTensor::new(&shape).inverse();
+            let inverse = if self.is_singular(model, point) {
+                None
+            } else {
+                ShapeTensor::new(&shape).inverse()
+            };
             let change = inverse.map(|inverse| moved * inverse);
             SMatrix::identity() + change.unwrap_or_else(SMatrix::zeros)
         };
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// 1 for each owned point that has too few bonds left for its law, else 0.
+    /// 1 for each owned point whose bonds left are too few for its law, or too stiff, else 0.
     pub fn singular(&self, model: &Model<D>) -> Vec<f64> {
-        let is_singular = |point: usize| {
-            let law = &self.blocks[usize::from(model.block[point])].law;
-            let singular = Law::<D>::is_singular(law, &self.numbers.of(point));
-            f64::from(u8::from(singular))
-        };
-        (0..model.owned()).map(is_singular).collect()
+        let flag = |point| f64::from(u8::from(self.is_singular(model, point)));
+        (0..model.owned()).map(flag).collect()
+    }
+
+    fn is_singular(&self, model: &Model<D>, point: usize) -> bool {
+        let law = &self.blocks[usize::from(model.block[point])].law;
+        Law::<D>::is_singular(law, &self.numbers.of(point))
     }
 
     /// Whether points of any law can be [singular](Self::singular); the same on all ranks.
