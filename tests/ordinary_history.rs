@@ -28,28 +28,42 @@ fn deck(dimension: &str, law: &str) -> String {
     )
 }
 
-/// Shears the body to γ in a step (s).
-fn shear<const D: usize>(simulation: &mut Simulation<D>, gamma: f64, step: f64) {
+/// Strains the body in a step (s); `over` has the displacement along x by strain.
+fn strain<const D: usize>(
+    simulation: &mut Simulation<D>,
+    strain: f64,
+    over: fn([f64; 3]) -> f64,
+    step: f64,
+) {
     for point in 0..simulation.model.volume.len() {
-        let y = simulation.model.position(point)[1];
-        simulation.fields.displacement[0][point] = gamma * y;
+        let place = simulation.model.position(point);
+        simulation.fields.displacement[0][point] = strain * over(place);
     }
     simulation.evaluate(Evolution::Step(step));
 }
 
+/// Shears the body to γ in a step (s).
+fn shear<const D: usize>(simulation: &mut Simulation<D>, gamma: f64, step: f64) {
+    strain(simulation, gamma, |[_, y, _]| y, step);
+}
+
 /// The shear stress (Pa) of the central point, its strain energy density and what it has dissipated, J/m³.
 fn centre<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 3] {
+    let ([.., xy, _, _], energies) = whole_centre(simulation);
+    [xy, energies[0], energies[1]]
+}
+
+/// The stress (Pa) of the central point as xx, yy, zz, xy, yz, xz; its strain energy density and what it has
+/// dissipated, J/m³.
+fn whole_centre<const D: usize>(simulation: &mut Simulation<D>) -> ([f64; 6], [f64; 2]) {
     let model = &simulation.model;
     let at_origin = |point: &usize| model.position(*point).iter().all(|x| x.abs() < 1e-9);
     let point = (0..model.owned()).find(at_origin).unwrap();
     let snapshot = Snapshot::new(simulation);
     let stress = snapshot.field(simulation, Field::Stress);
     let stored = &snapshot.stored;
-    [
-        stress[6 * point + 3],
-        stored.energy[point],
-        stored.dissipated[point],
-    ]
+    let stress = std::array::from_fn(|k| stress[6 * point + k]);
+    (stress, [stored.energy[point], stored.dissipated[point]])
 }
 
 const YOUNG: f64 = 5.0;
@@ -122,32 +136,47 @@ fn a_steady_shear_has_the_closed_form() {
     });
 }
 
+/// A way to strain a body, and what stands for it in the deviator: a stress that is elastic, perfectly plastic.
+struct Way {
+    /// Displacement along x by strain.
+    over: fn([f64; 3]) -> f64,
+    /// The stress that yields.
+    stress: fn(&[f64; 6]) -> f64,
+    /// It by the strain, Pa.
+    modulus: f64,
+    /// It by the yield stress where it yields.
+    limit: f64,
+    /// Power by it and the rate of its plastic strain.
+    share: f64,
+}
+
 #[test]
-fn a_cycle_of_shear_yields_at_the_yield_stress_and_dissipates_its_area() {
-    fn check<const D: usize>(mut simulation: Simulation<D>, strength: f64, bound: f64) {
-        // In pure shear von Mises' stress is √3 τ.
-        let limit = strength / 3_f64.sqrt();
-        // With the modulus of the lattice, which is the solid's to one per cent.
-        shear(&mut simulation, 1e-3 * limit, 0.0);
-        let modulus = centre(&mut simulation)[0] / (1e-3 * limit);
-        assert!((modulus / SHEAR - 1.0).abs() < 0.01, "{modulus}");
+fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
+    fn check<const D: usize>(mut simulation: Simulation<D>, way: &Way, strength: f64, bound: f64) {
+        let limit = strength * way.limit;
+        // With the modulus of the lattice, which is the solid's to some per cent.
+        strain(&mut simulation, 1e-3 * limit, way.over, 0.0);
+        let modulus = (way.stress)(&whole_centre(&mut simulation).0) / (1e-3 * limit);
+        let error = (modulus / way.modulus - 1.0).abs();
+        assert!(error < 0.01, "{modulus} for {}", way.modulus);
         let yields = limit / modulus;
         let (mut plastic, mut wanted, mut before) = (0.0_f64, 0.0, 0.0);
-        let mut gamma = 0.0;
+        let mut now = 0.0;
         for target in [3.0, -2.0, 2.5] {
-            while gamma != target {
-                let left: f64 = target - gamma;
-                gamma += left.clamp(-0.1, 0.1);
-                shear(&mut simulation, gamma * yields, 0.0);
+            while now != target {
+                let left: f64 = target - now;
+                now += left.clamp(-0.1, 0.1);
+                strain(&mut simulation, now * yields, way.over, 0.0);
                 // Elastic, perfectly plastic.
-                let trial = (gamma - plastic).clamp(-1.0, 1.0);
-                let change = gamma - trial - plastic;
+                let trial = (now - plastic).clamp(-1.0, 1.0);
+                let change = now - trial - plastic;
                 plastic += change;
-                wanted += (change * trial).abs() * yields * limit;
-                let [stress, _, dissipated] = centre(&mut simulation);
+                wanted += way.share * (change * trial).abs() * yields * limit;
+                let (stress, [_, dissipated]) = whole_centre(&mut simulation);
+                let stress = (way.stress)(&stress);
                 let error = (stress / limit - trial).abs();
-                assert!(error < bound, "{gamma}: {stress} of {limit}, {trial}");
-                assert!(dissipated >= before, "{gamma}: {dissipated} {before}");
+                assert!(error < bound, "{now}: {stress} of {limit}, {trial}");
+                assert!(dissipated >= before, "{now}: {dissipated} {before}");
                 before = dissipated;
             }
             assert!(
@@ -156,6 +185,31 @@ fn a_cycle_of_shear_yields_at_the_yield_stress_and_dissipates_its_area() {
             );
         }
     }
+    // In pure shear von Mises' stress is √3 τ.
+    let of_shear = 1.0 / 3_f64.sqrt();
+    let shear = Way {
+        over: |[_, y, _]| y,
+        stress: |stress| stress[3],
+        modulus: SHEAR,
+        limit: of_shear,
+        share: 1.0,
+    };
+    // The plane's deviator is a pure shear, at 45°.
+    let pull_in_the_plane = Way {
+        over: |[x, ..]| x,
+        stress: |stress| 0.5 * (stress[0] - stress[1]),
+        modulus: SHEAR,
+        limit: of_shear,
+        share: 1.0,
+    };
+    // (σ_xx − σ_yy) ė_xx of plastic strain, and σ_xx − σ_yy = 2G (ε − 3/2 e_xx).
+    let pull = Way {
+        over: |[x, ..]| x,
+        stress: |stress| stress[0] - stress[1],
+        modulus: 2.0 * SHEAR,
+        limit: 1.0,
+        share: 2.0 / 3.0,
+    };
     let strength = 1e-4;
     let law = |more: &str| {
         format!(
@@ -166,8 +220,13 @@ fn a_cycle_of_shear_yields_at_the_yield_stress_and_dissipates_its_area() {
     // The weighted volume of the lattice is that of a ball to some per cent only.
     for (more, bound) in [("", 0.01), (", calibration = 'continuum'", 0.05)] {
         let law = law(more);
-        simulate::<2, _>(&deck("plane-strain", &law), |s| check(s, strength, bound));
-        simulate::<2, _>(&deck("plane-stress", &law), |s| check(s, strength, bound));
-        simulate::<3, _>(&deck("3d", &law), |s| check(s, strength, bound));
+        for way in [&shear, &pull_in_the_plane] {
+            for dimension in ["plane-strain", "plane-stress"] {
+                simulate::<2, _>(&deck(dimension, &law), |s| check(s, way, strength, bound));
+            }
+        }
+        for way in [&shear, &pull] {
+            simulate::<3, _>(&deck("3d", &law), |s| check(s, way, strength, bound));
+        }
     }
 }
