@@ -53,7 +53,7 @@ fn laws(dimension: &str) -> Vec<(String, Matrix6<f64>)> {
         "youngs_modulus = 5, poisson_ratio = 0.3".to_owned(),
         isotropic,
     )];
-    let (mut full, angles, there) = if dimension == "3d" {
+    let (full, angles, there) = if dimension == "3d" {
         (
             Matrix6::new(
                 9.0, 3.0, 2.0, 0.2, 0.1, 0.3, 3.0, 8.0, 2.5, 0.1, 0.4, 0.2, 2.0, 2.5, 7.0, 0.3,
@@ -64,16 +64,13 @@ fn laws(dimension: &str) -> Vec<(String, Matrix6<f64>)> {
             vec![0, 1, 2, 3, 4, 5],
         )
     } else {
-        (Matrix6::zeros(), [0.4, 0.0, 0.0], vec![0, 1, 5])
-    };
-    if dimension != "3d" {
         let plane = Matrix3::new(9.0, 3.0, 0.7, 3.0, 6.0, -0.5, 0.7, -0.5, 2.5);
-        for (k, a) in there.iter().enumerate() {
-            for (l, b) in there.iter().enumerate() {
-                full[(*a, *b)] = plane[(k, l)];
-            }
-        }
-    }
+        let there = vec![0, 1, 5];
+        let place = |a: usize| there.iter().position(|b| *b == a);
+        let entry = |a, b| Some(plane[(place(a)?, place(b)?)]);
+        let full = Matrix6::from_fn(|a, b| entry(a, b).unwrap_or(0.0));
+        (full, [0.4, 0.0, 0.0], there)
+    };
     let pairs = there
         .iter()
         .flat_map(|a| there.iter().map(move |b| (*a, *b)));
@@ -405,14 +402,15 @@ fn a_plate_that_is_torn_keeps_its_energy_at_the_default_step() {
         format!("bond_associated_correspondence = {{ {glass} }}"),
     ] {
         let (energies, broken) = torn(&law);
-        // One row through is some 300 bonds and 5.4 J.
         assert!(broken > 2000, "{law}: {broken}");
+        // One crack through costs 5.4 J at 0.8 of G0; these branch. What runs away is wrong by powers of ten.
         assert!(
             (5.4..15.0).contains(&energies.fracture),
             "{law}: {energies:?}"
         );
         let error = energies.error.abs() / energies.fracture;
-        assert!(error < 0.02, "{law}: {error}");
+        // 0.1 to 0.5 %: of the second order in the step.
+        assert!(error < 0.01, "{law}: {error}");
     }
 }
 

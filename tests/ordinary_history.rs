@@ -154,7 +154,7 @@ struct Way {
 fn a_cycle_yields_at_the_yield_stress_and_dissipates_its_area() {
     fn check<const D: usize>(mut simulation: Simulation<D>, way: &Way, strength: f64, bound: f64) {
         let limit = strength * way.limit;
-        // With the modulus of the lattice, which is the solid's to some per cent.
+        // With the modulus of the lattice, which is the solid's to one per cent.
         strain(&mut simulation, 1e-3 * limit, way.over, 0.0);
         let modulus = (way.stress)(&whole_centre(&mut simulation).0) / (1e-3 * limit);
         let error = (modulus / way.modulus - 1.0).abs();
