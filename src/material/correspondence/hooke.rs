@@ -4,7 +4,7 @@
 //! are used of it: in plane stress the matrix is that of a thin sheet, in plane strain part of that of
 //! the solid.
 
-use nalgebra::{Matrix3, Matrix6, Rotation3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix6, Rotation3, SMatrix, Vector3};
 
 use super::super::{Given, Key, Kind, LawFault, Values};
 use super::tensor::{Number, Tensor};
@@ -189,7 +189,13 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
             let message = "in the plane Hooke's matrix has c11, c12, c16, c22, c26 and c66";
             return fault_at(key, message);
         }
-        return indefinite(&unturned(values, dimension)?, dimension, first);
+        // A diagonal entry that is not above 0 is to blame by itself.
+        let to_blame = |name: &&'static str| {
+            let of_diagonal = (0..6).any(|k| FULL[k][k] == *name);
+            of_diagonal && values.get(name).is_some() && values.number(name) <= 0.0
+        };
+        let at = full_entries().find(to_blame).unwrap_or(first);
+        return indefinite(&unturned(values, dimension)?, dimension, at);
     }
     let first = orthotropic?;
     let wanted: &[&'static str] = match dimension {
@@ -209,34 +215,48 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     indefinite(&unturned(values, dimension)?, dimension, first)
 }
 
-/// A matrix that some strain has no energy in.
-fn indefinite(matrix: &Matrix6<f64>, dimension: Dimension, key: &'static str) -> Option<LawFault> {
-    let smallest = eigenvalues(matrix, dimension)
-        .into_iter()
-        .fold(f64::INFINITY, f64::min);
-    // A NaN is not above 0 either.
-    if smallest > 0.0 {
+/// A matrix in which some strain has no energy.
+fn indefinite(
+    matrix: &Matrix6<f64>,
+    dimension: Dimension,
+    first: &'static str,
+) -> Option<LawFault> {
+    if matrix.iter().any(|entry| !entry.is_finite()) {
+        let message =
+            "these constants are of no solid: Hooke's matrix has entries that are not finite";
+        return fault_at(first, message);
+    }
+    let (eigenvalue, strain) = softest(matrix, dimension);
+    if eigenvalue > 0.0 {
         return None;
     }
     fault_at(
-        key,
+        first,
         format!(
-            "these constants are of no solid: the smallest eigenvalue of Hooke's matrix is {smallest:.4e} \
-             Pa, and all must be above 0"
+            "these constants are of no solid: Hooke's matrix has the eigenvalue {eigenvalue:.4e} Pa, of the strain \
+             {strain}, and all must be above 0"
         ),
     )
 }
 
-/// The eigenvalues of C : E = λ E, Pa.
-fn eigenvalues(matrix: &Matrix6<f64>, dimension: Dimension) -> Vec<f64> {
-    // Kelvin's notation, in which the length of a tensor is that of its vector.
-    let factor = |k: usize| if k < 3 { 1.0 } else { 2_f64.sqrt() };
-    let kelvin = Matrix6::from_fn(|a, b| matrix[(a, b)] * factor(a) * factor(b));
-    if matches!(dimension, Dimension::Space) {
-        return kelvin.symmetric_eigenvalues().iter().copied().collect();
-    }
-    let plane = Matrix3::from_fn(|a, b| kelvin[(PLANE[a], PLANE[b])]);
-    plane.symmetric_eigenvalues().iter().copied().collect()
+/// The smallest eigenvalue (Pa) of the matrix as decks have it, and its strain in words.
+fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
+    let used: Vec<usize> = match dimension {
+        Dimension::Space => (0..6).collect(),
+        _ => PLANE.to_vec(),
+    };
+    let written = DMatrix::from_fn(used.len(), used.len(), |a, b| matrix[(used[a], used[b])]);
+    let all = written.symmetric_eigen();
+    let softest = all.eigenvalues.imin();
+    let strain = all.eigenvectors.column(softest);
+    let largest = strain[strain.iamax()];
+    let name = |component: usize| ["xx", "yy", "zz", "yz", "xz", "xy"][component];
+    let parts = used.iter().zip(strain.iter());
+    let parts = parts.filter(|(_, part)| part.abs() > 0.01 * largest.abs());
+    let parts: Vec<String> = parts
+        .map(|(component, part)| format!("{:.2} {}", part / largest, name(*component)))
+        .collect();
+    (all.eigenvalues[softest], parts.join(", "))
 }
 
 /// The matrix along the material's own axes, where it is not isotropic.
@@ -346,8 +366,13 @@ impl Hooke {
 
     /// The largest eigenvalue of C : E = λ E, Pa.
     pub fn largest(&self) -> f64 {
-        eigenvalues(&self.0, Dimension::Space)
-            .into_iter()
+        // Kelvin's notation, in which the length of a tensor is that of its vector.
+        let factor = |k: usize| if k < 3 { 1.0 } else { 2_f64.sqrt() };
+        let kelvin = Matrix6::from_fn(|a, b| self.0[(a, b)] * factor(a) * factor(b));
+        kelvin
+            .symmetric_eigenvalues()
+            .iter()
+            .copied()
             .fold(0.0, f64::max)
     }
 }
