@@ -359,6 +359,21 @@ fn blocks_of_bond_associated_correspondence() {
 }
 
 #[test]
+fn blocks_of_ordinary_laws_whose_bonds_remember() {
+    for (name, more) in [
+        ("plastic", "yield_stress = 0.05"),
+        ("viscoelastic", "relaxing_share = 0.6, relaxation_time = 3"),
+    ] {
+        let law = format!(
+            "ordinary_{name} = {{ density = 2, youngs_modulus = 5, poisson_ratio = 0.3, {more} }}"
+        );
+        let rule = "brittle.energy]\ntension_only = false";
+        let deck = with_one_law(&law).replace("brittle.critical_stretch]", rule);
+        same_with_either_family(&format!("ordinary-{name}"), &deck);
+    }
+}
+
+#[test]
 fn blocks_of_a_law_whose_points_flow() {
     let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, \
                yield_stress = 0.05, hardening_modulus = 0.2 }";

@@ -51,14 +51,18 @@ impl Case {
     fn damages(&self, alpha: f64) -> Vec<String> {
         let stretch = self.law.critical_stretch.map(|_| damage(alpha));
         // About the energy of a critical stretch of 0.02.
-        let energy =
-            format!("damage.brittle.energy = {{ fracture_energy = 0.004, alpha = {alpha} }}");
-        let energy = self.law.breaks_by_energy.then_some(energy);
+        let energy = |fracture_energy: f64, more| {
+            let text = format!("fracture_energy = {fracture_energy}, alpha = {alpha}{more}");
+            format!("damage.brittle.energy = {{ {text} }}")
+        };
         // With an influence only where all volumes are whole.
         let influenced = ["influence", "diehl2016"];
         let influenced = influenced.iter().any(|word| self.example.contains(word));
-        let energy = energy.filter(|_| !influenced);
-        stretch.into_iter().chain(energy).collect()
+        let by_energy = self.law.breaks_by_energy && !influenced;
+        let pulled = by_energy.then(|| energy(0.004, ""));
+        let either = by_energy && self.law.any_poisson_ratio;
+        let either = either.then(|| energy(0.04, ", tension_only = false"));
+        stretch.into_iter().chain(pulled).chain(either).collect()
     }
 
     fn invariants(&self) -> Invariants {
@@ -486,14 +490,18 @@ const STEPS: usize = 8;
 #[test]
 fn the_bits_are_the_same_on_any_ranks_and_after_a_restart() {
     for case in cases() {
-        let damage = case.damages(0.25).into_iter().next();
-        let broken = if damage.is_some() {
-            ", damage = 'brittle'"
-        } else {
+        let mut damages = case.damages(0.25);
+        let broken = if damages.is_empty() {
+            damages.push(String::new());
             ""
+        } else {
+            ", damage = 'brittle'"
         };
-        let damage = damage.unwrap_or_default();
-        for family in ["lattice", "list"] {
+        let families = ["lattice", "list"];
+        for (damage, family) in damages
+            .iter()
+            .flat_map(|it| families.map(|family| (it, family)))
+        {
             let shaken = |dimension, velocity: &str| {
                 let body = deck(dimension, &case.table(), "exact", broken);
                 let body = body.replace(

@@ -94,6 +94,9 @@ fn look<const D: usize>(plan: &Plan, asked: &Asked) -> Result<Report> {
         say::body(&mut report, plan, body);
         say::figures(&mut report, body, &survey.bodies[index], D);
         say::interior(&mut report, plan, interiors[index].as_ref());
+        if asked.trial {
+            say::parting(&mut report, plan, index);
+        }
     }
     say::joints(&mut report, plan, &survey);
     say::places(&mut report, plan, &survey, D);

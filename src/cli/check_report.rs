@@ -1,14 +1,15 @@
 //! The parts of what `fissure check` prints.
 
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use fissure::damage::DamageLaw;
 use fissure::deck::Plan;
-use fissure::deck::plan::{Block, Body, PointSource};
+use fissure::deck::plan::{Block, Body, DamageRule, PointSource, Sense};
 use fissure::dimension::Dimension;
 use fissure::solver::assign::block_laws;
 use fissure::solver::motion::Clock;
-use fissure::survey::{BodyFigures, Cost, Interior, Survey};
+use fissure::survey::{BodyFigures, Cost, Interior, Survey, parting_cost};
 
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
@@ -127,6 +128,25 @@ pub fn interior(report: &mut Report, plan: &Plan, interior: Option<&Interior>) {
                 share(diagonals, shear)
             ),
         );
+    }
+}
+
+/// What it costs to part a body whose bonds break by their work.
+pub fn parting(report: &mut Report, plan: &Plan, body: usize) {
+    let Some(damage) = &plan.bodies[body].damage else {
+        return;
+    };
+    let DamageRule::Energy { sense, .. } = damage.rule else {
+        return;
+    };
+    let mut ways = vec![("cost of opening", 0.0)];
+    if sense == Sense::Either && plan.dimension.count() > 1 {
+        ways.push(("cost of sliding", FRAC_PI_2));
+    }
+    for (name, angle) in ways {
+        if let Some(cost) = parting_cost(plan, body, angle) {
+            report.line(name, format_args!("{cost:.3} of the fracture energy"));
+        }
     }
 }
 

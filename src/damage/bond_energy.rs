@@ -1,4 +1,4 @@
-//! A bond breaks for good when it is pulled and the work of its force states reaches w_c.
+//! A bond breaks for good when the work of its force states reaches w_c, by default only when it is pulled.
 //!
 //! Foster, Silling & Chen 2011; Willberg, Hesse & Heinecke 2022, eq. 16–18. The work that a linear bond
 //! has taken is w = ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η. All bonds across a unit area take G0 together: in the plane
@@ -6,6 +6,7 @@
 
 use std::f64::consts::PI;
 
+use super::Sense;
 use crate::dimension::Dimension;
 
 /// How w_c follows from the fracture energy.
@@ -27,6 +28,8 @@ pub struct BondEnergy {
     pub alpha: f64,
     /// The critical stretch s0 that belongs to the same fracture energy, which α acts on.
     pub stretch: f64,
+    /// Whether pressed bonds break.
+    pub sense: Sense,
 }
 
 impl Calibration {
@@ -123,6 +126,7 @@ mod tests {
             critical: 4.0,
             alpha: 0.5,
             stretch: 0.02,
+            sense: Sense::Pulled,
         };
         // s0 − α s_min = 0.03 is 1.5 s0.
         assert!((law.threshold(-0.02) - 9.0).abs() < 1e-12);

@@ -15,11 +15,19 @@ pub enum Criterion {
     /// At the smaller of the threshold stretches of the two points; the critical stretches of their
     /// blocks are the part of it that a law may scale, 0 where a block has none.
     Thresholds([f64; 2]),
-    /// Pulled, when the work of the force states reaches this much, J/m⁶.
-    Work(f64),
-    /// Pulled, when the work of the force states reaches the smaller of the thresholds of the two
-    /// points, J/m⁶.
-    WorkThresholds,
+    /// When the work of the force states reaches this much, J/m⁶.
+    Work(f64, Sense),
+    /// When the work of the force states reaches the smaller of the thresholds of the two points, J/m⁶.
+    WorkThresholds(Sense),
+}
+
+/// Which bonds break by their work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sense {
+    /// Those that are longer than in the undeformed body.
+    Pulled,
+    /// Pressed ones as well.
+    Either,
 }
 
 /// The own and the far ends of eight bonds: their laws and what they know.
@@ -37,13 +45,13 @@ impl Criterion {
     /// Whether it depends on the thresholds of the ends.
     #[inline(always)]
     pub fn reads_thresholds(self) -> bool {
-        matches!(self, Self::Thresholds(_) | Self::WorkThresholds)
+        matches!(self, Self::Thresholds(_) | Self::WorkThresholds(_))
     }
 
     /// Whether it asks for the work of the force states.
     #[inline(always)]
     pub fn reads_work(self) -> bool {
-        matches!(self, Self::Work(_) | Self::WorkThresholds)
+        matches!(self, Self::Work(..) | Self::WorkThresholds(_))
     }
 
     /// The |x| of [`crate::material::bond`] beyond which bonds must be marked; none below breaks by
@@ -63,7 +71,7 @@ impl Criterion {
         match self {
             Self::Never => true,
             Self::Stretch(_) => !scaled,
-            Self::Thresholds(_) | Self::Work(_) | Self::WorkThresholds => false,
+            Self::Thresholds(_) | Self::Work(..) | Self::WorkThresholds(_) => false,
         }
     }
 
@@ -83,8 +91,12 @@ impl Criterion {
             Self::Stretch(critical) if !L::SCALED => {
                 simd.at_least(bond.growth, Lanes::splat(growth_of(critical)))
             }
-            Self::Work(_) | Self::WorkThresholds => {
-                simd.at_least(work, self.threshold(ends)) & bond.growth.above(0.0)
+            Self::Work(_, sense) | Self::WorkThresholds(sense) => {
+                let spent = simd.at_least(work, self.threshold(ends));
+                match sense {
+                    Sense::Pulled => spent & bond.growth.above(0.0),
+                    Sense::Either => spent,
+                }
             }
             Self::Stretch(_) | Self::Thresholds(_) => {
                 let threshold = self.threshold(ends);
@@ -104,7 +116,7 @@ impl Criterion {
         match self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) | Self::Work(critical) => Lanes::splat(critical),
+            Self::Stretch(critical) | Self::Work(critical, _) => Lanes::splat(critical),
             Self::Thresholds(critical) => {
                 let [mut here, mut there] = *ends.thresholds;
                 if L::SCALED {
@@ -114,7 +126,7 @@ impl Criterion {
                 }
                 here.min(there)
             }
-            Self::WorkThresholds => ends.thresholds[0].min(ends.thresholds[1]),
+            Self::WorkThresholds(_) => ends.thresholds[0].min(ends.thresholds[1]),
         }
     }
 

@@ -4,7 +4,7 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Text};
 use super::number::Number;
-use super::plan::{self, Calibration, DamageRule, Toughness};
+use super::plan::{self, Calibration, DamageRule, Sense, Toughness};
 use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::error::Result;
@@ -48,8 +48,13 @@ pub fn damage(
                 grammar::Calibration::Energy => Calibration::Energy,
                 grammar::Calibration::Willberg2022 => Calibration::Willberg2022,
             };
+            let sense = if law.tension_only {
+                Sense::Pulled
+            } else {
+                Sense::Either
+            };
             Ok(plan::Damage {
-                rule: DamageRule::Energy(calibration),
+                rule: DamageRule::Energy { calibration, sense },
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,

@@ -2,7 +2,7 @@
 
 use super::expression::Expression;
 use super::number::shown;
-use super::plan::{Damage, DamageRule};
+use super::plan::{Damage, DamageRule, Sense};
 use super::source::suggestion;
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
@@ -94,7 +94,16 @@ impl Law {
             DamageRule::CriticalStretch => {
                 (|law| law.critical_stretch.is_some(), "by their stretch")
             }
-            DamageRule::Energy(_) => (|law| law.breaks_by_energy, "by their energy"),
+            DamageRule::Energy { sense, .. } => {
+                if sense == Sense::Either && !self.declaration.any_poisson_ratio {
+                    return Some(format!(
+                        "bonds of the bond-based law `{}` break by their stretch, of the same fracture energy: \
+                         `tension_only = false` is for laws with any Poisson's ratio",
+                        self.declaration.name
+                    ));
+                }
+                (|law| law.breaks_by_energy, "by their energy")
+            }
         };
         if can(self.declaration) {
             return None;

@@ -1,6 +1,6 @@
 //! From the plan to the law, the failure rule and the weights of every family.
 
-use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw};
+use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, Sense};
 use crate::deck::plan::{
     self, Block, Body, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
 };
@@ -192,17 +192,19 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
     };
     let energy = match damage.rule {
         DamageRule::CriticalStretch => energy,
-        DamageRule::Energy(calibration) => energy * calibration.share(dimension),
+        DamageRule::Energy { calibration, .. } => energy * calibration.share(dimension),
     };
     let (critical, alpha) = (stretch(energy), damage.alpha);
-    Some(if breaks_by_work(body, damage) {
-        DamageLaw::BondEnergy(BondEnergy {
-            critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
-            alpha,
-            stretch: critical,
-        })
-    } else {
-        DamageLaw::CriticalStretch(CriticalStretch { critical, alpha })
+    Some(match damage.rule {
+        DamageRule::Energy { sense, .. } if breaks_by_work(body, damage) => {
+            DamageLaw::BondEnergy(BondEnergy {
+                critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
+                alpha,
+                stretch: critical,
+                sense,
+            })
+        }
+        _ => DamageLaw::CriticalStretch(CriticalStretch { critical, alpha }),
     })
 }
 
@@ -214,12 +216,22 @@ fn criterion(blocks: &[BlockLaws], ends: [usize; 2], per_point: bool) -> Criteri
     let Some(smallest) = critical.into_iter().flatten().reduce(f64::min) else {
         return Criterion::Never;
     };
-    let by_work = |law: DamageLaw| matches!(law, DamageLaw::BondEnergy(_));
-    match (laws.into_iter().flatten().any(by_work), per_point) {
-        (true, true) => Criterion::WorkThresholds,
-        (true, false) => Criterion::Work(smallest),
-        (false, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
-        (false, false) => Criterion::Stretch(smallest),
+    let sense = |law: DamageLaw| match law {
+        DamageLaw::BondEnergy(law) => Some(law.sense),
+        DamageLaw::CriticalStretch(_) => None,
+    };
+    let senses: Vec<Sense> = laws.into_iter().flatten().filter_map(sense).collect();
+    // A pressed bond breaks where the laws of both ends say so.
+    let sense = if senses.contains(&Sense::Pulled) {
+        Sense::Pulled
+    } else {
+        Sense::Either
+    };
+    match (senses.is_empty(), per_point) {
+        (false, true) => Criterion::WorkThresholds(sense),
+        (false, false) => Criterion::Work(smallest, sense),
+        (true, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
+        (true, false) => Criterion::Stretch(smallest),
     }
 }
 

@@ -1,16 +1,15 @@
 //! What a body is like far from its surface: a small block of its lattice, bonded and stretched.
 
 use crate::comm::threads;
-use crate::deck::plan::{
-    History, Interface, InterfaceRule, Method, Plan, PointSource, Selector, Set, Shape, StepRule,
-    Time,
-};
+use crate::deck::plan::{Plan, PointSource, Shape};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 use crate::solver::bonds::Evolution;
 use crate::solver::observers::nearest;
+
+use super::alone::{alone, fill};
 
 /// Blocks with more bonds than this are not made.
 const MOST_BONDS: f64 = 2e7;
@@ -47,61 +46,16 @@ pub fn interior(plan: &Plan, body: usize) -> Option<Interior> {
 
 /// The plan of a block that has one point with all of its neighbours.
 fn block(plan: &Plan, body: usize) -> Option<Plan> {
-    let mut alone = plan.bodies[body].clone();
-    let PointSource::Lattice { spacing, .. } = alone.points else {
-        return None;
-    };
-    alone.damage = None;
-    let mut block = Plan {
-        bodies: vec![alone],
-        refinement: None,
-        interface: Interface {
-            rule: InterfaceRule::Own,
-            pairs: Vec::new(),
-        },
-        sets: vec![Set {
-            name: "all".to_owned(),
-            span: 0..0,
-            selector: Selector::All,
-        }],
-        cracks: Vec::new(),
-        initials: Vec::new(),
-        conditions: Vec::new(),
-        history: History {
-            reactions: Vec::new(),
-            support_forces: Vec::new(),
-            probes: Vec::new(),
-            fronts: Vec::new(),
-            cracks: Vec::new(),
-            tips: Vec::new(),
-            ..plan.history.clone()
-        },
-        time: Time {
-            end: 1.0,
-            step: StepRule::Fixed(1.0),
-            method: Method::Explicit,
-            density_scale: 1.0,
-            adaptive: None,
-        },
-        stages: Vec::new(),
-        ..plan.clone()
-    };
-    let dimension = plan.dimension.count();
+    let (mut block, spacing) = alone(plan, body)?;
+    block.bodies[0].damage = None;
     let cutoff = cutoffs(&block)[0];
     let (mut upper, mut bonds) = ([0.0; 3], 1.0);
-    for k in 0..dimension {
+    for k in 0..plan.dimension.count() {
         let cells = 2.0 * (cutoff / spacing[k]).ceil() + 1.0;
         upper[k] = cells * spacing[k];
         bonds *= cells * cells * f64::from(plan.quadrature.points(1)).powi(2);
     }
-    block.bodies[0].points = PointSource::Lattice {
-        shape: Shape::Box {
-            lower: [0.0; 3],
-            upper,
-        },
-        spacing,
-        origin: [0.0; 3],
-    };
+    fill(&mut block, [[0.0; 3], upper], spacing, [0.0; 3]);
     (bonds < MOST_BONDS).then_some(block)
 }
 

@@ -2,15 +2,18 @@
 //! warnings about what a deck may say but most likely does not mean. `check` and the start of a run say
 //! the same.
 
+mod alone;
 mod bodies;
 mod cost;
 mod interior;
 mod loads;
+mod parting;
 mod size;
 
 pub use bodies::BodyFigures;
 pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
+pub use parting::parting_cost;
 pub use size::{Size, size};
 
 use crate::comm::total;

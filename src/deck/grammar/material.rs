@@ -80,7 +80,7 @@ impl Serialize for Material {
 pub enum Damage {
     /// A bond breaks for good at a critical stretch.
     CriticalStretch(Spanned<CriticalStretch>),
-    /// A bond that is pulled breaks for good when it has taken a work.
+    /// A bond breaks for good when it has taken a work.
     Energy(Spanned<BondEnergy>),
 }
 
@@ -119,6 +119,10 @@ pub struct BondEnergy {
     /// "willberg2022" (as in Willberg et al. 2022, eq. 16 and 18).
     #[serde(default)]
     pub calibration: Calibration,
+    /// Whether only bonds that are longer than at the start break; if not, pressed ones break too, as in a
+    /// shear crack.
+    #[serde(default = "yes")]
+    pub tension_only: bool,
     /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
     #[serde(default = "no_alpha")]
     pub alpha: Number,
@@ -136,6 +140,10 @@ pub enum Calibration {
     Energy,
     /// As printed in Willberg et al. 2022.
     Willberg2022,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn no_alpha() -> Number {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use super::{Calibration, Law};
+use super::{Calibration, Law, Sense};
 use crate::deck::expression::Expression;
 use crate::elastic::Isotropic;
 
@@ -139,7 +139,12 @@ pub enum DamageRule {
     /// Their stretch.
     CriticalStretch,
     /// The work that they have taken.
-    Energy(Calibration),
+    Energy {
+        /// How the critical work follows.
+        calibration: Calibration,
+        /// Whether pressed bonds break; for laws that are not bond-based.
+        sense: Sense,
+    },
 }
 
 /// Three measures of how much a material resists a crack.

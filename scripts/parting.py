@@ -1,0 +1,60 @@
+"""Draws what it costs to part a body at any angle, from opening to sliding, by law and criterion.
+
+Runs examples/parting.rs, which pulls the halves of a small block apart, and draws its table.
+"""
+
+import argparse
+import csv
+import pathlib
+import subprocess
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot  # noqa: E402  (the backend comes first)
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PANELS = [("ordinary", "0.1"), ("ordinary", "0.4"), ("correspondence", "0.3"), ("bond_associated_correspondence", "0.3")]
+STYLES = {"stretch": "C0o--", "work of pulled bonds": "C1s:", "work": "C2D-"}
+LABELS = {
+    "stretch": "critical stretch",
+    "work of pulled bonds": "energy, tension only",
+    "work": "energy, pressed bonds too",
+}
+
+
+def table(program):
+    """The rows of the table: law, ratio, criterion, costs by angle (degrees)."""
+    printed = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    head, *rows = csv.reader(printed.splitlines())
+    angles = [float(angle) for angle in head[3:]]
+    for law, ratio, criterion, *costs in rows:
+        yield law, ratio, criterion, [(a, float(c)) for a, c in zip(angles, costs) if c]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--picture", type=pathlib.Path, default=ROOT / "docs/parting.png")
+    parser.add_argument("--program", type=pathlib.Path, default=ROOT / "target/release/examples/parting")
+    arguments = parser.parse_args()
+    figure, axes = pyplot.subplots(2, 2, figsize=(9, 6.5), sharex=True, sharey=True, constrained_layout=True)
+    panels = dict(zip(PANELS, axes.flat))
+    for law, ratio, criterion, costs in table(arguments.program):
+        shown = ", ".join(f"{cost:.3f}" for _, cost in costs)
+        print(f"{law}, ν = {ratio}, {LABELS[criterion]}: {shown}")
+        panels[law, ratio].plot(*zip(*costs), STYLES[criterion], label=LABELS[criterion])
+    for (law, ratio), panel in panels.items():
+        panel.axhline(1, color="0.7", zorder=0)
+        panel.set_title(f"{law.replace('_', ' ')}, ν = {ratio}", fontsize=10)
+        panel.set_ylim(0, 1.6)
+        panel.set_xticks(range(0, 91, 15))
+    for panel in axes[1]:
+        panel.set_xlabel("angle to the normal of the crack, degrees (90: sliding)")
+    for panel in axes[:, 0]:
+        panel.set_ylabel("cost / fracture energy")
+    axes[0, 0].legend(fontsize=8, loc="lower left")
+    figure.savefig(arguments.picture, dpi=110)
+
+
+if __name__ == "__main__":
+    main()
