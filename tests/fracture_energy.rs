@@ -4,9 +4,12 @@
 //! its criterion then is not counted. What is left is the quadrature error of the lattice, which falls as the
 //! horizon holds more spacings.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
-use fissure::survey::parting_cost;
+use fissure::comm::threads::alone;
+use fissure::solver::Simulation;
+use fissure::survey::{calibrated, parting_cost};
 
 use crate::support::{displace, plan, simulate};
 
@@ -310,6 +313,34 @@ fn what_a_survey_says_of_parting() {
     // A critical stretch is not measured by an energy.
     let stretch = text("1d", 3, PMB, STRETCH).replace("fracture_energy", "critical_stretch");
     assert_eq!(parting_cost(&plan(&stretch), 0, 0.0), None);
+}
+
+#[test]
+fn calibrated_by_opening() {
+    let rule = "energy calibration = 'opening'";
+    // The order in which bonds of correspondence break moves its cost by some per cent.
+    for (law, bound) in [(CORRESPONDENCE, 0.05), (&*ordinary(0.4, "constant"), 0.01)] {
+        for (dimension, ratio) in [("plane-strain", 3), ("plane-stress", 4), ("3d", 2)] {
+            let plan = plan(&text(dimension, ratio, law, rule));
+            let plan = calibrated(&plan).unwrap();
+            let cost = parting_cost(&plan, 0, 0.0).unwrap();
+            assert!((cost - 1.0).abs() < bound, "{law} {dimension}: {cost}");
+        }
+    }
+    // Nothing to do.
+    let plain = plan(&text("plane-strain", 3, PMB, ENERGY));
+    assert!(matches!(calibrated(&plain), Ok(Cow::Borrowed(_))));
+    let large = plan(&text("3d", 9, CORRESPONDENCE, rule));
+    let error = calibrated(&large).unwrap_err();
+    let wanted =
+        "test.toml:13:9: [body.block] damage: what opening this body costs cannot be measured";
+    assert!(error.message.starts_with(wanted), "{error}");
+    let (unmeasured, comm) = (
+        plan(&text("plane-strain", 3, CORRESPONDENCE, rule)),
+        alone(),
+    );
+    let error = Simulation::<2>::new(&unmeasured, &comm).err().unwrap();
+    assert!(error.message.contains("has not been measured"), "{error}");
 }
 
 /// The costs of a law in plane strain: of a slide and an opening, and of a slanted way.

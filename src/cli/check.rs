@@ -12,7 +12,9 @@ use fissure::solver::motion::Clock;
 use fissure::solver::observers::HistoryObserver;
 use fissure::solver::size::is_feasible;
 use fissure::solver::steps::choose_steps;
-use fissure::survey::{Cost, Interior, Measured, Size, Survey, ghost_share, interior, size};
+use fissure::survey::{
+    Cost, Interior, Measured, Size, Survey, calibrated, ghost_share, interior, size,
+};
 
 use super::check_report as say;
 use super::report::Report;
@@ -47,6 +49,7 @@ fn check_one(deck: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> R
         trial: verbosity != Verbosity::Quiet,
     };
     is_feasible(&plan, &cutoffs(&plan), arguments.ranks as usize)?;
+    let plan = calibrated(&plan)?;
     let size = size(&plan)?;
     let few = size.cells <= MOST_CELLS
         && size.all_points() <= MOST_POINTS

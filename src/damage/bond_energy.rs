@@ -10,10 +10,13 @@ use super::Sense;
 use crate::dimension::Dimension;
 
 /// How w_c follows from the fracture energy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Calibration {
     /// So that all bonds across a unit area take it.
     Energy,
+    /// So that opening a crack costs it: as [`Self::Energy`], over the share of the fracture energy that opening costs
+    /// then. It is measured before a run, by [`crate::survey::calibrated`].
+    Opening(Option<f64>),
     /// As Willberg et al. 2022 print it in eq. 16 and 18: their w has no ½, and in the plane their w_c
     /// is 3G0/(πδ³h).
     Willberg2022,
@@ -37,7 +40,8 @@ impl Calibration {
     pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
         match (self, dimension) {
-            (Self::Energy, _) => 1.0,
+            (Self::Energy | Self::Opening(None), _) => 1.0,
+            (Self::Opening(Some(cost)), _) => 1.0 / cost,
             (Self::Willberg2022, PlaneStress { .. } | PlaneStrain { .. }) => 1.0 / PI,
             (Self::Willberg2022, Space | Line { .. }) => 0.5,
         }

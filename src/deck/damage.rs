@@ -46,6 +46,7 @@ pub fn damage(
             let all = of_crack(&law.fracture_energy, &law.fracture_toughness);
             let calibration = match law.calibration {
                 grammar::Calibration::Energy => Calibration::Energy,
+                grammar::Calibration::Opening => Calibration::Opening(None),
                 grammar::Calibration::Willberg2022 => Calibration::Willberg2022,
             };
             let sense = if law.tension_only {

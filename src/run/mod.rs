@@ -52,7 +52,7 @@ use crate::solver::Simulation;
 use crate::solver::observers::{Contact, ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
 use crate::solver::steps::choose_steps;
-use crate::survey::Survey;
+use crate::survey::{Survey, calibrated};
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
@@ -113,6 +113,7 @@ pub fn run(
     options: Options,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
+    let calibrated = calibrated(plan)?;
     let files = Files::new(options.folder.clone());
     // Taken before anything is looked at, and kept until the end.
     let prepared = match comm.rank() {
@@ -126,7 +127,7 @@ pub fn run(
     };
     let _lock = agree(comm, prepared)?;
     let mut job = Job {
-        plan,
+        plan: &calibrated,
         comm,
         files,
         physics: physics::describe(plan, options.deck.as_deref()),

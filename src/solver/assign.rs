@@ -2,7 +2,7 @@
 
 use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, Sense};
 use crate::deck::plan::{
-    self, Block, Body, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
+    self, Block, Body, Calibration, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
 };
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
@@ -90,6 +90,11 @@ fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
              `[interface] rule = \"none\"`",
             other.name
         ));
+    }
+    let unmeasured = Calibration::Opening(None);
+    if matches!(damage.rule, DamageRule::Energy { calibration, .. } if calibration == unmeasured) {
+        let message = "what opening the body costs has not been measured: take the plan that `survey::calibrated` returns";
+        return error(message.to_owned());
     }
     let by_energy = damage.rule != DamageRule::CriticalStretch;
     if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {

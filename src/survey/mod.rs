@@ -4,6 +4,7 @@
 
 mod alone;
 mod bodies;
+mod calibrated;
 mod cost;
 mod interior;
 mod loads;
@@ -11,6 +12,7 @@ mod parting;
 mod size;
 
 pub use bodies::BodyFigures;
+pub use calibrated::calibrated;
 pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
 pub use parting::parting_cost;

@@ -115,8 +115,8 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// How the critical work follows: "energy" (all bonds across an area take the fracture energy) or
-    /// "willberg2022" (as in Willberg et al. 2022, eq. 16 and 18).
+    /// How the critical work follows: "energy" (all bonds across an area take the fracture energy), "opening"
+    /// (opening a block of the body, which is tried before the run, costs it) or "willberg2022" (as in Willberg et al. 2022, eq. 16 and 18).
     #[serde(default)]
     pub calibration: Calibration,
     /// Whether only bonds that are longer than at the start break; if not, pressed ones break too, as in a
@@ -138,6 +138,8 @@ pub enum Calibration {
     /// From the energy of all bonds across an area.
     #[default]
     Energy,
+    /// From what opening a block costs, which is measured.
+    Opening,
     /// As printed in Willberg et al. 2022.
     Willberg2022,
 }

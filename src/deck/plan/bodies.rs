@@ -134,7 +134,7 @@ pub struct Damage {
 }
 
 /// What bonds break by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DamageRule {
     /// Their stretch.
     CriticalStretch,
