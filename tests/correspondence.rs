@@ -273,11 +273,11 @@ fn only_rigid_motions_cost_nothing_where_zero_energy_modes_are_controlled() {
     };
     let [simple, associated] = LAWS;
     let free = of(simple, ", zero_energy = 'none'");
-    for (name, more, least) in [
-        (simple, ", zero_energy = 'wan2019'", 8),
-        (simple, ", zero_energy = 'silling2017'", 8),
-        (associated, "", 4),
-        (associated, ", stress = 'neo-hooke'", 4),
+    for (name, more) in [
+        (simple, ", zero_energy = 'wan2019'"),
+        (simple, ", zero_energy = 'silling2017'"),
+        (associated, ""),
+        (associated, ", stress = 'neo-hooke'"),
     ] {
         for (controlled, free) in of(name, more).iter().zip(&free) {
             let softest = controlled[0];
@@ -285,7 +285,7 @@ fn only_rigid_motions_cost_nothing_where_zero_energy_modes_are_controlled() {
             // Families at the surface see to it that none of the motions without control costs quite nothing.
             let softer = free.iter().filter(|value| **value < softest).count();
             assert!(
-                softer >= least,
+                softer >= 16,
                 "{name} {more}: {softer} softer than {softest}"
             );
         }
@@ -383,7 +383,7 @@ fn a_checkerboard_is_resisted_and_decays() {
         assert!(start > least * free, "{name} {more}: {start} {free}");
         assert!(end < 0.7 * start, "{name} {more}: {start} {end}");
         let left = left(name, more);
-        // A damped oscillation is within exp(−½ r t).
+        // A damped oscillation is within exp(−½ r t), and t within a step.
         assert!(left < (-1.0_f64).exp() + 0.05, "{name} {more}: {left}");
     }
 }

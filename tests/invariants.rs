@@ -60,6 +60,7 @@ impl Case {
         let influenced = influenced.iter().any(|word| self.example.contains(word));
         let by_energy = self.law.breaks_by_energy && !influenced;
         let pulled = by_energy.then(|| energy(0.004, ""));
+        // With more, for the motions here press bonds so that all would break.
         let either = by_energy && self.law.any_poisson_ratio;
         let either = either.then(|| energy(0.04, ", tension_only = false"));
         stretch.into_iter().chain(pulled).chain(either).collect()

@@ -4,10 +4,10 @@ use super::expression::{Expression, Variable};
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS, STEPS_A_ROW};
 use super::plan::{
-    Action, Body, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule, History,
-    Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places, Plan,
-    PointSource, PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time, Toughness,
-    VolumeCorrection,
+    Action, Body, Calibration, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule,
+    History, Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places,
+    Plan, PointSource, PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time,
+    Toughness, VolumeCorrection,
 };
 use super::resolve::ALL_VARIABLES;
 use super::source::Source;
@@ -239,6 +239,19 @@ impl Damage {
             alpha: 0.0,
             no_failure: Vec::new(),
         }
+    }
+}
+
+impl DamageRule {
+    /// Whether it is calibrated by what opening the body costs, and that has not been measured yet.
+    pub fn is_unmeasured(self) -> bool {
+        matches!(
+            self,
+            Self::Energy {
+                calibration: Calibration::Opening(None),
+                ..
+            }
+        )
     }
 }
 

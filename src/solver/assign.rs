@@ -2,7 +2,7 @@
 
 use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, Sense};
 use crate::deck::plan::{
-    self, Block, Body, Calibration, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
+    self, Block, Body, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
 };
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
@@ -91,8 +91,7 @@ fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
             other.name
         ));
     }
-    let unmeasured = Calibration::Opening(None);
-    if matches!(damage.rule, DamageRule::Energy { calibration, .. } if calibration == unmeasured) {
+    if damage.rule.is_unmeasured() {
         let message = "what opening the body costs has not been measured: take the plan that `survey::calibrated` returns";
         return error(message.to_owned());
     }

@@ -1,9 +1,6 @@
 //! A body of a plan alone, as a block of its lattice that nothing acts on.
 
-use crate::deck::plan::{
-    History, Interface, InterfaceRule, Method, Plan, PointSource, Selector, Set, Shape, StepRule,
-    Time,
-};
+use crate::deck::plan::{Plan, PointSource, Shape, StepRule};
 
 /// A plan with this body only, and the edges of its cells (m); `None` for points from a file.
 pub fn alone(plan: &Plan, body: usize) -> Option<(Plan, [f64; 3])> {
@@ -14,40 +11,16 @@ pub fn alone(plan: &Plan, body: usize) -> Option<(Plan, [f64; 3])> {
     if let Some(damage) = &mut body.damage {
         damage.no_failure.clear();
     }
-    let alone = Plan {
+    let mut alone = Plan {
+        source: plan.source.clone(),
+        volume_correction: plan.volume_correction,
+        quadrature: plan.quadrature,
+        family: plan.family,
         bodies: vec![body],
-        refinement: None,
-        interface: Interface {
-            rule: InterfaceRule::Own,
-            pairs: Vec::new(),
-        },
-        sets: vec![Set {
-            name: "all".to_owned(),
-            span: 0..0,
-            selector: Selector::All,
-        }],
-        cracks: Vec::new(),
-        initials: Vec::new(),
-        conditions: Vec::new(),
-        history: History {
-            reactions: Vec::new(),
-            support_forces: Vec::new(),
-            probes: Vec::new(),
-            fronts: Vec::new(),
-            cracks: Vec::new(),
-            tips: Vec::new(),
-            ..plan.history.clone()
-        },
-        time: Time {
-            end: 1.0,
-            step: StepRule::Fixed(1.0),
-            method: Method::Explicit,
-            density_scale: 1.0,
-            adaptive: None,
-        },
-        stages: Vec::new(),
-        ..plan.clone()
+        ..Plan::new(plan.dimension, plan.horizon, 1.0)
     };
+    // It is never moved by steps.
+    alone.time.step = StepRule::Fixed(1.0);
     Some((alone, spacing))
 }
 

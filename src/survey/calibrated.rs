@@ -13,14 +13,13 @@ use super::parting::parting_cost;
 /// When that of a body cannot be measured.
 pub fn calibrated(plan: &Plan) -> Result<Cow<'_, Plan>> {
     let mut found = Cow::Borrowed(plan);
-    for index in 0..plan.bodies.len() {
-        let mut trial = plan.clone();
-        let Some(rule @ Calibration::Opening(None)) = calibration_of(&mut trial, index) else {
+    for (index, body) in plan.bodies.iter().enumerate() {
+        let rule = body.damage.as_ref().map(|damage| damage.rule);
+        if !rule.is_some_and(DamageRule::is_unmeasured) {
             continue;
-        };
-        *rule = Calibration::Opening(Some(1.0));
-        let Some(cost) = parting_cost(&trial, index, 0.0).filter(|cost| *cost > 0.0) else {
-            let body = &plan.bodies[index];
+        }
+        set_cost(found.to_mut(), index, 1.0);
+        let Some(cost) = parting_cost(&found, index, 0.0).filter(|cost| *cost > 0.0) else {
             let message = format!(
                 "[body.{}] damage: what opening this body costs cannot be measured: `calibration = \"opening\"` is for \
                  bodies on a lattice with horizons of at most 3 spacings in space and 10 in the plane; take \"energy\"",
@@ -28,16 +27,14 @@ pub fn calibrated(plan: &Plan) -> Result<Cow<'_, Plan>> {
             );
             return Err(plan.source.error(body.span.clone(), message));
         };
-        if let Some(rule) = calibration_of(found.to_mut(), index) {
-            *rule = Calibration::Opening(Some(cost));
-        }
+        set_cost(found.to_mut(), index, cost);
     }
     Ok(found)
 }
 
-fn calibration_of(plan: &mut Plan, body: usize) -> Option<&mut Calibration> {
-    match &mut plan.bodies[body].damage.as_mut()?.rule {
-        DamageRule::Energy { calibration, .. } => Some(calibration),
-        DamageRule::CriticalStretch => None,
+fn set_cost(plan: &mut Plan, body: usize, cost: f64) {
+    let damage = plan.bodies[body].damage.as_mut();
+    if let Some(DamageRule::Energy { calibration, .. }) = damage.map(|damage| &mut damage.rule) {
+        *calibration = Calibration::Opening(Some(cost));
     }
 }

@@ -5,7 +5,7 @@ use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
 use crate::deck::plan::{Block, Plan, Toughness};
 use crate::solver::Simulation;
-use crate::solver::assign::{block_laws, cutoffs};
+use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::Evolution;
 
 use super::alone::{alone, fill};
@@ -37,6 +37,7 @@ const LOOK: u32 = 20;
 /// long, and for a body that does not part.
 pub fn parting_cost(plan: &Plan, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = alone(plan, body)?;
+    laws_are_possible(&block).ok()?;
     let fracture_energy = fracture_energy(plan, body)?;
     let first = match block_laws(&block, &Block::unrefined(&block.bodies[0])).damage? {
         DamageLaw::CriticalStretch(law) => law.critical,
