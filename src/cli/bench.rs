@@ -1,18 +1,17 @@
 //! `fissure bench`: the speed of the time loop on a fixed problem.
 
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::ValueEnum;
-use fissure::comm::halo::Traffic;
 use fissure::comm::mpi::World;
 use fissure::comm::{self, Communicator, agree};
 use fissure::deck::{self, Source};
 use fissure::error::Result;
-use fissure::solver::Simulation;
+use fissure::survey::memory::{Resident, resident};
+use fissure::survey::speed;
 
 use super::bench_report::{Figures, Limited, Phase};
-use super::memory::{Resident, resident};
 use super::{BenchArguments, Verbosity, launch, machine_limits};
 
 /// The laws that are measured.
@@ -117,7 +116,7 @@ fn deck(arguments: &BenchArguments) -> String {
     let breaking = arguments.law.damage();
     let family = arguments.family.name();
     let [x, y, z] = arguments.points;
-    let last = warm_up(arguments) + u64::from(arguments.steps);
+    let last = u64::from(warm_up(arguments)) + u64::from(arguments.steps);
     let damage = if arguments.no_failure {
         ""
     } else {
@@ -142,9 +141,9 @@ fn deck(arguments: &BenchArguments) -> String {
     )
 }
 
-/// Steps before those that are measured: caches, page tables and clock rates settle.
-fn warm_up(arguments: &BenchArguments) -> u64 {
-    u64::from(arguments.steps).div_ceil(10)
+/// Steps before those that are measured.
+fn warm_up(arguments: &BenchArguments) -> u32 {
+    arguments.steps.div_ceil(10)
 }
 
 /// Measures and prints on all ranks.
@@ -170,24 +169,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         text: deck(arguments),
     };
     let plan = deck::parse(&source)?;
-    let mut simulation = Simulation::<3>::new(&plan, world)?;
-    for _ in 0..warm_up(arguments) {
-        simulation.advance();
-    }
-    let set_up = simulation.times.set_up;
-    let halo = simulation.forces.halo().sent;
-    simulation.times = Default::default();
-    // All ranks begin together.
-    world.sum(&mut [0]);
-    let start = Instant::now();
-    for _ in 0..arguments.steps {
-        simulation.advance();
-    }
-    let whole = start.elapsed();
-    simulation.check()?;
-    let sent = simulation.forces.halo().sent;
-    let alone = exchange_alone(world, &mut simulation, arguments.steps);
-    let after = resident();
+    let speed = speed(&plan, world, warm_up(arguments), arguments.steps)?;
 
     let total = |value: u64| comm::total(world, value) as f64;
     let largest = |value: f64| {
@@ -200,14 +182,13 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         mean: total(time.as_nanos() as u64) / 1e9 / world.size() as f64,
         slowest: largest(time.as_secs_f64()),
     };
-    let times = simulation.times;
+    let (times, sent, alone) = (speed.times, speed.sent, speed.sent_alone);
     let steps = f64::from(arguments.steps);
-    let messages = (sent.messages - halo.messages) as f64 / steps;
-    let ghosts = simulation.model.volume.len() - simulation.model.owned();
-    let points = simulation.model.total;
-    let bonds = total(simulation.forces.directed_bonds());
-    let bonds_bytes = total(simulation.forces.bytes() as u64);
-    let halo_bytes = total(sent.bytes - halo.bytes) / steps;
+    let messages = sent.messages as f64 / steps;
+    let points = speed.points;
+    let bonds = total(speed.directed_bonds);
+    let bonds_bytes = total(speed.bond_bytes);
+    let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
     // Further passes send fewer numbers than the first, which alone was repeated.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
@@ -215,23 +196,21 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         phase("bonds", times.forces.bonds),
         phase("halo", times.forces.halo),
         phase("motion", times.motion),
-        phase("loop", whole),
+        phase("loop", speed.whole),
     ];
     let seconds = phases[3].slowest;
     let resident = |of: fn(Resident) -> f64, at: Resident| total(of(at) as u64);
     let memory = vec![
         ("before set-up", resident(|r| r.now, before)),
         ("bonds", bonds_bytes),
-        ("after the loop", resident(|r| r.now, after)),
-        ("peak", resident(|r| r.peak, after)),
+        ("after the loop", resident(|r| r.now, speed.memory)),
+        ("peak", resident(|r| r.peak, speed.memory)),
     ];
-    let instructions = simulation.forces.instructions();
-    let family = if total(simulation.forces.lattice_bonds()) > 0.0 {
+    let family = if total(speed.lattice_bonds) > 0.0 {
         Family::Lattice
     } else {
         Family::List
     };
-    drop(simulation);
     let limits = if arguments.no_limits {
         None
     } else {
@@ -250,7 +229,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     Ok(Figures {
         law: arguments.law,
         family,
-        instructions,
+        instructions: speed.instructions,
         failure: !arguments.no_failure,
         edges: arguments.points,
         points: points as f64,
@@ -259,35 +238,19 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         threads,
         cores: total(threads as u64),
         steps,
-        warm_up: warm_up(arguments) as f64,
-        set_up: largest(set_up.as_secs_f64()),
+        warm_up: f64::from(warm_up(arguments)),
+        set_up: largest(speed.set_up.as_secs_f64()),
         phases,
         memory,
         halo_bytes,
-        messages_time: mean(sent.time - halo.time),
+        messages_time: mean(sent.time),
         messages_time_alone: mean(alone.time) * as_many,
         messages: total((messages * steps) as u64) / steps,
         most_messages: largest(messages),
-        ghosts: total(ghosts as u64),
-        most_ghosts: largest(ghosts as f64),
+        ghosts: total(speed.ghosts),
+        most_ghosts: largest(speed.ghosts as f64),
         limits,
     })
-}
-
-/// Sends the messages of a step so many times, with nothing to do meanwhile.
-fn exchange_alone(world: &World, simulation: &mut Simulation<'_, 3>, times: u32) -> Traffic {
-    let before = simulation.forces.halo().sent;
-    world.sum(&mut [0]);
-    for _ in 0..times {
-        let displacement = &mut simulation.fields.displacement;
-        simulation.forces.update_ghosts(world, displacement);
-    }
-    let after = simulation.forces.halo().sent;
-    Traffic {
-        messages: after.messages - before.messages,
-        bytes: after.bytes - before.bytes,
-        time: after.time - before.time,
-    }
 }
 
 #[cfg(test)]

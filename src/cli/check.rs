@@ -1,33 +1,24 @@
 //! `fissure check`: what a deck would do.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
-use fissure::comm::threads;
 use fissure::deck::{self, Plan};
 use fissure::error::Result;
-use fissure::solver::Simulation;
 use fissure::solver::assign::cutoffs;
 use fissure::solver::motion::Clock;
-use fissure::solver::observers::HistoryObserver;
 use fissure::solver::size::is_feasible;
 use fissure::solver::steps::choose_steps;
-use fissure::survey::{
-    Cost, Interior, Measured, Size, Survey, calibrated, ghost_share, interior, size,
-};
+use fissure::survey::{Cost, Interior, Size, calibrated, interior, look, size};
 
 use super::check_report as say;
 use super::report::Report;
-use super::{CheckArguments, Verbosity, each, launch, memory, print};
+use super::{CheckArguments, Verbosity, each, launch, print};
 
 /// More lattice cells, points or bonds than these, counted from both ends, are not made to check a deck:
 /// it would take more than some seconds and some 2 GB.
-const MOST_CELLS: f64 = 2e7;
-const MOST_POINTS: f64 = 4e6;
-const MOST_BONDS: f64 = 3e8;
-
-/// How long the time loop is tried to know its speed.
-const TRIAL: Duration = Duration::from_millis(300);
+const MOST_CELLS: f64 = 1e7;
+const MOST_POINTS: f64 = 2e6;
+const MOST_BONDS: f64 = 1.5e8;
 
 /// Validates the decks and prints their figures.
 ///
@@ -54,11 +45,10 @@ fn check_one(deck: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> R
     let few = size.cells <= MOST_CELLS
         && size.all_points() <= MOST_POINTS
         && size.directed_bonds <= MOST_BONDS;
-    let report = match (few, plan.dimension.count()) {
-        (false, _) => estimate(&plan, &asked, &size)?,
-        (true, 1) => look::<1>(&plan, &asked)?,
-        (true, 2) => look::<2>(&plan, &asked)?,
-        (true, _) => look::<3>(&plan, &asked)?,
+    let report = if few {
+        look_at(&plan, &asked)?
+    } else {
+        estimate(&plan, &asked, &size)?
     };
     if verbosity == Verbosity::Quiet {
         return Ok(());
@@ -82,82 +72,43 @@ fn interiors(plan: &Plan) -> Vec<Option<Interior>> {
 }
 
 /// Makes points and bonds and looks at them.
-fn look<const D: usize>(plan: &Plan, asked: &Asked) -> Result<Report> {
-    let comm = threads::alone();
-    let before = memory::forget_peak();
-    let mut simulation = Simulation::<D>::new(plan, &comm)?;
-    let after = memory::resident();
-    simulation.check()?;
-    let columns = HistoryObserver::new(&simulation)?.columns().len();
-    let survey = Survey::new(&mut simulation);
+fn look_at(plan: &Plan, asked: &Asked) -> Result<Report> {
+    let look = look(plan, asked.ranks, asked.trial)?;
+    let (survey, dimension) = (&look.survey, plan.dimension.count());
     let interiors = interiors(plan);
     let mut report = Report::default();
     say::heading(&mut report, plan, asked.deck);
     for (index, body) in plan.bodies.iter().enumerate() {
         say::body(&mut report, plan, body);
-        say::figures(&mut report, body, &survey.bodies[index], D);
+        say::figures(&mut report, body, &survey.bodies[index], dimension);
         say::interior(&mut report, plan, interiors[index].as_ref());
         if asked.trial {
             say::parting(&mut report, plan, index);
         }
     }
-    say::joints(&mut report, plan, &survey);
-    say::places(&mut report, plan, &survey, D);
-    say::sets(&mut report, plan, &survey);
+    say::joints(&mut report, plan, survey);
+    say::places(&mut report, plan, survey, dimension);
+    say::sets(&mut report, plan, survey);
     report.say("size");
-    say::size(
-        &mut report,
-        plan,
-        simulation.model.total,
-        simulation.forces.directed_bonds() / 2,
-    );
+    say::size(&mut report, plan, look.points, look.bonds);
     report.line(
         "of them as lattice",
-        super::format::count(simulation.forces.lattice_bonds() / 2),
+        super::format::count(look.lattice_bonds),
     );
-    let ghosts = ghost_share(&edges(&simulation), plan.horizon, asked.ranks);
-    let measured = before.map(|before| Measured {
-        peak: after.peak - before,
-        kept: after.now - before,
-    });
-    let cost = Cost::of(&simulation, columns, measured);
-    say::cost(&mut report, &cost, asked.ranks, ghosts);
-    say::time(&mut report, plan, simulation.scaled_stable_step());
-    say::steps(&mut report, &simulation.expected_clock());
-    let (steps, relaxes) = (simulation.last_step(), plan.relaxes());
-    if asked.trial {
-        let seconds = seconds_a_step(&mut simulation);
-        if relaxes {
+    say::cost(&mut report, &look.cost, asked.ranks, look.ghosts);
+    say::time(&mut report, plan, look.stable_step);
+    say::steps(&mut report, &look.clock);
+    if let Some(seconds) = look.seconds {
+        if plan.relaxes() {
             say::iteration_time(&mut report, seconds, asked.ranks);
         } else {
-            say::run_time(&mut report, seconds, steps, asked.ranks);
+            say::run_time(&mut report, seconds, look.steps, asked.ranks);
         }
     }
     for warning in &survey.warnings {
         report.say(format_args!("warning: {warning}"));
     }
     Ok(report)
-}
-
-/// The edges (m) of the box around all points.
-fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
-    simulation.model.reference.each_ref().map(|places| {
-        let least = places.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        most - least
-    })
-}
-
-/// Wall-clock time of a step, from some of them.
-fn seconds_a_step<const D: usize>(simulation: &mut Simulation<'_, D>) -> f64 {
-    // The first ones bring everything into the caches.
-    simulation.advance();
-    let (start, mut steps) = (Instant::now(), 0);
-    while start.elapsed() < TRIAL && steps < 1000 {
-        simulation.advance();
-        steps += 1;
-    }
-    start.elapsed().as_secs_f64() / f64::from(steps)
 }
 
 /// Says by formula what there is too much of to make.

@@ -9,7 +9,6 @@ mod format;
 mod init;
 mod launch;
 mod machine_limits;
-mod memory;
 mod plot;
 mod plot_paths;
 mod progress;

@@ -8,15 +8,20 @@ mod calibrated;
 mod cost;
 mod interior;
 mod loads;
+mod look;
+pub mod memory;
 mod parting;
 mod size;
+mod speed;
 
 pub use bodies::BodyFigures;
 pub use calibrated::calibrated;
 pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
+pub use look::{Look, look};
 pub use parting::parting_cost;
 pub use size::{Size, size};
+pub use speed::{Speed, speed};
 
 use crate::comm::total;
 use crate::damage::DamageLaw;

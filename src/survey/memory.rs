@@ -1,7 +1,7 @@
 //! The memory of this process as the system counts it.
 
 /// What of this process is in memory, bytes.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct Resident {
     /// Now.
     pub now: f64,

@@ -1,0 +1,120 @@
+//! How fast the time loop of a run is.
+
+use std::time::{Duration, Instant};
+
+use super::memory::{Resident, resident};
+use crate::comm::Communicator;
+use crate::comm::halo::Traffic;
+use crate::deck::Plan;
+use crate::error::Result;
+use crate::lanes::Instructions;
+use crate::solver::Simulation;
+use crate::solver::simulation::Times;
+
+/// What some steps of a run took, and what they were made with, on this rank.
+#[derive(Debug, Clone)]
+pub struct Speed {
+    /// Points of all ranks.
+    pub points: u64,
+    /// Copies of other ranks' points.
+    pub ghosts: u64,
+    /// Bonds, by the points of this rank that they are of.
+    pub directed_bonds: u64,
+    /// Those of them that are kept as a lattice.
+    pub lattice_bonds: u64,
+    /// Memory of the bonds, bytes.
+    pub bond_bytes: u64,
+    /// The vector instructions of the loops.
+    pub instructions: Instructions,
+    /// Time of the set-up.
+    pub set_up: Duration,
+    /// Time of the steps.
+    pub whole: Duration,
+    /// Time of their parts.
+    pub times: Times,
+    /// Messages of the steps.
+    pub sent: Traffic,
+    /// The messages of displacements of as many steps, with nothing to do meanwhile.
+    pub sent_alone: Traffic,
+    /// Memory after the steps.
+    pub memory: Resident,
+}
+
+/// Makes so many steps of a run, after some that are not measured: caches, page tables and clock rates
+/// settle. Collective.
+///
+/// # Errors
+/// As those of a run; or the motion of a point is not finite.
+pub fn speed(plan: &Plan, comm: &dyn Communicator, warm_up: u32, steps: u32) -> Result<Speed> {
+    match plan.dimension.count() {
+        1 => speed_in::<1>(plan, comm, warm_up, steps),
+        2 => speed_in::<2>(plan, comm, warm_up, steps),
+        _ => speed_in::<3>(plan, comm, warm_up, steps),
+    }
+}
+
+fn speed_in<const D: usize>(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    warm_up: u32,
+    steps: u32,
+) -> Result<Speed> {
+    let mut simulation = Simulation::<D>::new(plan, comm)?;
+    for _ in 0..warm_up {
+        simulation.advance();
+    }
+    let set_up = simulation.times.set_up;
+    let before = simulation.forces.halo().sent;
+    simulation.times = Times::default();
+    begin_together(comm);
+    let start = Instant::now();
+    for _ in 0..steps {
+        simulation.advance();
+    }
+    let whole = start.elapsed();
+    simulation.check()?;
+    let sent = since(before, simulation.forces.halo().sent);
+    let sent_alone = exchange_alone(comm, &mut simulation, steps);
+    let (model, forces) = (&simulation.model, &simulation.forces);
+    Ok(Speed {
+        points: model.total,
+        ghosts: (model.volume.len() - model.owned()) as u64,
+        directed_bonds: forces.directed_bonds(),
+        lattice_bonds: forces.lattice_bonds(),
+        bond_bytes: forces.bytes() as u64,
+        instructions: forces.instructions(),
+        set_up,
+        whole,
+        times: simulation.times,
+        sent,
+        sent_alone,
+        memory: resident(),
+    })
+}
+
+/// Sends the messages of a step so many times, with nothing to do meanwhile.
+fn exchange_alone<const D: usize>(
+    comm: &dyn Communicator,
+    simulation: &mut Simulation<'_, D>,
+    times: u32,
+) -> Traffic {
+    let before = simulation.forces.halo().sent;
+    begin_together(comm);
+    for _ in 0..times {
+        let displacement = &mut simulation.fields.displacement;
+        simulation.forces.update_ghosts(comm, displacement);
+    }
+    since(before, simulation.forces.halo().sent)
+}
+
+fn begin_together(comm: &dyn Communicator) {
+    comm.sum(&mut [0]);
+}
+
+fn since(before: Traffic, after: Traffic) -> Traffic {
+    Traffic {
+        messages: after.messages - before.messages,
+        bytes: after.bytes - before.bytes,
+        time: after.time - before.time,
+    }
+}
