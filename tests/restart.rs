@@ -83,10 +83,15 @@ fn outputs(out: &Path) -> usize {
 }
 
 /// Starts a run, and waits for its second output.
-fn with_two_outputs(mut command: Command, out: &Path) -> Child {
+fn with_two_outputs(command: Command, out: &Path) -> Child {
+    with_outputs(2, command, out)
+}
+
+/// Starts a run, and waits until there are so many outputs.
+fn with_outputs(count: usize, mut command: Command, out: &Path) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    while outputs(out) < 2 {
+    while outputs(out) < count {
         std::thread::sleep(Duration::from_millis(20));
         let ended = child.try_wait().unwrap();
         assert!(ended.is_none(), "the run ended by itself");
@@ -695,6 +700,37 @@ fn a_run_goes_on_again_and_again() {
         difference(&datasets(&result(&whole)), &datasets(&result(&out))),
         None
     );
+}
+
+#[test]
+fn a_result_with_room_for_all_outputs_is_gone_on_with_in_place() {
+    use std::os::unix::fs::MetadataExt;
+
+    let folder = Folder::new("in-place");
+    let deck = folder.write("deck.toml", &plate("1e-4", ""));
+    let (whole, out) = (folder.join("whole"), folder.join("out"));
+    succeed(&mut run(1, &deck, &whole, &[]));
+    let file = || std::fs::metadata(result(&out)).unwrap();
+    let mut first = None;
+    for (ranks, extra) in [(3, &[][..]), (2, &["--restart"]), (2, &["--restart"])] {
+        let before = outputs(&out);
+        let child = with_outputs(before + 2, run(ranks, &deck, &out, extra), &out);
+        send("-USR1", *rank_processes(&child, ranks).last().unwrap());
+        let output = wait(child);
+        assert_eq!(output.status.code(), Some(STOPPED), "{}", text(&output));
+        // Not only the place is the same, but also the length: there is room from the start.
+        let now = (file().ino(), file().len());
+        assert_eq!(*first.get_or_insert(now), now);
+    }
+    succeed(&mut run(2, &deck, &out, &["--restart"]));
+    assert_eq!(file().ino(), first.unwrap().0);
+    assert!(file().len() <= std::fs::metadata(result(&whole)).unwrap().len());
+    assert_eq!(
+        difference(&datasets(&result(&whole)), &datasets(&result(&out))),
+        None
+    );
+    let csv = |out: &Path| std::fs::read_to_string(out.join("history.csv")).unwrap();
+    assert_eq!(csv(&whole), csv(&out));
 }
 
 #[test]

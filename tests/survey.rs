@@ -226,6 +226,10 @@ fn numbers_that_no_solid_has() {
                     length";
     assert_eq!(warnings(&brittle(2.5)), [expected]);
     assert!(warnings(&brittle(0.5)).is_empty());
+    let bold = brittle(0.5).replace("time.end = 1", "time = { end = 1, safety = 0.95 }");
+    let expected = "[body.plate] damage: its bonds break at a stretch of 0.500; so far stretched they ask for \
+                    `safety = 0.86` or less, it is 0.95";
+    assert_eq!(warnings(&bold), [expected]);
     let wide = plate("").replace("horizon = 3", "horizon = 9");
     let expected = "[body.plate]: its horizon, 9 m, is 9 spacings; 3 to 6 are usual";
     assert_eq!(warnings(&wide), [expected]);

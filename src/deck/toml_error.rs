@@ -270,3 +270,48 @@ fn given(value: &DeValue, written: &str) -> String {
         DeValue::Integer(_) | DeValue::Float(_) | DeValue::Boolean(_) => written.to_owned(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::grammar::Deck;
+
+    /// What is told of a wrong deck depends on these words of the reader.
+    #[test]
+    fn the_reader_says_what_is_looked_for() {
+        let grid = "dimension = '2d'\ngrid = { spacing = 1, horizon = 3 }\n";
+        for (wrong, said) in [
+            ("dimension = '2d'\ndimension = '2d'", "duplicate key"),
+            ("dimension = plane", "string values must be quoted"),
+            ("dimension =", "string values must be quoted"),
+            (
+                "dimension = '2d' 3",
+                "unexpected key or value, expected newline",
+            ),
+            ("", "missing field `dimension`"),
+            (
+                "dimension = '2d'\ngrit = 1",
+                "unknown field `grit`, expected ",
+            ),
+            ("dimension = '4d'", "unknown variant `4d`, expected "),
+            (
+                "[body.plate.shape]\nbox = { lower = [0], upper = [1] }\ndisc = {}",
+                "wanted exactly 1 element",
+            ),
+            (
+                "[crack.notch.segment]\nfrom = [0]\nto = [1]\nvia = [2]",
+                "unknown field `via`, expected ",
+            ),
+            ("time = { end = 1, step = [] }", "invalid type: "),
+            ("output = { every_steps = 0 }", "invalid value: "),
+        ] {
+            let deck = if wrong.contains("dimension") || wrong.is_empty() {
+                wrong.to_owned()
+            } else {
+                format!("{grid}{wrong}")
+            };
+            let error = toml::from_str::<Deck>(&deck).err();
+            let message = error.map_or_else(String::new, |error| error.message().trim().to_owned());
+            assert!(message.starts_with(said), "{wrong}: {message}");
+        }
+    }
+}

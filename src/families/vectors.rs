@@ -155,9 +155,13 @@ impl<'a> Vectors<'a> {
 impl Adjacent<'_> {
     /// The place of the first of the eight far ends at an offset, with seven more after it. Where
     /// none of the bonds exists it is meaningless, but still a place.
+    ///
+    /// # Safety
+    /// The offset must be one of [`Self::offsets`].
     #[inline(always)]
-    pub fn far(&self, offset: &Offset) -> usize {
-        // SAFETY: lines around are numbered from 0, and there is a shift for each.
+    pub unsafe fn far(&self, offset: &Offset) -> usize {
+        debug_assert!((offset.line as usize) < self.shifts.len());
+        // SAFETY: the lines of own offsets are numbered from 0, and there is a shift for each.
         let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
         (self.place as isize + (shift + offset.x) as isize) as usize
     }

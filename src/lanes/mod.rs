@@ -6,10 +6,12 @@
 pub mod instructions;
 pub mod numbers;
 pub mod simd;
+mod versions;
 
 pub use instructions::Instructions;
 pub use numbers::Numbers;
 pub use simd::Simd;
+pub use versions::Versions;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 

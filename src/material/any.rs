@@ -2,7 +2,7 @@
 //! different laws.
 
 use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, with_law};
-use crate::lanes::{Lanes, Numbers};
+use crate::lanes::{Lanes, Numbers, Versions};
 
 /// How many numbers of each kind the points and bonds of a law have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,7 +105,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     type WholeSum = [Lanes; MOST.whole_sum];
     type Sum = [Lanes; MOST.sum];
     type Force = [Lanes; D];
-    const HOT: bool = false;
+    const VERSIONS: Versions = Versions::Avx2;
     const STAGES: usize = MOST.stages;
     const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;

@@ -47,7 +47,7 @@ registration::register! {
     correspondence::BondAssociated,
 }
 
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use bond::Weights;
 
 /// What can be told of a law without bonds.
@@ -110,8 +110,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.
     const LINEAR: bool = false;
 
-    /// Whether its loops are worth a version for each set of vector instructions.
-    const HOT: bool = true;
+    /// For which vector instructions the loops of its forces, sums and energies are compiled.
+    const VERSIONS: Versions = Versions::Each;
 
     /// Whether [`Self::toughness_scale`] is not 1.
     const SCALED: bool = false;

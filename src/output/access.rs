@@ -22,8 +22,16 @@ pub enum Creation {
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
     // Ranks whose caches differ, as they do after reading different rows, wait for one another in
     // vain when they read metadata together (HDF5 1.10.8). A file that is being created has all of it
-    // in memory, one that is read is read by each rank for itself; none is ever changed again.
+    // in memory, one that is read, or appended to, is read by each rank for itself.
     options(raw, false)?.open(path)
+}
+
+/// Opens a file that exists, to read it and to write to it.
+pub(super) fn open_to_append(
+    path: &Path,
+    raw: Option<RawCommunicator>,
+) -> hdf5::Result<hdf5::File> {
+    options(raw, false)?.open_rw(path)
 }
 
 /// Creates a file for one process or, with a communicator, for all ranks together.

@@ -81,6 +81,18 @@ impl<'a> CollectiveFile<'a> {
             .map_err(|error| Error::run(format!("cannot open {error}")))
     }
 
+    /// Opens a file that exists, together with the other ranks, to read it and to write to it. Where there
+    /// are several ranks, datasets may become longer and not shorter: HDF5 1.10's come apart when they
+    /// do, and wait for one another for ever.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and where it may not be written.
+    pub fn open_to_append(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
+        let raw = comm.raw();
+        Self::begin(path, comm, true, || access::open_to_append(path, raw))
+            .map_err(|error| Error::run(format!("cannot open {error}")))
+    }
+
     fn begin(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -115,6 +127,11 @@ impl<'a> CollectiveFile<'a> {
     /// The ranks that write the file.
     pub fn communicator(&self) -> &'a dyn Communicator {
         self.comm
+    }
+
+    /// Where the file is.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Gives the open file another name, in the place of any that has it. Collective.

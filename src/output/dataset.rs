@@ -43,6 +43,19 @@ impl Dataset {
         self.rows
     }
 
+    /// Its path in the file.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Whether it could have so many rows in place of those that it has without a chunk more or less.
+    pub fn has_room_for(&self, rows: u64) -> bool {
+        match self.rows_per_chunk {
+            0 => rows == self.rows,
+            chunk => rows.div_ceil(chunk) == self.rows.div_ceil(chunk),
+        }
+    }
+
     /// The numbers of a row.
     pub fn columns(&self) -> usize {
         self.columns.unwrap_or(1)

@@ -69,6 +69,37 @@ impl History {
         })
     }
 
+    /// Collective. Goes on after the rows of the history in a file, which are given. The CSV file is written anew,
+    /// beside its place, so that the old one is there until the new one is whole.
+    ///
+    /// # Errors
+    /// The table is missing, or the files cannot be written.
+    pub fn resume(
+        file: &mut CollectiveFile<'_>,
+        contents: &HistoryContents,
+        past: &[Vec<f64>],
+    ) -> Result<Self> {
+        let table = file.open_dataset(HISTORY)?;
+        let csv = contents.csv;
+        let rewritten = || -> Result<File> {
+            let part = csv.with_extension("csv.part");
+            let writer = create_csv(&part, &(header(contents.columns) + &lines(past)))?;
+            std::fs::rename(&part, csv).map_err(|error| csv_failure(csv, &error))?;
+            Ok(writer)
+        };
+        let comm = file.communicator();
+        let writer = if comm.rank() == 0 {
+            rewritten().map(Some)
+        } else {
+            Ok(None)
+        };
+        Ok(Self {
+            table,
+            csv: csv.to_path_buf(),
+            writer: agree(comm, writer)?,
+        })
+    }
+
     /// Collective. The first `count` rows of the history in a file, the same on all ranks.
     ///
     /// # Errors
@@ -107,19 +138,14 @@ impl History {
         let Some(writer) = &mut self.writer else {
             return Ok(());
         };
-        let mut text = String::new();
-        for row in rows {
-            let (length, columns) = (row.len(), self.table.columns());
-            if length != columns {
-                let message = format!("a history row has {length} numbers for {columns} columns");
-                return Err(Error::run(message));
-            }
-            let cells: Vec<_> = row.iter().map(|&value| shortest(value)).collect();
-            text.push_str(&cells.join(","));
-            text.push('\n');
+        let columns = self.table.columns();
+        if let Some(row) = rows.iter().find(|row| row.len() != columns) {
+            let length = row.len();
+            let message = format!("a history row has {length} numbers for {columns} columns");
+            return Err(Error::run(message));
         }
         writer
-            .write_all(text.as_bytes())
+            .write_all(lines(rows).as_bytes())
             .map_err(|error| csv_failure(&self.csv, &error))
     }
 }
@@ -147,6 +173,17 @@ fn header(columns: &[(String, &str)]) -> String {
         }
     }
     text + "\n"
+}
+
+/// The lines of some rows.
+fn lines(rows: &[Vec<f64>]) -> String {
+    let mut text = String::new();
+    for row in rows {
+        let cells: Vec<_> = row.iter().map(|&value| shortest(value)).collect();
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    text
 }
 
 /// The shortest text that reads back as the same number; whole numbers without a point.

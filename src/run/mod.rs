@@ -186,11 +186,12 @@ impl<'a> Job<'a> {
         let first = simulation.clock.number();
         self.observer.begin(&simulation);
         let left = self.make_steps(&mut simulation, &mut checkpoints, &mut recorder)?;
-        self.observer.end(matches!(left, Left::Complete));
+        let is_complete = matches!(left, Left::Complete);
+        self.observer.end(is_complete);
         let no_collective_cause = recorder.file.no_collective_cause();
         let last_row = recorder.last_row.take();
         let spent = (recorder.spent, recorder.spent_on_rows);
-        recorder.close()?;
+        recorder.close(is_complete)?;
         let stopped = match left {
             Left::Complete => None,
             Left::Stopped(reason) => Some(reason),

@@ -252,13 +252,13 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Closes the result. Collective.
+    /// Closes the result of a run that is complete or goes on another time. Collective.
     ///
     /// # Errors
     /// When the disc is full, or writing has failed before.
-    pub fn close(self) -> Result<()> {
+    pub fn close(self, is_complete: bool) -> Result<()> {
         let comm = self.file.communicator();
-        self.file.close()?;
+        self.file.close(is_complete)?;
         agree(comm, self.side_car.map_or(Ok(()), SideCar::finish))
     }
 

@@ -25,7 +25,7 @@ pub use speed::{Speed, speed};
 
 use crate::comm::total;
 use crate::damage::DamageLaw;
-use crate::deck::plan::{Block, Plan, PointSource, Selector};
+use crate::deck::plan::{Block, Plan, PointSource, Selector, StepRule};
 use crate::deck::shown;
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
@@ -135,19 +135,34 @@ fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
 fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
     for body in &plan.bodies {
         let critical = match block_laws(plan, &Block::unrefined(body)).damage {
-            Some(DamageLaw::CriticalStretch(law)) => Some(law.critical),
-            _ => None,
+            Some(DamageLaw::CriticalStretch(law)) => law.critical,
+            _ => continue,
         };
-        if let Some(critical) = critical.filter(|critical| *critical >= LARGEST_STRETCH) {
+        let mut warn = |consequence: String| {
+            let name = &body.name;
             let message = format!(
-                "[body.{}] damage: its bonds break at a stretch of {critical:.3}, at {:.3} times their \
-                 length",
-                body.name,
-                1.0 + critical
+                "[body.{name}] damage: its bonds break at a stretch of {critical:.3}{consequence}"
             );
             warnings.push(plan.source.warning(body.span.clone(), message));
+        };
+        let slower = stretched_stiffness(critical, plan.dimension.count()).sqrt();
+        if critical >= LARGEST_STRETCH {
+            warn(format!(", at {:.3} times their length", 1.0 + critical));
+        } else if let StepRule::Automatic(safety) = plan.time.step
+            && safety * slower > 1.0
+        {
+            let enough = (100.0 / slower).floor() / 100.0;
+            warn(format!(
+                "; so far stretched they ask for `safety = {enough:.2}` or less, it is {safety}"
+            ));
         }
     }
+}
+
+/// How many times stiffer a family with bonds stretched by `stretch` is than the stable step is for: such bonds
+/// resist being turned with s/(1 + s) of their stiffness.
+fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
+    1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
 
 /// Number of points of each set.

@@ -29,7 +29,7 @@ use super::hooke::{self, Hooke};
 use super::stress::{OfBonds, Stress};
 use super::tensor::{Tensor, tensor};
 use super::{STRESS, of_stress};
-use crate::lanes::{Lanes, Numbers};
+use crate::lanes::{Lanes, Numbers, Versions};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,7 +140,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_SHORTENING: bool = false;
     // The stresses, in a loop of their own, take most of the time.
-    const HOT: bool = false;
+    const VERSIONS: Versions = Versions::Avx2;
 
     #[inline(always)]
     fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {

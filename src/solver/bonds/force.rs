@@ -1,7 +1,7 @@
 //! The sum of the bond forces, and the breaking of bonds by what both ends' force states say.
 
 use crate::damage::{Criterion, Ends};
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use crate::material::bond::{Wanted, Weights};
 use crate::material::{ForceState, Law};
 
@@ -104,8 +104,8 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Point = L::Point;
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const HOT: bool = L::HOT;
-    const NEAR: bool = L::HOT
+    const VERSIONS: Versions = L::VERSIONS;
+    const NEAR: bool = L::VERSIONS.is_each()
         && !L::LINEAR
         && L::Memory::COUNT == 0
         && (L::FORCE_READS_STRETCH || L::FORCE_READS_SHORTENING);

@@ -174,9 +174,9 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         o: usize,
     ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
-        let far = vector.far(offset);
-        // SAFETY: `far` is a place of the grid with seven more after it.
+        // SAFETY: the offset is one of the vector's, so `far` is a place of the grid with seven more after it.
         let (displacement, numbers, threshold) = unsafe {
+            let far = vector.far(offset);
             let component = |d| eight(self.displacement[d], far);
             let displacement: [Lanes; D] = Numbers::each(component);
             (

@@ -4,7 +4,7 @@
 //! law and storage: the bonds may be those of one point or those of eight.
 
 use crate::damage::Criterion;
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
 
@@ -91,8 +91,9 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// How its sums become numbers.
     const COMBINE: Combine = Combine::Add;
 
-    /// Whether it is worth a version for each set of vector instructions.
-    const HOT: bool = false;
+    /// For which vector instructions its loops are compiled. A loop that runs at the set-up or for an output
+    /// only takes longer to compile than it could ever save.
+    const VERSIONS: Versions = Versions::One;
 
     /// Whether it is worth a loop for bonds none of which is marked.
     const NEAR: bool = false;

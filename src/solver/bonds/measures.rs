@@ -1,6 +1,6 @@
 //! What is summed over bonds at set-up and for output: volume, energy, stiffness, stress, dilatation.
 
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use crate::material::bond::Wanted;
 use crate::material::{FamilyShare, ForceState, Law, family_share};
 
@@ -32,7 +32,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = L::Memory::COUNT > 0;
-    const HOT: bool = L::HOT;
+    const VERSIONS: Versions = L::VERSIONS;
     const WANTED: Wanted = Wanted {
         shortening: false,
         ..wanted(L::LINEAR)

@@ -161,8 +161,7 @@ impl<const D: usize> Forces<D> {
         let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.whole_sum];
         self.for_each_interaction(|interaction, source| {
             with_pair!(interaction.laws, laws => {
-                let kernel = WholeSum { law: laws[0] };
-                sweep_all(&mut interaction.bonds, &mut sums, &kernel, source);
+                whole_sums(laws[0], &mut interaction.bonds, &mut sums, source);
             });
         });
         self.numbers.set_constants(model, &self.blocks, &sums);
@@ -290,5 +289,17 @@ impl<const D: usize> Forces<D> {
         for interaction in &mut self.interactions {
             interaction.bonds.protect(|point| protected[point] == 1.0);
         }
+    }
+}
+
+/// Adds up what gives the points of a law their constants, if they have any.
+fn whole_sums<L: Law<D>, const D: usize>(
+    law: L,
+    bonds: &mut BlockBonds,
+    sums: &mut [Vec<f64>],
+    source: Source<'_, D>,
+) {
+    if const { L::WholeSum::COUNT > 0 } {
+        sweep_all(bonds, sums, &WholeSum { law }, source);
     }
 }

@@ -1,6 +1,6 @@
 //! The sums over bonds that the numbers of points follow from.
 
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use crate::material::Law;
 use crate::material::bond::Wanted;
 
@@ -28,8 +28,9 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
     type Point = L::Point;
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const HOT: bool = L::HOT;
-    const NEAR: bool = L::HOT && !L::LINEAR && L::Memory::COUNT == 0 && L::SUM_READS_STRETCH;
+    const VERSIONS: Versions = L::VERSIONS;
+    const NEAR: bool =
+        L::VERSIONS.is_each() && !L::LINEAR && L::Memory::COUNT == 0 && L::SUM_READS_STRETCH;
     const READS_FAR: bool = false;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
@@ -91,7 +92,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;
-    const HOT: bool = true;
+    const VERSIONS: Versions = Versions::Each;
     const WANTED: Wanted = growth_only(false);
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
 use crate::lanes::simd::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
-use crate::lanes::{Instructions, Lanes, Numbers, Simd, WIDTH};
+use crate::lanes::{Instructions, Lanes, Numbers, Simd, Versions, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
 use super::kernel::{Combine, Kernel};
@@ -73,8 +73,8 @@ trait Runner<P: Part>: Sync {
         results: <Self::Sums as Numbers>::ColumnsMut<'_>,
     ) -> Vec<BrokenSums>;
 
-    /// Whether it is worth a version for each set of vector instructions.
-    const HOT: bool;
+    /// For which vector instructions it is compiled.
+    const VERSIONS: Versions;
 }
 
 /// Runs the kernel over the bonds of the owned points in a range of local indices. The results are
@@ -211,23 +211,22 @@ fn run<P: Part, R: Runner<P>>(
     instructions: Instructions,
 ) -> Vec<BrokenSums> {
     match instructions {
-        // Without AVX-512 it is not much slower, and has the same bits.
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(simd) if R::HOT => {
+        Instructions::Avx512(simd) if const { R::VERSIONS.is_each() } => {
             // SAFETY: the machine has the instructions, as `simd` shows.
             unsafe { run_avx512(simd, part, base, results, runner) }
         }
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(simd) => {
+        Instructions::Avx512(simd) if const { !R::VERSIONS.is_one() } => {
             // SAFETY: as above; AVX-512 has all of AVX2.
             unsafe { run_avx2(simd.avx2(), part, base, results, runner) }
         }
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(simd) => {
+        Instructions::Avx2(simd) if const { !R::VERSIONS.is_one() } => {
             // SAFETY: as above.
             unsafe { run_avx2(simd, part, base, results, runner) }
         }
-        Instructions::Baseline => runner.run(Portable, part, base, results),
+        _ => runner.run(Portable, part, base, results),
     }
 }
 
@@ -434,7 +433,7 @@ struct OverRows<'a, K: Kernel<D>, const D: usize> {
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
     type Sums = K::Sums;
-    const HOT: bool = K::HOT;
+    const VERSIONS: Versions = K::VERSIONS;
 
     #[inline(always)]
     fn run<S: Simd>(
@@ -500,7 +499,7 @@ struct OverVectors<'a, K: Kernel<D>, const D: usize> {
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K, D> {
     type Sums = K::Sums;
-    const HOT: bool = K::HOT;
+    const VERSIONS: Versions = K::VERSIONS;
 
     #[inline(always)]
     fn run<S: Simd>(

@@ -15,14 +15,16 @@
 //! The points are one part whatever the number of ranks, in the order of their ids. A step's data are flushed
 //! before its row of the tables: a file whose writer was killed holds all its complete steps.
 
+mod resume;
+
 use super::access::Creation;
 use super::attribute::Attribute;
-use super::changing::{self, ChangingPoints};
+use super::changing::ChangingPoints;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
 use super::field::{FieldData, FieldDescription, POINT_DATA, check, create_field, write_field};
 use super::history::{History, HistoryContents};
-use crate::comm::{Communicator, agree};
+use crate::comm::{Communicator, agree, threads};
 use crate::error::{Error, Result};
 use hdf5_metno::H5Type;
 use std::path::Path;
@@ -187,14 +189,10 @@ impl<'a> ResultFile<'a> {
             fields: Vec::new(),
             history: None,
         };
-        for (field, data) in fixed {
-            if !changing {
-                let rows = Rows::Fixed(piece.total);
-                let dataset = create_field(&mut result.file, field, data, rows)?;
-                write_field(&mut result.file, &dataset, piece.first, field, data)?;
-            }
-            let rule = (0, 0, Counted::Points);
-            result.create_table(&offsets_path(field), None, steps, rule)?;
+        for (field, data) in fixed.iter().filter(|_| !changing) {
+            let rows = Rows::Fixed(piece.total);
+            let dataset = create_field(&mut result.file, field, data, rows)?;
+            write_field(&mut result.file, &dataset, piece.first, field, data)?;
         }
         for field in moving {
             let per_append = piece.total;
@@ -206,134 +204,15 @@ impl<'a> ResultFile<'a> {
             };
             let dataset = create_field(&mut result.file, field, &empty, rows)?;
             result.fields.push((*field, dataset));
-            let rule = (0, piece.total as i64, Counted::Points);
-            result.create_table(&offsets_path(field), None, steps, rule)?;
         }
-        for (name, columns, value, counted) in STEP_TABLES {
-            let rule = (value, 0, counted);
-            result.create_table(&format!("{STEPS}/{name}"), columns, steps, rule)?;
+        for (path, columns, rule) in tables_of(contents) {
+            result.create_table(&path, columns, steps, rule)?;
         }
         let file = &mut result.file;
         file.set_dataset_attribute(&result.times, "unit", Attribute::Text("s"))?;
         result.make_room(steps.max(1))?;
         result.file.flush()?;
         Ok(result)
-    }
-
-    /// Goes on with a result after its first `kept` steps and so many rows of its history; later ones
-    /// are dropped. What is kept is copied to a new file, which then takes the place of the old one:
-    /// whenever the process is killed, one of them is there. Also gives the rows that are kept.
-    ///
-    /// # Errors
-    /// The old file cannot be read, holds less, or other points or fields; the disc is full.
-    pub fn resume(
-        path: &Path,
-        comm: &'a dyn Communicator,
-        contents: &Contents,
-        history: &HistoryContents,
-        (kept, kept_rows): (u64, u64),
-    ) -> Result<(Self, Vec<Vec<f64>>)> {
-        let piece = contents.piece;
-        let mut old = CollectiveFile::open(path, comm)?;
-        let times = old.open_dataset(&format!("{STEPS}/Values"))?;
-        let numbers = old.open_dataset(&format!("{STEPS}/Step"))?;
-        let points = old.open_dataset("/VTKHDF/Points")?;
-        let found = times.rows().min(numbers.rows());
-        let fits = if !contents.changing && points.rows() != piece.total {
-            Err(Error::run(format!("{}: has other points", path.display())))
-        } else if found < kept {
-            let text = format!("has {found} of the first {kept} outputs");
-            Err(Error::run(format!("{}: {text}", path.display())))
-        } else {
-            Ok(())
-        };
-        agree(comm, fits)?;
-        let times: Vec<f64> = old.read_rows(&times, 0, kept as usize)?;
-        let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept as usize)?;
-
-        let part = path.with_extension("vtkhdf.part");
-        let copied = Self::copy(&mut old, &part, comm, contents, (kept, times, numbers));
-        let finished = copied.and_then(|mut result| {
-            let rows = History::read(&mut old, kept_rows)?;
-            old.close()?;
-            result.create_history(history)?;
-            result.append_history(&rows)?;
-            result.file.flush()?;
-            result.file.rename(path)?;
-            Ok((result, rows))
-        });
-        if finished.is_err() && comm.rank() == 0 {
-            // It only takes up space; that it cannot be removed either changes nothing.
-            let _ = std::fs::remove_file(&part);
-        }
-        finished
-    }
-
-    /// A new file with the first steps of an old one.
-    fn copy(
-        old: &mut CollectiveFile<'a>,
-        part: &Path,
-        comm: &'a dyn Communicator,
-        contents: &Contents,
-        (kept, times, numbers): (u64, Vec<f64>, Vec<u64>),
-    ) -> Result<Self> {
-        let piece = contents.piece;
-        let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
-        if contents.changing {
-            let counts = result.copy_changing(old, kept)?;
-            return result.note_steps(&times, &numbers, &counts);
-        }
-        result.make_room(kept)?;
-        for (field, values) in &result.fields {
-            let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
-            for step in 0..kept {
-                let (first, count) = (step * piece.total + piece.first, result.points);
-                if contents.single {
-                    let rows: Vec<f32> = old.read_rows(&stored, first, count)?;
-                    result.file.write_rows(values, first, &rows)?;
-                } else {
-                    let rows: Vec<f64> = old.read_rows(&stored, first, count)?;
-                    result.file.write_rows(values, first, &rows)?;
-                }
-            }
-        }
-        result.rows = kept * piece.total;
-        result.note_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
-    }
-
-    /// Takes note of the first steps, with so many points each.
-    fn note_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
-        for ((time, number), points) in times.iter().zip(numbers).zip(points) {
-            append_one(&mut self.file, &mut self.numbers, *number)?;
-            append_one(&mut self.file, &mut self.times, *time)?;
-            self.past.push((*time, *points as usize));
-        }
-        self.steps = times.len() as u64;
-        let steps = Attribute::Integer(self.steps as i64);
-        self.file.set_attribute(STEPS, "NSteps", steps)?;
-        Ok(self)
-    }
-
-    /// Copies the first steps of an old file, each with its own points; gives their numbers.
-    fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, kept: u64) -> Result<Vec<i64>> {
-        let Some(changing) = &mut self.changing else {
-            return Ok(Vec::new());
-        };
-        let counts = old.open_dataset("/VTKHDF/NumberOfPoints")?;
-        let counts: Vec<i64> = old.read_rows(&counts, 0, kept as usize)?;
-        self.rows = counts.iter().sum::<i64>() as u64;
-        changing.copy(old, &mut self.file, self.rows, kept)?;
-        for (_, dataset) in &mut self.fields {
-            if self.single {
-                changing::copy::<f32>(old, &mut self.file, dataset, self.rows)?;
-            } else {
-                changing::copy::<f64>(old, &mut self.file, dataset, self.rows)?;
-            }
-        }
-        for table in &mut self.tables {
-            changing::copy::<i64>(old, &mut self.file, &mut table.dataset, kept)?;
-        }
-        Ok(counts)
     }
 
     /// Gives the next step its points, with the fields that do not change while they are there: the same
@@ -455,7 +334,7 @@ impl<'a> ResultFile<'a> {
         path: &str,
         columns: Option<usize>,
         steps: u64,
-        (start, stride, counted): (i64, i64, Counted),
+        (start, stride, counted): Rule,
     ) -> Result<()> {
         let rows = Rows::Extensible {
             per_append: steps.max(LEAST_ROWS),
@@ -522,19 +401,33 @@ impl<'a> ResultFile<'a> {
         self.file.no_collective_cause()
     }
 
-    /// Gives back the room that was not used, and closes the file.
+    /// Closes the file; room that was not used is given back, or kept for a run that goes on another time.
     ///
     /// # Errors
     /// The disc is full, or an earlier operation failed.
-    pub fn close(mut self) -> Result<()> {
-        let file = &mut self.file;
-        for (_, dataset) in &mut self.fields {
-            file.resize(dataset, self.rows)?;
-        }
-        for table in &mut self.tables {
-            file.resize(&mut table.dataset, self.steps)?;
-        }
-        self.file.close()
+    pub fn close(self, is_complete: bool) -> Result<()> {
+        let (comm, path) = (self.file.communicator(), self.file.path().to_path_buf());
+        let tables = self.tables.iter().map(|table| &table.dataset);
+        let tables = tables.map(|table| (table.path().to_owned(), table.rows(), self.steps));
+        let fields = self.fields.iter();
+        let fields = fields.map(|(_, field)| (field.path().to_owned(), field.rows(), self.rows));
+        let unused: Vec<_> = tables
+            .chain(fields)
+            .filter(|(_, has, used)| has > used)
+            .collect();
+        self.file.close()?;
+        // By one rank: HDF5 1.10's ranks come apart when they shorten a file that was there before them.
+        let cut = || {
+            let alone = threads::alone();
+            let mut file = CollectiveFile::open_to_append(&path, &alone)?;
+            for (dataset, _, rows) in &unused {
+                let mut dataset = file.open_dataset(dataset)?;
+                file.resize(&mut dataset, *rows)?;
+            }
+            file.close()
+        };
+        let is_due = is_complete && !unused.is_empty() && comm.rank() == 0;
+        agree(comm, if is_due { cut() } else { Ok(()) })
     }
 }
 
@@ -551,8 +444,23 @@ fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> 
     )
 }
 
-fn offsets_path(field: &FieldDescription) -> String {
-    format!("{STEPS}/PointDataOffsets/{}", field.name)
+/// What the numbers of a table begin with, how much they grow by from step to step, and what they count where
+/// each step has its own points.
+type Rule = (i64, i64, Counted);
+
+/// The tables of a result: path, columns and rule.
+fn tables_of(contents: &Contents) -> Vec<(String, Option<usize>, Rule)> {
+    let offsets = |field: &FieldDescription, stride| {
+        let path = format!("{STEPS}/PointDataOffsets/{}", field.name);
+        (path, None, (0, stride, Counted::Points))
+    };
+    let fixed = contents.fixed.iter().map(|(field, _)| offsets(field, 0));
+    let total = contents.piece.total as i64;
+    let moving = contents.moving.iter().map(|field| offsets(field, total));
+    let of_steps = STEP_TABLES.iter().map(|(name, columns, value, counted)| {
+        (format!("{STEPS}/{name}"), *columns, (*value, 0, *counted))
+    });
+    fixed.chain(moving).chain(of_steps).collect()
 }
 
 fn write_geometry(

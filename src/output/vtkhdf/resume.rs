@@ -1,0 +1,291 @@
+//! Going on with a result: in the file itself where nothing but numbers of rows has to change in it, else
+//! in a copy of what is kept.
+
+use std::path::Path;
+
+use super::super::access::Creation;
+use super::super::attribute::Attribute;
+use super::super::changing;
+use super::super::collective::CollectiveFile;
+use super::super::dataset::Dataset;
+use super::super::field::POINT_DATA;
+use super::super::history::{HISTORY, History, HistoryContents};
+use super::{Contents, ResultFile, STEPS, Table, append_one, tables_of};
+use crate::comm::{Communicator, agree, threads, total};
+use crate::error::{Error, Result};
+
+/// Attributes that tell what a result is of. Those that tell how a run was started stay as they were where a
+/// file is gone on with.
+const IDENTITY: [&str; 3] = ["deck", "deck_in_full", "version"];
+
+/// What is kept of a result.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    steps: u64,
+    rows: u64,
+}
+
+impl<'a> ResultFile<'a> {
+    /// Goes on with a result after its first steps and rows of its history; later ones are dropped. Also gives
+    /// the rows that are kept.
+    ///
+    /// Where the file has room for all steps that are expected, and no other text to tell, it is gone on
+    /// with as it is: what is kept is not touched, and whenever the process is killed, it is there. Else it
+    /// is copied to a new file, which then takes the place of the old one.
+    ///
+    /// # Errors
+    /// The old file cannot be read, holds less, or other points or fields; the disc is full.
+    pub fn resume(
+        path: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        history: &HistoryContents,
+        (steps, rows): (u64, u64),
+    ) -> Result<(Self, Vec<Vec<f64>>)> {
+        let kept = Kept { steps, rows };
+        let prepared = if comm.rank() == 0 {
+            prepare(path, contents, kept)
+        } else {
+            Ok(false)
+        };
+        let prepared = agree(comm, prepared)?;
+        if total(comm, u64::from(prepared)) > 0 {
+            Self::go_on(path, comm, contents, history, kept)
+        } else {
+            Self::copied(path, comm, contents, history, kept)
+        }
+    }
+
+    /// Opens a file that has been prepared.
+    fn go_on(
+        path: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        history: &HistoryContents,
+        kept: Kept,
+    ) -> Result<(Self, Vec<Vec<f64>>)> {
+        let total = contents.piece.total;
+        let mut file = CollectiveFile::open_to_append(path, comm)?;
+        let times = file.open_dataset(&format!("{STEPS}/Values"))?;
+        let numbers = file.open_dataset(&format!("{STEPS}/Step"))?;
+        let past: Vec<f64> = file.read_rows(&times, 0, kept.steps as usize)?;
+        let rows = History::read(&mut file, kept.rows)?;
+        let mut fields = Vec::new();
+        for field in contents.moving {
+            let path = format!("{POINT_DATA}/{}", field.name);
+            fields.push((*field, file.open_dataset(&path)?));
+        }
+        let mut tables = Vec::new();
+        for (path, _, rule) in tables_of(contents) {
+            let (start, stride, counted) = rule;
+            let dataset = file.open_dataset(&path)?;
+            tables.push(Table {
+                dataset,
+                start,
+                stride,
+                counted,
+            });
+        }
+        let capacity = tables.iter().map(|table| table.dataset.rows());
+        let capacity = capacity.chain(fields.iter().map(|(_, field)| field.rows() / total));
+        let history = History::resume(&mut file, history, &rows)?;
+        let result = Self {
+            piece: contents.piece,
+            points: contents.positions.len(),
+            single: contents.single,
+            steps: kept.steps,
+            past: past.iter().map(|time| (*time, total as usize)).collect(),
+            rows: kept.steps * total,
+            changing: None,
+            capacity: capacity.min().unwrap_or(0),
+            tables,
+            numbers,
+            times,
+            fields,
+            history: Some(history),
+            file,
+        };
+        Ok((result, rows))
+    }
+
+    /// What is kept, in a new file that takes the place of the old one: whenever the process is killed, one of
+    /// them is there.
+    fn copied(
+        path: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        history: &HistoryContents,
+        kept: Kept,
+    ) -> Result<(Self, Vec<Vec<f64>>)> {
+        let piece = contents.piece;
+        let mut old = CollectiveFile::open(path, comm)?;
+        let times = old.open_dataset(&format!("{STEPS}/Values"))?;
+        let numbers = old.open_dataset(&format!("{STEPS}/Step"))?;
+        let points = old.open_dataset("/VTKHDF/Points")?;
+        let found = times.rows().min(numbers.rows());
+        let fits = if !contents.changing && points.rows() != piece.total {
+            Err(Error::run(format!("{}: has other points", path.display())))
+        } else if found < kept.steps {
+            let text = format!("has {found} of the first {} outputs", kept.steps);
+            Err(Error::run(format!("{}: {text}", path.display())))
+        } else {
+            Ok(())
+        };
+        agree(comm, fits)?;
+        let times: Vec<f64> = old.read_rows(&times, 0, kept.steps as usize)?;
+        let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept.steps as usize)?;
+
+        let part = path.with_extension("vtkhdf.part");
+        let copied = Self::copy(&mut old, &part, comm, contents, (times, numbers));
+        let finished = copied.and_then(|mut result| {
+            let rows = History::read(&mut old, kept.rows)?;
+            old.close()?;
+            result.create_history(history)?;
+            result.append_history(&rows)?;
+            result.file.flush()?;
+            result.file.rename(path)?;
+            Ok((result, rows))
+        });
+        if finished.is_err() && comm.rank() == 0 {
+            // It only takes up space; that it cannot be removed either changes nothing.
+            let _ = std::fs::remove_file(&part);
+        }
+        finished
+    }
+
+    /// A new file with the first steps of an old one, at these times and with these numbers.
+    fn copy(
+        old: &mut CollectiveFile<'a>,
+        part: &Path,
+        comm: &'a dyn Communicator,
+        contents: &Contents,
+        (times, numbers): (Vec<f64>, Vec<u64>),
+    ) -> Result<Self> {
+        let (piece, kept) = (contents.piece, times.len() as u64);
+        let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
+        if contents.changing {
+            let counts = result.copy_changing(old, kept)?;
+            return result.note_steps(&times, &numbers, &counts);
+        }
+        result.make_room(kept)?;
+        for (field, values) in &result.fields {
+            let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
+            for step in 0..kept {
+                let (first, count) = (step * piece.total + piece.first, result.points);
+                if contents.single {
+                    let rows: Vec<f32> = old.read_rows(&stored, first, count)?;
+                    result.file.write_rows(values, first, &rows)?;
+                } else {
+                    let rows: Vec<f64> = old.read_rows(&stored, first, count)?;
+                    result.file.write_rows(values, first, &rows)?;
+                }
+            }
+        }
+        result.rows = kept * piece.total;
+        result.note_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
+    }
+
+    /// Takes note of the first steps, with so many points each.
+    fn note_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
+        for ((time, number), points) in times.iter().zip(numbers).zip(points) {
+            append_one(&mut self.file, &mut self.numbers, *number)?;
+            append_one(&mut self.file, &mut self.times, *time)?;
+            self.past.push((*time, *points as usize));
+        }
+        self.steps = times.len() as u64;
+        let steps = Attribute::Integer(self.steps as i64);
+        self.file.set_attribute(STEPS, "NSteps", steps)?;
+        Ok(self)
+    }
+
+    /// Copies the first steps of an old file, each with its own points; gives their numbers.
+    fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, kept: u64) -> Result<Vec<i64>> {
+        let Some(changing) = &mut self.changing else {
+            return Ok(Vec::new());
+        };
+        let counts = old.open_dataset("/VTKHDF/NumberOfPoints")?;
+        let counts: Vec<i64> = old.read_rows(&counts, 0, kept as usize)?;
+        self.rows = counts.iter().sum::<i64>() as u64;
+        changing.copy(old, &mut self.file, self.rows, kept)?;
+        for (_, dataset) in &mut self.fields {
+            if self.single {
+                changing::copy::<f32>(old, &mut self.file, dataset, self.rows)?;
+            } else {
+                changing::copy::<f64>(old, &mut self.file, dataset, self.rows)?;
+            }
+        }
+        for table in &mut self.tables {
+            changing::copy::<i64>(old, &mut self.file, &mut table.dataset, kept)?;
+        }
+        Ok(counts)
+    }
+}
+
+/// Lets a file end after what is kept, if it can be gone on with as it is; else it is left alone. For one
+/// rank.
+fn prepare(path: &Path, contents: &Contents, kept: Kept) -> Result<bool> {
+    let alone = threads::alone();
+    let mut file = CollectiveFile::open(path, &alone)?;
+    let fits = has_room(&mut file, contents, kept)?;
+    file.close()?;
+    if !fits {
+        return Ok(false);
+    }
+    let mut file = CollectiveFile::open_to_append(path, &alone)?;
+    // The number of steps first: whenever the process is killed, what it counts is there.
+    let steps = Attribute::Integer(kept.steps as i64);
+    file.set_attribute(STEPS, "NSteps", steps)?;
+    file.flush()?;
+    for (path, rows) in counted_rows(kept) {
+        let mut dataset = file.open_dataset(&path)?;
+        file.resize(&mut dataset, rows)?;
+    }
+    file.close()?;
+    Ok(true)
+}
+
+/// Whether a file has room for the steps that are expected, no row that is dropped takes a chunk of its
+/// dataset with it, and the texts are the same.
+fn has_room(file: &mut CollectiveFile<'_>, contents: &Contents, kept: Kept) -> Result<bool> {
+    if contents.changing {
+        return Ok(false);
+    }
+    let (total, steps) = (contents.piece.total, contents.steps.max(kept.steps));
+    let texts = contents.metadata.iter();
+    for (name, text) in texts.filter(|(name, _)| IDENTITY.contains(name)) {
+        if file.text_attribute("/", name)? != *text {
+            return Ok(false);
+        }
+    }
+    let is_long = |dataset: Dataset, rows: u64| dataset.rows() >= rows;
+    if file.open_dataset("/VTKHDF/Points")?.rows() != total {
+        return Ok(false);
+    }
+    for field in contents.moving {
+        let dataset = file.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
+        if !is_long(dataset, steps * total) {
+            return Ok(false);
+        }
+    }
+    for (path, _, _) in tables_of(contents) {
+        if !is_long(file.open_dataset(&path)?, steps) {
+            return Ok(false);
+        }
+    }
+    for (path, rows) in counted_rows(kept) {
+        let dataset = file.open_dataset(&path)?;
+        if dataset.rows() < rows || !dataset.has_room_for(rows) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The datasets whose lengths are counts, and how long they are to be.
+fn counted_rows(kept: Kept) -> [(String, u64); 3] {
+    [
+        (format!("{STEPS}/Values"), kept.steps),
+        (format!("{STEPS}/Step"), kept.steps),
+        (HISTORY.to_owned(), kept.rows),
+    ]
+}
