@@ -124,7 +124,11 @@ impl Declared for Ordinary {
             "poisson_ratio = 0.25, influence = 'gaussian'",
             "poisson_ratio = -0.3, influence = 'inverse'",
         ],
-        ..Declaration::new("ordinary", "state-based, of the family's dilatation", build)
+        ..Declaration::new(
+            "ordinary",
+            "the linear peridynamic solid (LPS): state-based, of the family's dilatation",
+            build,
+        )
     }];
 }
 

@@ -79,8 +79,8 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Counts a turn. Whether the ranks look together after it; `step` is the clock if it ended a step.
-    pub fn is_due(&mut self, step: Option<&Clock>) -> bool {
+    /// Counts a turn; whether the ranks look together after it. `step` is the clock if the turn ended a step.
+    pub fn end_turn(&mut self, step: Option<&Clock>) -> bool {
         self.turns += 1;
         self.turns >= self.next_look || self.is_scheduled(step)
     }

@@ -271,7 +271,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         let step = self.clock.step();
         self.conditions.before_moving(&self.fields);
-        verlet::kick_and_drift(&self.model, &mut self.fields, step);
+        verlet::half_kick_and_drift(&self.model, &mut self.fields, step);
         self.clock.advance();
         let time = self.clock.time();
         self.conditions.place(&mut self.fields, time, step);
@@ -280,7 +280,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         let (model, fields) = (&self.model, &mut self.fields);
         self.conditions.load(fields, time, false);
-        let finite = verlet::kick(model, fields, step);
+        let finite = verlet::second_half_kick(model, fields, step);
         let finite = self.guide() && finite;
         if !finite {
             self.note_bad();

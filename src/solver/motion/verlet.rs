@@ -58,7 +58,7 @@ fn for_each_part<const D: usize>(
 }
 
 /// Half a kick with the forces at the old place, then the drift: u̇ += ½ Δt ü, u += Δt u̇. `step` in s.
-pub fn kick_and_drift<const D: usize>(model: &Model<D>, fields: &mut Fields<D>, step: f64) {
+pub fn half_kick_and_drift<const D: usize>(model: &Model<D>, fields: &mut Fields<D>, step: f64) {
     for_each_part(model, fields, |displacement, velocity, force, block| {
         for k in 0..velocity.len() {
             let block = usize::from(block[k]);
@@ -76,7 +76,11 @@ pub fn kick_and_drift<const D: usize>(model: &Model<D>, fields: &mut Fields<D>, 
 
 /// Half a kick with the forces at the new place, and with the damping at the velocity that comes out:
 /// u̇ ← (u̇ + ½ Δt f/ρ)/(1 + ½ r Δt). Returns whether all velocities are still finite. `step` in s.
-pub fn kick<const D: usize>(model: &Model<D>, fields: &mut Fields<D>, step: f64) -> bool {
+pub fn second_half_kick<const D: usize>(
+    model: &Model<D>,
+    fields: &mut Fields<D>,
+    step: f64,
+) -> bool {
     for_each_part(model, fields, |_, velocity, force, block| {
         let mut finite = true;
         for k in 0..velocity.len() {
