@@ -7,7 +7,7 @@
 use crate::comm::{self, Communicator, agree};
 use crate::error::{Error, Result};
 
-use super::simd::Portable;
+use super::simd::FUSED;
 #[cfg(target_arch = "x86_64")]
 use super::simd::{Avx2, Avx512};
 
@@ -91,7 +91,7 @@ impl Instructions {
     /// Whether products and sums are rounded once, so that results have the bits of all other
     /// machines that do so.
     pub fn are_fused(self) -> bool {
-        self.level() > 0 || Portable::FUSED
+        self.level() > 0 || FUSED
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! All others on [`Lanes`] are plain loops over eight numbers, which the compiler turns into vector
 //! instructions. Every operation here is correctly rounded or moves numbers only, so that all kinds
-//! but [`Portable`] on a machine without fused multiplication and addition give the same bits.
+//! but [`Portable`] without fused multiplication and addition give the same bits.
 
 use super::Lanes;
 
@@ -57,19 +57,18 @@ pub trait Simd: Copy + Send + Sync + 'static {
     }
 }
 
-/// What every machine has. Fused where all machines of the kind have it (64-bit ARM).
+/// Whether all machines of the kind that the program is built for round a product and a sum once (64-bit ARM).
+pub const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+
+/// What every machine has; with `ONCE` it rounds a product and a sum once, which is slow but where they are
+/// [`FUSED`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Portable;
+pub struct Portable<const ONCE: bool>;
 
-impl Portable {
-    /// Whether products and sums are rounded once.
-    pub const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
-}
-
-impl Simd for Portable {
+impl<const ONCE: bool> Simd for Portable<ONCE> {
     #[inline(always)]
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
-        if !Self::FUSED {
+        if !ONCE {
             return a * b + c;
         }
         let mut result = a;
@@ -467,7 +466,8 @@ mod tests {
 
     #[test]
     fn every_kind_moves_numbers_alike() {
-        check(Portable);
+        check(Portable::<false>);
+        check(Portable::<true>);
         #[cfg(target_arch = "x86_64")]
         {
             Avx2::detect().into_iter().for_each(check);
@@ -486,9 +486,7 @@ mod tests {
 
     #[test]
     fn fused_kinds_round_once() {
-        if Portable::FUSED {
-            rounds_once(Portable);
-        }
+        rounds_once(Portable::<true>);
         #[cfg(target_arch = "x86_64")]
         {
             Avx2::detect().into_iter().for_each(rounds_once);

@@ -1,14 +1,14 @@
 //! For which vector instructions a loop is compiled.
 
-/// The versions of a loop. Those of AVX-512 and AVX2 have the same bits; that for any processor does not fuse
-/// multiply-adds.
+/// The versions of a loop. Those of AVX-512 and AVX2 have the same bits, that for any processor only where all of
+/// the kind fuse multiply-adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Versions {
     /// AVX-512, AVX2 and any processor.
     Each,
     /// AVX2, which is not much slower, and any processor.
     Avx2,
-    /// Any processor.
+    /// Any processor, and nowhere fused multiply-adds, so that the bits are the same everywhere.
     One,
 }
 

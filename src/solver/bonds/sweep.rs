@@ -6,9 +6,9 @@
 use std::ops::Range;
 
 use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
-use crate::lanes::simd::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
+use crate::lanes::simd::{FUSED, Portable};
 use crate::lanes::{Instructions, Lanes, Numbers, Simd, Versions, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
@@ -226,7 +226,9 @@ fn run<P: Part, R: Runner<P>>(
             // SAFETY: as above.
             unsafe { run_avx2(simd, part, base, results, runner) }
         }
-        _ => runner.run(Portable, part, base, results),
+        // With the same bits everywhere.
+        _ if const { R::VERSIONS.is_one() } => runner.run(Portable::<false>, part, base, results),
+        _ => runner.run(Portable::<FUSED>, part, base, results),
     }
 }
 
