@@ -91,8 +91,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// How its sums become numbers.
     const COMBINE: Combine = Combine::Add;
 
-    /// For which vector instructions its loops are compiled. A loop that runs at the set-up or for an output
-    /// only takes longer to compile than it could ever save.
+    /// For which vector instructions its loops are compiled. One that runs for outputs only takes longer to compile
+    /// than it could save.
     const VERSIONS: Versions = Versions::One;
 
     /// Whether it is worth a loop for bonds none of which is marked.

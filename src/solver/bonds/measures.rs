@@ -61,6 +61,8 @@ impl<const D: usize> Kernel<D> for FamilyVolume {
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
+    // At every set-up and after every refinement.
+    const VERSIONS: Versions = Versions::Avx2;
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
@@ -101,6 +103,8 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     type Point = L::Point;
     type Memory = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
+    // At every set-up and after every refinement.
+    const VERSIONS: Versions = Versions::Avx2;
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]

@@ -69,6 +69,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
     type Memory = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = true;
+    const VERSIONS: Versions = Versions::Avx2;
     const WANTED: Wanted = growth_only(L::LINEAR);
 
     #[inline(always)]
