@@ -56,7 +56,7 @@ fn what_is_written_reads_back() -> Result<()> {
     }
     let error = file.write_step(1.0, 2, &[&[0.0], &[0.0, 0.0]]);
     assert!(error.unwrap_err().message.contains("velocity has 1 values"));
-    file.close(true)?;
+    file.close(false)?;
 
     let error = create().err().unwrap();
     assert!(

@@ -177,12 +177,11 @@ impl<'a> Job<'a> {
         let first = simulation.clock.number();
         self.observer.begin(&simulation);
         let left = self.make_steps(&mut simulation, &mut checkpoints, &mut recorder)?;
-        let is_complete = matches!(left, Left::Complete);
-        self.observer.end(is_complete);
+        self.observer.end(matches!(left, Left::Complete));
         let no_collective_cause = recorder.file.no_collective_cause();
         let last_row = recorder.last_row.take();
         let spent = (recorder.spent, recorder.spent_on_rows);
-        recorder.close(is_complete)?;
+        recorder.close(matches!(left, Left::Stopped(_)))?;
         let stopped = match left {
             Left::Complete => None,
             Left::Stopped(reason) => Some(reason),

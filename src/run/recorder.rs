@@ -252,13 +252,13 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Closes the result of a run that is complete or goes on another time. Collective.
+    /// Closes the result; `goes_on` if another run is to continue it. Collective.
     ///
     /// # Errors
     /// When the disc is full, or writing has failed before.
-    pub fn close(self, is_complete: bool) -> Result<()> {
+    pub fn close(self, goes_on: bool) -> Result<()> {
         let comm = self.file.communicator();
-        self.file.close(is_complete)?;
+        self.file.close(goes_on)?;
         agree(comm, self.side_car.map_or(Ok(()), SideCar::finish))
     }
 

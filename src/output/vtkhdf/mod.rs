@@ -401,11 +401,11 @@ impl<'a> ResultFile<'a> {
         self.file.no_collective_cause()
     }
 
-    /// Closes the file; room that was not used is given back, or kept for a run that goes on another time.
+    /// Closes the file. Room that was not used is given back, or kept for a run that `goes_on` another time.
     ///
     /// # Errors
     /// The disc is full, or an earlier operation failed.
-    pub fn close(self, is_complete: bool) -> Result<()> {
+    pub fn close(self, goes_on: bool) -> Result<()> {
         let (comm, path) = (self.file.communicator(), self.file.path().to_path_buf());
         let tables = self.tables.iter().map(|table| &table.dataset);
         let tables = tables.map(|table| (table.path().to_owned(), table.rows(), self.steps));
@@ -426,7 +426,7 @@ impl<'a> ResultFile<'a> {
             }
             file.close()
         };
-        let is_due = is_complete && !unused.is_empty() && comm.rank() == 0;
+        let is_due = !goes_on && !unused.is_empty() && comm.rank() == 0;
         agree(comm, if is_due { cut() } else { Ok(()) })
     }
 }
