@@ -79,7 +79,10 @@ def check_xdmf(path, file, count):
         name, _, place = item.text.partition(":")
         expect(name == pathlib.Path(file.filename).name, f"{path.name} points to {name}")
         declared = tuple(int(size) for size in item.get("Dimensions").split())
-        expect(file[place].shape == declared, f"{path.name}: {place} is {file[place].shape}, not {declared}")
+        # A run that was stopped keeps room for more rows.
+        shape = file[place].shape
+        fits = shape[1:] == declared[1:] and shape[0] >= declared[0]
+        expect(fits, f"{path.name}: {place} is {shape}, not {declared}")
 
 
 def main():

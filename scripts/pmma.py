@@ -191,7 +191,8 @@ def damage(folder):
     with h5py.File(folder / "result.vtkhdf") as file:
         places = file["VTKHDF/Points"][:]
         times = file["VTKHDF/Steps/Values"][:]
-        values = file["VTKHDF/PointData/damage"][:].reshape(len(times), len(places))
+        rows = len(times) * len(places)
+        values = file["VTKHDF/PointData/damage"][:rows].reshape(len(times), len(places))
     return places, values, times
 
 

@@ -82,16 +82,17 @@ fn outputs(out: &Path) -> usize {
     steps.map_or(0, |steps| steps.len())
 }
 
-/// Starts a run, and waits for its second output.
-fn with_two_outputs(command: Command, out: &Path) -> Child {
-    with_outputs(2, command, out)
+/// How many lines `history.csv` has.
+fn rows(out: &Path) -> usize {
+    let text = std::fs::read_to_string(out.join("history.csv"));
+    text.map_or(0, |text| text.lines().count())
 }
 
-/// Starts a run, and waits until there are so many outputs.
-fn with_outputs(count: usize, mut command: Command, out: &Path) -> Child {
+/// Starts a run, and waits for its second output.
+fn with_two_outputs(mut command: Command, out: &Path) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    while outputs(out) < count {
+    while outputs(out) < 2 {
         std::thread::sleep(Duration::from_millis(20));
         let ended = child.try_wait().unwrap();
         assert!(ended.is_none(), "the run ended by itself");
@@ -713,8 +714,16 @@ fn a_result_with_room_for_all_outputs_is_gone_on_with_in_place() {
     let file = || std::fs::metadata(result(&out)).unwrap();
     let mut first = None;
     for (ranks, extra) in [(3, &[][..]), (2, &["--restart"]), (2, &["--restart"])] {
-        let before = outputs(&out);
-        let child = with_outputs(before + 2, run(ranks, &deck, &out, extra), &out);
+        let before = rows(&out);
+        let mut command = run(ranks, &deck, &out, extra);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        // A reader of the result would lock it.
+        while rows(&out) < before + 9 {
+            std::thread::sleep(Duration::from_millis(20));
+            let ended = child.try_wait().unwrap();
+            assert!(ended.is_none(), "the run ended by itself");
+        }
         send("-USR1", *rank_processes(&child, ranks).last().unwrap());
         let output = wait(child);
         assert_eq!(output.status.code(), Some(STOPPED), "{}", text(&output));
@@ -722,8 +731,22 @@ fn a_result_with_room_for_all_outputs_is_gone_on_with_in_place() {
         let now = (file().ino(), file().len());
         assert_eq!(*first.get_or_insert(now), now);
     }
+    // While somebody reads it, it is copied.
+    let copy = folder.join("copy");
+    std::fs::create_dir(&copy).unwrap();
+    for entry in std::fs::read_dir(&out).unwrap().flatten() {
+        std::fs::copy(entry.path(), copy.join(entry.file_name())).unwrap();
+    }
+    let inode = |out: &Path| std::fs::metadata(result(out)).unwrap().ino();
+    let before = inode(&copy);
+    let reader = ResultReader::open(&result(&copy)).unwrap();
+    succeed(&mut run(1, &deck, &copy, &["--restart"]));
+    drop(reader);
+    assert_ne!(inode(&copy), before);
+    let expected = datasets(&result(&whole));
+    assert_eq!(difference(&expected, &datasets(&result(&copy))), None);
     succeed(&mut run(2, &deck, &out, &["--restart"]));
-    assert_eq!(file().ino(), first.unwrap().0);
+    assert_eq!(inode(&out), first.unwrap().0);
     assert!(file().len() <= std::fs::metadata(result(&whole)).unwrap().len());
     assert_eq!(
         difference(&datasets(&result(&whole)), &datasets(&result(&out))),

@@ -15,7 +15,7 @@ use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
 /// More lattice cells, points or bonds than these, counted from both ends, are not made to check a deck:
-/// it would take more than some seconds and some 2 GB.
+/// it would take more than some seconds and 1 GB.
 const MOST_CELLS: f64 = 1e7;
 const MOST_POINTS: f64 = 2e6;
 const MOST_BONDS: f64 = 1.5e8;

@@ -298,6 +298,10 @@ mod tests {
                 "wanted exactly 1 element",
             ),
             (
+                "[body.plate.shape.disc]\ncentre = [0, 0]\nradius = 1\nheight = 2",
+                "unexpected keys in table: ",
+            ),
+            (
                 "[crack.notch.segment]\nfrom = [0]\nto = [1]\nvia = [2]",
                 "unknown field `via`, expected ",
             ),

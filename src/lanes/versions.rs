@@ -1,7 +1,7 @@
 //! For which vector instructions a loop is compiled.
 
-/// The versions of a loop. Those of AVX-512 and AVX2 have the same bits, that for any processor only where all of
-/// the kind fuse multiply-adds.
+/// The versions of a loop. AVX-512 and AVX2 give the same bits; the one for any processor does so only where every
+/// processor of the kind fuses multiply-adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Versions {
     /// AVX-512, AVX2 and any processor.

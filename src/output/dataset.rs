@@ -48,12 +48,9 @@ impl Dataset {
         &self.path
     }
 
-    /// Whether it could have so many rows in place of those that it has without a chunk more or less.
-    pub fn has_room_for(&self, rows: u64) -> bool {
-        match self.rows_per_chunk {
-            0 => rows == self.rows,
-            chunk => rows.div_ceil(chunk) == self.rows.div_ceil(chunk),
-        }
+    /// Whether a chunk goes if it is cut to so many rows.
+    pub fn frees_a_chunk(&self, rows: u64) -> bool {
+        rows.div_ceil(self.rows_per_chunk.max(1)) < self.rows.div_ceil(self.rows_per_chunk.max(1))
     }
 
     /// The numbers of a row.

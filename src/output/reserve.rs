@@ -46,7 +46,8 @@ impl Reservation {
         }
         let reserved = match allocate(&self.file, self.bytes, additional) {
             Err(error) if error.raw_os_error() == Some(libc::EOPNOTSUPP) => {
-                compare(&self.file, additional)
+                let taken = self.file.metadata().map_or(0, |metadata| metadata.len());
+                compare(&self.file, bytes.saturating_sub(taken.max(self.bytes)))
             }
             other => other,
         };

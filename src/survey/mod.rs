@@ -25,7 +25,7 @@ pub use speed::{Speed, speed};
 
 use crate::comm::total;
 use crate::damage::DamageLaw;
-use crate::deck::plan::{Block, Plan, PointSource, Selector, StepRule};
+use crate::deck::plan::{Block, Plan, PointSource, Selector, Stage, StepRule};
 use crate::deck::shown;
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
@@ -145,18 +145,33 @@ fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
             );
             warnings.push(plan.source.warning(body.span.clone(), message));
         };
-        let slower = stretched_stiffness(critical, plan.dimension.count()).sqrt();
         if critical >= LARGEST_STRETCH {
             warn(format!(", at {:.3} times their length", 1.0 + critical));
-        } else if let StepRule::Automatic(safety) = plan.time.step
-            && safety * slower > 1.0
-        {
+        }
+        let slower = stretched_stiffness(critical, plan.dimension.count()).sqrt();
+        let too_bold = safeties(plan)
+            .into_iter()
+            .find(|safety| safety * slower > 1.0);
+        if let Some(safety) = too_bold {
             let enough = (100.0 / slower).floor() / 100.0;
             warn(format!(
                 "; so far stretched they ask for `safety = {enough:.2}` or less, it is {safety}"
             ));
         }
     }
+}
+
+/// The shares of the stable step that the stages of a run take.
+fn safeties(plan: &Plan) -> Vec<f64> {
+    let moving = plan
+        .all_stages()
+        .into_iter()
+        .filter(|stage| !stage.time.is_relaxation());
+    let safety = |stage: Stage| match stage.time.step {
+        StepRule::Automatic(safety) => Some(safety),
+        StepRule::Fixed(_) => None,
+    };
+    moving.filter_map(safety).collect()
 }
 
 /// How many times stiffer a family with bonds stretched by `stretch` is than the stable step is for: such bonds

@@ -355,12 +355,15 @@ impl<'a> ResultFile<'a> {
             return Ok(());
         }
         let file = &mut self.file;
+        // None may become shorter, see `close`.
         for (_, dataset) in &mut self.fields {
-            file.resize(dataset, steps * self.piece.total)?;
+            let rows = dataset.rows().max(steps * self.piece.total);
+            file.resize(dataset, rows)?;
         }
         let root = file.communicator().rank() == 0;
         for table in &mut self.tables {
-            file.resize(&mut table.dataset, steps)?;
+            let rows = table.dataset.rows().max(steps);
+            file.resize(&mut table.dataset, rows)?;
             let value = |k: u64| table.start + table.stride * k as i64;
             let values: Vec<i64> = (0..steps).map(value).collect();
             file.write_rows(&table.dataset, 0, if root { &values } else { &[] })?;
@@ -401,34 +404,40 @@ impl<'a> ResultFile<'a> {
         self.file.no_collective_cause()
     }
 
-    /// Closes the file. Room that was not used is given back, or kept for a run that `goes_on` another time.
+    /// Closes the file. Datasets end with the last step, or keep their room for a run that `goes_on` another time.
     ///
     /// # Errors
     /// The disc is full, or an earlier operation failed.
     pub fn close(self, goes_on: bool) -> Result<()> {
         let (comm, path) = (self.file.communicator(), self.file.path().to_path_buf());
-        let tables = self.tables.iter().map(|table| &table.dataset);
-        let tables = tables.map(|table| (table.path().to_owned(), table.rows(), self.steps));
-        let fields = self.fields.iter();
-        let fields = fields.map(|(_, field)| (field.path().to_owned(), field.rows(), self.rows));
-        let unused: Vec<_> = tables
+        let tables = self.tables.iter().map(|table| (&table.dataset, self.steps));
+        let fields = self.fields.iter().map(|(_, field)| (field, self.rows));
+        let unused = tables
             .chain(fields)
-            .filter(|(_, has, used)| has > used)
-            .collect();
+            .filter(|(dataset, rows)| dataset.rows() > *rows);
+        let unused = unused.map(|(dataset, rows)| (dataset.path().to_owned(), rows));
+        let unused: Vec<_> = unused.collect();
         self.file.close()?;
-        // By one rank: HDF5 1.10's ranks come apart when they shorten a file that was there before them.
-        let cut = || {
+        // By one rank: HDF5 1.10's ranks come apart when they shorten a file that was there before them. Where
+        // somebody reads it and has locked it, it stays as it is: what is read of it is the same.
+        if !goes_on && !unused.is_empty() && comm.rank() == 0 {
             let alone = threads::alone();
-            let mut file = CollectiveFile::open_to_append(&path, &alone)?;
-            for (dataset, _, rows) in &unused {
-                let mut dataset = file.open_dataset(dataset)?;
-                file.resize(&mut dataset, *rows)?;
-            }
-            file.close()
-        };
-        let is_due = !goes_on && !unused.is_empty() && comm.rank() == 0;
-        agree(comm, if is_due { cut() } else { Ok(()) })
+            let _ = CollectiveFile::open_to_append(&path, &alone).and_then(|mut file| {
+                shorten(&mut file, &unused)?;
+                file.close()
+            });
+        }
+        agree(comm, Ok(()))
     }
+}
+
+/// Cuts datasets to so many rows. For one rank.
+fn shorten(file: &mut CollectiveFile<'_>, lengths: &[(String, u64)]) -> Result<()> {
+    for (path, rows) in lengths {
+        let mut dataset = file.open_dataset(path)?;
+        file.resize(&mut dataset, *rows)?;
+    }
+    Ok(())
 }
 
 /// A chunk of a table of steps or of the history has at least so many rows.

@@ -7,15 +7,13 @@ use super::super::access::Creation;
 use super::super::attribute::Attribute;
 use super::super::changing;
 use super::super::collective::CollectiveFile;
-use super::super::dataset::Dataset;
 use super::super::field::POINT_DATA;
 use super::super::history::{HISTORY, History, HistoryContents};
-use super::{Contents, ResultFile, STEPS, Table, append_one, tables_of};
+use super::{Contents, ResultFile, STEPS, Table, append_one, shorten, tables_of};
 use crate::comm::{Communicator, agree, threads, total};
 use crate::error::{Error, Result};
 
-/// Attributes that tell what a result is of. Those that tell how a run was started stay as they were where a
-/// file is gone on with.
+/// Attributes that tell what a result is of; others tell how the last part of the run was started.
 const IDENTITY: [&str; 3] = ["deck", "deck_in_full", "version"];
 
 /// What is kept of a result.
@@ -29,9 +27,9 @@ impl<'a> ResultFile<'a> {
     /// Goes on with a result after its first steps and rows of its history; later ones are dropped. Also gives
     /// the rows that are kept.
     ///
-    /// Where the file has room for all steps that are expected, and no other text to tell, it is gone on
-    /// with as it is: what is kept is not touched, and whenever the process is killed, it is there. Else it
-    /// is copied to a new file, which then takes the place of the old one.
+    /// Where the file has room for all steps that are expected, and is of the same deck and version, it is
+    /// continued in place: no row that is kept moves, and whenever the process is killed, all are there. Else, or
+    /// where it cannot be written to now, it is copied to a new file, which then takes the place of the old one.
     ///
     /// # Errors
     /// The old file cannot be read, holds less, or other points or fields; the disc is full.
@@ -48,8 +46,7 @@ impl<'a> ResultFile<'a> {
         } else {
             Ok(false)
         };
-        let prepared = agree(comm, prepared)?;
-        if total(comm, u64::from(prepared)) > 0 {
+        if total(comm, u64::from(agree(comm, prepared)?)) > 0 {
             Self::go_on(path, comm, contents, history, kept)
         } else {
             Self::copied(path, comm, contents, history, kept)
@@ -221,31 +218,42 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Lets a file end after what is kept, if it can be gone on with as it is; else it is left alone. For one
-/// rank.
+/// Lets a file end after what is kept, if it can be continued in place; else it is left alone. For one rank.
+///
+/// # Errors
+/// It cannot be written any more.
 fn prepare(path: &Path, contents: &Contents, kept: Kept) -> Result<bool> {
     let alone = threads::alone();
-    let mut file = CollectiveFile::open(path, &alone)?;
-    let fits = has_room(&mut file, contents, kept)?;
-    file.close()?;
-    if !fits {
+    let looked = CollectiveFile::open(path, &alone).and_then(|mut file| {
+        let fits = has_room(&mut file, contents, kept)?;
+        file.close()?;
+        Ok(fits)
+    });
+    // Whoever reads the file may have locked it, and it may be read-only; what is damaged is found when it is
+    // copied.
+    let opened = match looked {
+        Ok(true) => CollectiveFile::open_to_append(path, &alone).ok(),
+        _ => None,
+    };
+    let Some(mut file) = opened else {
         return Ok(false);
-    }
-    let mut file = CollectiveFile::open_to_append(path, &alone)?;
+    };
     // The number of steps first: whenever the process is killed, what it counts is there.
     let steps = Attribute::Integer(kept.steps as i64);
     file.set_attribute(STEPS, "NSteps", steps)?;
     file.flush()?;
-    for (path, rows) in counted_rows(kept) {
-        let mut dataset = file.open_dataset(&path)?;
-        file.resize(&mut dataset, rows)?;
+    shorten(&mut file, &counted_rows(kept))?;
+    for (name, text) in contents.metadata {
+        if file.text_attribute("/", name).ok().as_ref() != Some(text) {
+            file.set_attribute("/", name, Attribute::Text(text))?;
+        }
     }
     file.close()?;
     Ok(true)
 }
 
-/// Whether a file has room for the steps that are expected, no row that is dropped takes a chunk of its
-/// dataset with it, and the texts are the same.
+/// Whether a file is of the same deck and version and has room for the steps that are expected, and no chunk
+/// goes with the rows that are dropped.
 fn has_room(file: &mut CollectiveFile<'_>, contents: &Contents, kept: Kept) -> Result<bool> {
     if contents.changing {
         return Ok(false);
@@ -257,24 +265,23 @@ fn has_room(file: &mut CollectiveFile<'_>, contents: &Contents, kept: Kept) -> R
             return Ok(false);
         }
     }
-    let is_long = |dataset: Dataset, rows: u64| dataset.rows() >= rows;
     if file.open_dataset("/VTKHDF/Points")?.rows() != total {
         return Ok(false);
     }
     for field in contents.moving {
         let dataset = file.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
-        if !is_long(dataset, steps * total) {
+        if dataset.rows() < steps * total {
             return Ok(false);
         }
     }
     for (path, _, _) in tables_of(contents) {
-        if !is_long(file.open_dataset(&path)?, steps) {
+        if file.open_dataset(&path)?.rows() < steps {
             return Ok(false);
         }
     }
     for (path, rows) in counted_rows(kept) {
         let dataset = file.open_dataset(&path)?;
-        if dataset.rows() < rows || !dataset.has_room_for(rows) {
+        if dataset.rows() < rows || dataset.frees_a_chunk(rows) {
             return Ok(false);
         }
     }
