@@ -278,18 +278,22 @@ mod tests {
     /// What is told of a wrong deck depends on these words of the reader.
     #[test]
     fn the_reader_says_what_is_looked_for() {
-        let grid = "dimension = '2d'\ngrid = { spacing = 1, horizon = 3 }\n";
+        let grid = "dimension = 'plane-stress'\ngrid = { spacing = 1, horizon = 3 }\n";
+        let mut others = Vec::new();
         for (wrong, said) in [
-            ("dimension = '2d'\ndimension = '2d'", "duplicate key"),
+            (
+                "dimension = 'plane-stress'\ndimension = 'plane-stress'",
+                "duplicate key",
+            ),
             ("dimension = plane", "string values must be quoted"),
             ("dimension =", "string values must be quoted"),
             (
-                "dimension = '2d' 3",
+                "dimension = 'plane-stress' 3",
                 "unexpected key or value, expected newline",
             ),
             ("", "missing field `dimension`"),
             (
-                "dimension = '2d'\ngrit = 1",
+                "dimension = 'plane-stress'\ngrit = 1",
                 "unknown field `grit`, expected ",
             ),
             ("dimension = '4d'", "unknown variant `4d`, expected "),
@@ -298,12 +302,8 @@ mod tests {
                 "wanted exactly 1 element",
             ),
             (
-                "[body.plate.shape.disc]\ncentre = [0, 0]\nradius = 1\nheight = 2",
-                "unexpected keys in table: ",
-            ),
-            (
                 "[crack.notch.segment]\nfrom = [0]\nto = [1]\nvia = [2]",
-                "unknown field `via`, expected ",
+                "unexpected keys in table: via, available keys: from, to, width",
             ),
             ("time = { end = 1, step = [] }", "invalid type: "),
             ("output = { every_steps = 0 }", "invalid value: "),
@@ -315,7 +315,10 @@ mod tests {
             };
             let error = toml::from_str::<Deck>(&deck).err();
             let message = error.map_or_else(String::new, |error| error.message().trim().to_owned());
-            assert!(message.starts_with(said), "{wrong}: {message}");
+            if !message.starts_with(said) {
+                others.push(format!("{wrong}: {message}"));
+            }
         }
+        assert!(others.is_empty(), "{}", others.join("\n"));
     }
 }
