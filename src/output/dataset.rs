@@ -50,7 +50,8 @@ impl Dataset {
 
     /// Whether a chunk goes if it is cut to so many rows.
     pub fn frees_a_chunk(&self, rows: u64) -> bool {
-        rows.div_ceil(self.rows_per_chunk.max(1)) < self.rows.div_ceil(self.rows_per_chunk.max(1))
+        let chunk = self.rows_per_chunk.max(1);
+        rows.div_ceil(chunk) < self.rows.div_ceil(chunk)
     }
 
     /// The numbers of a row.

@@ -56,17 +56,7 @@ impl History {
         for (name, texts) in [(COLUMNS, names), (UNITS, units)] {
             file.set_dataset_attribute(&table, name, Attribute::Text(&texts.join(SEPARATOR)))?;
         }
-        let comm = file.communicator();
-        let writer = if comm.rank() == 0 {
-            create_csv(csv, &header(columns)).map(Some)
-        } else {
-            Ok(None)
-        };
-        Ok(Self {
-            table,
-            csv: csv.to_path_buf(),
-            writer: agree(comm, writer)?,
-        })
+        Self::with(file, table, csv, || create_csv(csv, &header(columns)))
     }
 
     /// Collective. Goes on after the rows of the history in a file, which are given. The CSV file is written anew,
@@ -87,9 +77,19 @@ impl History {
             std::fs::rename(&part, csv).map_err(|error| csv_failure(csv, &error))?;
             Ok(writer)
         };
+        Self::with(file, table, csv, rewritten)
+    }
+
+    /// With the CSV file that rank 0 begins.
+    fn with(
+        file: &CollectiveFile<'_>,
+        table: Dataset,
+        csv: &Path,
+        begin: impl FnOnce() -> Result<File>,
+    ) -> Result<Self> {
         let comm = file.communicator();
         let writer = if comm.rank() == 0 {
-            rewritten().map(Some)
+            begin().map(Some)
         } else {
             Ok(None)
         };

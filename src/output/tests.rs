@@ -113,3 +113,82 @@ fn what_is_no_result_is_named_so() {
     assert!(message(&path).contains("no group /VTKHDF"));
     std::fs::remove_file(&path).unwrap();
 }
+
+/// Stops a result of the deck `one` after two steps, of which one is kept, goes on with that of `deck` and gives it
+/// four, for two were expected. Returns whether it stayed in its place.
+fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
+    use std::os::unix::fs::MetadataExt as _;
+
+    let path = std::env::temp_dir().join(format!("fissure-{name}-{}.h5", std::process::id()));
+    let comm = threads::alone();
+    let positions = [[0.0; 3], [1.0, 0.0, 0.0]];
+    let moving = [describe("damage", "", 1)];
+    let metadata = |deck: &str, ranks: &str| [("deck", deck.into()), ("ranks", ranks.into())];
+    let contents = |metadata| Contents {
+        piece: Piece { first: 0, total: 2 },
+        changing: false,
+        positions: &positions,
+        fixed: &[],
+        moving: &moving,
+        metadata,
+        single: false,
+        steps: 2,
+    };
+    let (columns, csv) = ([("time".into(), "s")], path.with_extension("csv"));
+    let history = HistoryContents {
+        columns: &columns,
+        csv: &csv,
+        rows: 2,
+    };
+    let write = |file: &mut ResultFile<'_>, step: u64| {
+        file.append_history(&[vec![step as f64]])?;
+        file.write_step(step as f64, step, &[&[step as f64, 10.0 + step as f64]])
+    };
+    let first = metadata("one", "4");
+    let mut file = ResultFile::create(&path, &comm, Creation::Exclusive, &contents(&first))?;
+    file.create_history(&history)?;
+    write(&mut file, 0)?;
+    write(&mut file, 7)?;
+    file.close(true)?;
+    let inode = || std::fs::metadata(&path).unwrap().ino();
+    let before = inode();
+    let second = metadata(deck, "12");
+    let (mut file, past) = ResultFile::resume(&path, &comm, &contents(&second), &history, (1, 1))?;
+    assert_eq!(past, [[0.0]]);
+    assert_eq!(file.past(), [(0.0, 2)]);
+    for step in 1..4 {
+        write(&mut file, step)?;
+    }
+    file.close(false)?;
+    let reader = ResultReader::open(&path)?;
+    assert_eq!(reader.steps()?, [0, 1, 2, 3]);
+    assert_eq!(reader.times()?, [0.0, 1.0, 2.0, 3.0]);
+    for step in 0..4 {
+        let found = reader.field("damage", step)?;
+        assert_eq!(found, [step as f64, 10.0 + step as f64]);
+    }
+    assert_eq!(reader.history()?[0].values, [0.0, 1.0, 2.0, 3.0]);
+    drop(reader);
+    let text = std::fs::read_to_string(&csv).unwrap();
+    assert_eq!(text, "time [s]\n0\n1\n2\n3\n");
+    let mut file = CollectiveFile::open(&path, &comm)?;
+    assert_eq!(file.text_attribute("/", "ranks")?, "12");
+    assert_eq!(file.open_dataset("/VTKHDF/PointData/damage")?.rows(), 8);
+    file.close()?;
+    let stayed = inode() == before;
+    std::fs::remove_file(&path).unwrap();
+    std::fs::remove_file(&csv).unwrap();
+    Ok(stayed)
+}
+
+#[test]
+fn a_result_that_outgrows_its_room_in_place() -> Result<()> {
+    assert!(is_continued_in_place("grown", "one")?);
+    Ok(())
+}
+
+#[test]
+fn a_result_of_another_deck_is_copied() -> Result<()> {
+    assert!(!is_continued_in_place("copied", "another")?);
+    Ok(())
+}

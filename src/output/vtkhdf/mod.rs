@@ -88,9 +88,16 @@ pub struct ResultFile<'a> {
     history: Option<History>,
 }
 
-/// Numbers of the steps that are known in advance: `start + stride · k` for the step with index k.
+/// Numbers of the steps that are known in advance.
 struct Table {
     dataset: Dataset,
+    rule: Rule,
+}
+
+/// The numbers of a table: `start + stride · k` for the step with index k, or from `start` on what is counted where
+/// each step has its own points.
+#[derive(Debug, Clone, Copy)]
+struct Rule {
     start: i64,
     stride: i64,
     counted: Counted,
@@ -244,8 +251,8 @@ impl<'a> ResultFile<'a> {
         )?;
         let root = self.file.communicator().rank() == 0;
         for table in &mut self.tables {
-            let value = table.start
-                + match table.counted {
+            let value = table.rule.start
+                + match table.rule.counted {
                     Counted::Nothing => 0,
                     Counted::Steps => self.steps as i64,
                     Counted::Points => self.rows as i64,
@@ -334,18 +341,13 @@ impl<'a> ResultFile<'a> {
         path: &str,
         columns: Option<usize>,
         steps: u64,
-        (start, stride, counted): Rule,
+        rule: Rule,
     ) -> Result<()> {
         let rows = Rows::Extensible {
             per_append: steps.max(LEAST_ROWS),
         };
         let dataset = self.file.create_dataset::<i64>(path, rows, columns)?;
-        self.tables.push(Table {
-            dataset,
-            start,
-            stride,
-            counted,
-        });
+        self.tables.push(Table { dataset, rule });
         Ok(())
     }
 
@@ -364,7 +366,7 @@ impl<'a> ResultFile<'a> {
         for table in &mut self.tables {
             let rows = table.dataset.rows().max(steps);
             file.resize(&mut table.dataset, rows)?;
-            let value = |k: u64| table.start + table.stride * k as i64;
+            let value = |k: u64| table.rule.start + table.rule.stride * k as i64;
             let values: Vec<i64> = (0..steps).map(value).collect();
             file.write_rows(&table.dataset, 0, if root { &values } else { &[] })?;
         }
@@ -453,21 +455,26 @@ fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> 
     )
 }
 
-/// What the numbers of a table begin with, how much they grow by from step to step, and what they count where
-/// each step has its own points.
-type Rule = (i64, i64, Counted);
-
 /// The tables of a result: path, columns and rule.
 fn tables_of(contents: &Contents) -> Vec<(String, Option<usize>, Rule)> {
+    let rule = |start, stride, counted| Rule {
+        start,
+        stride,
+        counted,
+    };
     let offsets = |field: &FieldDescription, stride| {
         let path = format!("{STEPS}/PointDataOffsets/{}", field.name);
-        (path, None, (0, stride, Counted::Points))
+        (path, None, rule(0, stride, Counted::Points))
     };
     let fixed = contents.fixed.iter().map(|(field, _)| offsets(field, 0));
     let total = contents.piece.total as i64;
     let moving = contents.moving.iter().map(|field| offsets(field, total));
-    let of_steps = STEP_TABLES.iter().map(|(name, columns, value, counted)| {
-        (format!("{STEPS}/{name}"), *columns, (*value, 0, *counted))
+    let of_steps = STEP_TABLES.iter().map(|(name, columns, start, counted)| {
+        (
+            format!("{STEPS}/{name}"),
+            *columns,
+            rule(*start, 0, *counted),
+        )
     });
     fixed.chain(moving).chain(of_steps).collect()
 }

@@ -1,5 +1,4 @@
-//! Going on with a result: in the file itself where nothing but numbers of rows has to change in it, else
-//! in a copy of what is kept.
+//! Going on with a result: in the file itself where no row has to move in it, else in a copy of what is kept.
 
 use std::path::Path;
 
@@ -74,14 +73,8 @@ impl<'a> ResultFile<'a> {
         }
         let mut tables = Vec::new();
         for (path, _, rule) in tables_of(contents) {
-            let (start, stride, counted) = rule;
             let dataset = file.open_dataset(&path)?;
-            tables.push(Table {
-                dataset,
-                start,
-                stride,
-                counted,
-            });
+            tables.push(Table { dataset, rule });
         }
         let capacity = tables.iter().map(|table| table.dataset.rows());
         let capacity = capacity.chain(fields.iter().map(|(_, field)| field.rows() / total));
