@@ -27,6 +27,7 @@ examples:
   scripts/pmma --small                       2 mm, to see that it runs; seconds
   scripts/pmma --dx 1e-3                     a coarse grid
   scripts/pmma --dx 0.31e-3 --threads 2      the paper's grid
+  scripts/pmma --relaxation 60               from equilibrium to equilibrium, in 60 load steps
   scripts/pmma --set speed=0.01              another parameter of the deck; may be repeated
   scripts/pmma --reuse                       tables and pictures of runs that are there
 
@@ -67,6 +68,16 @@ MEASURED = 1e-3 * numpy.array(
 INITIATION = 0.43e-3  # m, the paper's section 6.3
 HOLE = (0.095, 0.035, 0.015)  # centre and radius, m
 CRACKED = 0.35  # the deck's damage_threshold
+
+# What relaxation has in place of these keys: no inertia, and a row of the history at each equilibrium.
+RELAXED = {
+    r'(?m)^end = "end_displacement/speed"$': """\
+end = "end_displacement/speed"
+method = "relaxation"
+relaxation = {{ load_steps = {steps}, tolerance = 1e-4 }}""",
+    r"\[initial\.compression\]\n.*\n": "",
+    r'every = "end_displacement/speed/700"': "every_steps = 1",
+}
 
 # The tables of material and damage; those of the deck itself where there are none.
 LAWS = {
@@ -118,6 +129,7 @@ def arguments():
     add("--laws", type=several_laws, default=list(LAWS), metavar="LIST", help="[all]")
     add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
     add("--small", action="store_true", help="2 mm and a fast press")
+    add("--relaxation", type=int, metavar="STEPS", help="equilibria, in so many load steps [explicit]")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
     add("--reuse", action="store_true", help="take the runs that are there")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
@@ -130,25 +142,33 @@ def arguments():
     return options
 
 
-def deck(law):
-    """The deck's text with another law."""
+def deck(law, load_steps):
+    """The deck's text with another law; with relaxation, if there are load steps."""
     text = DECK.read_text()
-    if LAWS[law] is None:
-        return text
-    tables = re.compile(r"\[material\.pmma\..*?(?=\[body\.plate\])", re.DOTALL)
-    if len(tables.findall(text)) != 1:
-        sys.exit(f"error: {DECK} has not one table [material.pmma.LAW] before [body.plate]")
-    return tables.sub(LAWS[law], text)
+
+    def replace(pattern, new):
+        nonlocal text
+        text, count = re.subn(pattern, lambda _: new, text)
+        if count != 1:
+            sys.exit(f"error: {DECK} has {count} times what fits `{pattern}`, and should have it once")
+
+    if LAWS[law] is not None:
+        replace(r"(?s)\[material\.pmma\..*?(?=\[body\.plate\])", LAWS[law])
+    if load_steps:
+        for pattern, new in RELAXED.items():
+            replace(pattern, new.format(steps=load_steps))
+    return text
 
 
 def run(options, law):
     """Runs the deck with a law; returns its folder."""
-    folder = options.output / f"{law}-{options.dx * 1e3:g}"
+    way = "-relaxed" if options.relaxation else ""
+    folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
     folder.mkdir(parents=True, exist_ok=True)
     if options.reuse and (folder / "crack_main.csv").exists():
         return folder
     written = folder / "deck.toml"
-    written.write_text(deck(law))
+    written.write_text(deck(law, options.relaxation))
     command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
     for assignment in [f"dx={options.dx!r}", *options.set]:
         command += ["--set", assignment]

@@ -235,6 +235,9 @@ fn same_everywhere(name: &str, text: &str, must_break: bool) {
                 if text.contains("[refinement.trigger]") {
                     let points = &found["history points"];
                     assert!(points.last() > points.first(), "no point was born");
+                    let points: Vec<f64> = points.iter().map(|n| f64::from_bits(*n)).collect();
+                    let fewer = points.windows(2).any(|pair| pair[1] < pair[0]);
+                    assert!(fewer, "no point has left");
                 }
                 if text.contains("yield_str") {
                     assert!(last("dissipated_energy") > 0.0, "nothing has yielded");
@@ -302,6 +305,7 @@ fn growing() -> String {
         damage = 0.3
         where = 't > 1e-6 && x < 3*dx && y > 0'
         every_steps = 5
+        coarsen_after = 3e-7
         [checkpoint]
         every_steps = 9
         {RESTLESS}"

@@ -132,7 +132,7 @@ fn killed_at_any_moment_and_continued_on_any_number_of_ranks() {
 #[test]
 fn killed_while_the_grid_grows_and_continued_on_any_number_of_ranks() {
     let more = "checkpoint.every_steps = 15
-        refinement = { levels = 1, trigger = { damage = 0.2, energy = 0.5, every_steps = 25 } }
+        refinement = { levels = 1, trigger = { damage = 0.2, energy = 0.5, every_steps = 25, coarsen_after = 2e-7 } }
         balance = { every_steps = 70, imbalance = 1 }";
     survives_kills(
         "kills-growing",

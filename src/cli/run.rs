@@ -10,6 +10,7 @@ use fissure::comm::{Communicator, agree};
 use fissure::deck;
 use fissure::error::Result;
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Signals, View};
+use fissure::solver::refinement::Regridded;
 use fissure::solver::repartition::Repartition;
 
 use super::format::{count, si};
@@ -148,12 +149,18 @@ impl Observer for Log {
             }
             Message::Refined {
                 number,
-                born,
+                regridded: Regridded { born, left },
                 points,
             } if self.speaks && self.verbose => {
                 let (born, points) = (count(*born), count(*points));
-                let aside = || say!("after step {number}: {born} new points, {points} in all");
-                self.progress.aside(aside);
+                let left = if *left > 0 {
+                    format!(", {} left", count(*left))
+                } else {
+                    String::new()
+                };
+                self.progress.aside(|| {
+                    say!("after step {number}: {born} new points{left}, {points} in all");
+                });
             }
             Message::Repartitioned { number, what } if self.speaks && self.verbose => {
                 let Repartition {

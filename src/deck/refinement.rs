@@ -125,6 +125,10 @@ fn trigger(
         let parse = |number| scope.expression(number, &format!("{key} {name}"), &ALL_VARIABLES);
         number.as_ref().map(parse).transpose()
     };
+    let coarsen_after = trigger
+        .coarsen_after
+        .as_ref()
+        .map(|number| scope.positive(number, &format!("{key} coarsen_after")));
     Ok(Some(plan::Trigger {
         span: table.span(),
         every_steps: trigger.every_steps.get_ref().get(),
@@ -132,6 +136,7 @@ fn trigger(
         damage: share(&trigger.damage, "damage")?,
         condition: parse(&trigger.condition, "where")?,
         only: parse(&trigger.only, "only")?,
+        coarsen_after: coarsen_after.transpose()?,
     }))
 }
 

@@ -107,6 +107,9 @@ impl<'a> Grids<'a> {
         self.part(&whole, &|a, b| {
             plan.cracks.iter().any(|crack| crosses(crack, a, b))
         });
+        for grid in self.bodies.iter_mut().flatten() {
+            grid.pattern.make_last();
+        }
         Ok(())
     }
 
@@ -120,6 +123,39 @@ impl<'a> Grids<'a> {
             changed |= pattern.refine(&|cell| cells.has_cell(cell), *level as u32, [*x, *y, *z]);
         }
         changed
+    }
+
+    /// Makes refined nodes coarse again, but for those that are refined from the start or are needed by finer ones.
+    /// Returns the nodes that are no longer there: body, level of their birth, and place in steps of the
+    /// finest level, the finest level first, each once.
+    pub fn coarsen(&mut self, picks: &[Pick]) -> Vec<Pick> {
+        let mut coarse: Vec<Pick> = picks.to_vec();
+        // Finer nodes first, for they need the coarser ones.
+        coarse.sort_unstable_by_key(|[body, level, x, y, z]| (-level, *body, *z, *y, *x));
+        coarse.retain(|[body, level, x, y, z]| {
+            let grid = self.bodies[*body as usize].as_mut();
+            grid.is_some_and(|grid| grid.pattern.coarsen(*level as u32, [*x, *y, *z]))
+        });
+        let mut left: Vec<Pick> = Vec::new();
+        for [number, level, x, y, z] in coarse {
+            let Some(BodyGrid { cells, pattern }) = &self.bodies[number as usize] else {
+                continue;
+            };
+            let body = |cell| cells.has_cell(cell);
+            let gone = pattern.left(&body, level as u32, [x, y, z]);
+            left.extend(gone.map(|[x, y, z]| [number, level + 1, x, y, z]));
+        }
+        left.sort_unstable_by_key(|[body, level, x, y, z]| (-level, *body, *z, *y, *x));
+        left.dedup();
+        left
+    }
+
+    /// What making the refined point of a body at a position (m) coarse means; none if it is not refined, or was
+    /// from the start.
+    pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<Pick> {
+        let place = self.place_at(body, position)?;
+        let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(place)?;
+        Some([body as i64, i64::from(level), x, y, z])
     }
 
     /// Of the nodes that have come since an earlier state, takes back those that lie between places (m) which

@@ -25,6 +25,8 @@ pub struct Pattern {
     dimension: usize,
     /// One set a level but the finest.
     refined: Vec<HashSet<Place>>,
+    /// Those that stay refined, by level.
+    lasting: Vec<HashSet<Place>>,
     /// Places where no node is born, with the level that it would be born at.
     parted: HashSet<(u32, Place)>,
 }
@@ -35,6 +37,7 @@ impl Pattern {
         Self {
             dimension,
             refined: vec![HashSet::new(); finest as usize],
+            lasting: vec![HashSet::new(); finest as usize],
             parted: HashSet::new(),
         }
     }
@@ -61,6 +64,52 @@ impl Pattern {
             }
         }
         true
+    }
+
+    /// Makes a refined node of a level, given in steps of it, coarse again, unless it is to last or is needed by
+    /// one of the next level. Returns whether it was refined until now.
+    pub fn coarsen(&mut self, level: u32, place: Place) -> bool {
+        let finer = level as usize + 1;
+        let is_needed = self.refined.get(finer).is_some_and(|finer| {
+            finer.contains(&place.map(|x| 2 * x))
+                || around(place, self.dimension).any(|other| finer.contains(&other))
+        });
+        let level = level as usize;
+        !is_needed && !self.lasting[level].contains(&place) && self.refined[level].remove(&place)
+    }
+
+    /// Makes the nodes that are refined now last.
+    pub fn make_last(&mut self) {
+        self.lasting.clone_from(&self.refined);
+    }
+
+    /// The finest level at which a place, in steps of the finest level, is a refined node, if it is not to last
+    /// there.
+    pub fn refined_at(&self, place: Place) -> Option<(u32, Place)> {
+        let finest = self.finest();
+        let (birth, _) = born(finest, place);
+        let nodes = (birth..finest).map(|level| (level, place.map(|x| x >> (finest - level))));
+        let is_in = |sets: &[HashSet<Place>], (level, place): &(u32, Place)| {
+            sets[*level as usize].contains(place)
+        };
+        let node = nodes.rev().find(|node| is_in(&self.refined, node));
+        node.filter(|node| !is_in(&self.lasting, node))
+    }
+
+    /// The nodes that a refined one of a level had around it and that are no longer there now that it is coarse,
+    /// in steps of the finest level.
+    pub fn left(
+        &self,
+        body: &impl Fn(Place) -> bool,
+        level: u32,
+        place: Place,
+    ) -> impl Iterator<Item = Place> {
+        let steps = 1 << (self.finest() - level - 1);
+        around(place, self.dimension)
+            .filter(move |other| {
+                self.is_possible(body, level + 1, *other) && !self.exists(body, level + 1, *other)
+            })
+            .map(move |other| other.map(|x| x * steps))
     }
 
     /// The refined nodes with their levels, in no order.
@@ -297,33 +346,84 @@ mod tests {
                 pattern.refine(&body, level, place);
             }
         }
-        let nodes = nodes(&pattern, &body, edge);
         let high = std::array::from_fn(|k| if k < dimension { edge } else { 0 });
         let cells = between([0; 3], high).filter(|cell| body(*cell)).count() as f64;
-        let volume: f64 = nodes.iter().map(|(_, node)| node.share).sum();
-        assert!((volume / cells - 1.0).abs() < 1e-13, "{volume} for {cells}");
-        for (place, node) in &nodes {
-            assert!(node.share > 0.0, "{place:?}: {node:?}");
-        }
-        for (level, place) in pattern.refined() {
-            assert!(pattern.exists(&body, level, place));
-            for parent in parents(place).filter(|_| level > 0) {
-                assert!(pattern.refined[level as usize - 1].contains(&parent));
+        let is_sound = |pattern: &Pattern| {
+            let nodes = nodes(pattern, &body, edge);
+            let volume: f64 = nodes.iter().map(|(_, node)| node.share).sum();
+            assert!((volume / cells - 1.0).abs() < 1e-13, "{volume} for {cells}");
+            for (place, node) in &nodes {
+                assert!(node.share > 0.0, "{place:?}: {node:?}");
             }
-        }
-        // A node and the next one in a row differ by one level at most, if no crack lies between them.
-        for (place, node) in &nodes {
-            for k in (0..dimension).filter(|_| parted.is_empty()) {
-                let next = (1..=1 << finest).find_map(|step| {
-                    let mut other = *place;
-                    other[k] += step;
-                    pattern.node(&body, other)
-                });
-                if let Some(next) = next {
-                    assert!(node.level.abs_diff(next.level) <= 1, "{place:?} {k}");
+            for (level, place) in pattern.refined() {
+                assert!(pattern.exists(&body, level, place));
+                for parent in parents(place).filter(|_| level > 0) {
+                    assert!(pattern.refined[level as usize - 1].contains(&parent));
                 }
             }
+            // A node and the next one in a row differ by one level at most, if no crack lies between them.
+            for (place, node) in &nodes {
+                for k in (0..dimension).filter(|_| parted.is_empty()) {
+                    let next = (1..=1 << finest).find_map(|step| {
+                        let mut other = *place;
+                        other[k] += step;
+                        pattern.node(&body, other)
+                    });
+                    if let Some(next) = next {
+                        assert!(node.level.abs_diff(next.level) <= 1, "{place:?} {k}");
+                    }
+                }
+            }
+            nodes
+        };
+        let mut before = is_sound(&pattern);
+        // Some of what was refined becomes coarse again, then the rest of it.
+        for every in [3, 1] {
+            let mut refined: Vec<(u32, Place)> = pattern.refined().collect();
+            refined.sort_unstable_by_key(|(level, place)| (std::cmp::Reverse(*level), *place));
+            let earlier = pattern.clone();
+            let coarse = refined.into_iter().step_by(every);
+            let coarse: Vec<(u32, Place)> = coarse
+                .filter(|(level, place)| pattern.coarsen(*level, *place))
+                .collect();
+            let left = coarse
+                .iter()
+                .flat_map(|(level, place)| pattern.left(&body, *level, *place));
+            let left: HashSet<Place> = left.collect();
+            let after = is_sound(&pattern);
+            let stays = |(place, _): &&(Place, Node)| !left.contains(place);
+            let places = |nodes: Vec<&(Place, Node)>| -> Vec<Place> {
+                nodes.into_iter().map(|(place, _)| *place).collect()
+            };
+            let stayed = places(before.iter().filter(stays).collect());
+            assert_eq!(stayed, places(after.iter().collect()));
+            // Those that leave have their whole cell to give, but for finer ones that leave with them.
+            for (place, node) in before.iter().filter(|node| !stays(node)) {
+                let (level, _) = born(finest, *place);
+                let alone = 0.5_f64.powi((level * dimension as u32) as i32);
+                let finer = around_by_half(level, finest, *place, dimension);
+                if finer
+                    .iter()
+                    .all(|other| earlier.node(&body, *other).is_none())
+                {
+                    assert_eq!((node.level, node.share), (level, alone));
+                }
+            }
+            before = after;
         }
+        assert_eq!(before.len() as f64, cells);
+    }
+
+    /// The places half a step of a level around a place, in steps of the finest level.
+    fn around_by_half(level: u32, finest: u32, place: Place, dimension: usize) -> Vec<Place> {
+        if level == finest {
+            return Vec::new();
+        }
+        let scale = 1 << (finest - level - 1);
+        let here = place.map(|x| x >> (finest - level));
+        around(here, dimension)
+            .map(|other| other.map(|x| x * scale))
+            .collect()
     }
 
     proptest! {

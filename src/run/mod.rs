@@ -238,13 +238,13 @@ impl<'a> Job<'a> {
         let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
             if simulation.is_refinement_due() {
-                let born = simulation.refine()?;
-                if born > 0 {
+                let regridded = simulation.refine()?;
+                if regridded.is_change() {
                     recorder.follow(simulation)?;
                     stable = self.warn_of_step(simulation, stable);
                     self.observer.message(&Message::Refined {
                         number: simulation.clock.number(),
-                        born,
+                        regridded,
                         points: simulation.model.total,
                     });
                 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::solver::Simulation;
 use crate::solver::observers::{Energies, HistoryRow};
+use crate::solver::refinement::Regridded;
 use crate::solver::repartition::Repartition;
 use crate::survey::Survey;
 
@@ -63,12 +64,12 @@ pub enum Message {
         /// What there is of the result so far, under its new names.
         kept: Vec<PathBuf>,
     },
-    /// The grid has been refined.
+    /// The grid has been refined, or made coarser.
     Refined {
         /// Number of the step after which.
         number: u64,
-        /// Number of new points.
-        born: u64,
+        /// Points that came and went.
+        regridded: Regridded,
         /// Number of points that there are now.
         points: u64,
     },

@@ -190,6 +190,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             relaxation: plan.relaxes(),
             damage: plan.bodies.iter().any(|body| body.damage.is_some()),
             plasticity: forces.flow(),
+            coarsening: refinement::may_coarsen(plan),
         };
         let mut fields = Fields::new(&model, needs);
         if let Some(density) = &mut fields.fictitious_density {

@@ -7,6 +7,7 @@ use crate::solver::assign::block_laws;
 use crate::solver::conditions::members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
+use crate::solver::refinement::may_coarsen;
 
 /// Bytes a point that a result holds once: position, id, block, volume, and the cell that shows it.
 const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
@@ -159,7 +160,7 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
 }
 
 /// Numbers that a checkpoint holds a point: displacement, velocity; bonds that broke, and their energies;
-/// reactions, work; what damping takes; what plastic flow leaves.
+/// reactions, work; what damping takes; what plastic flow leaves; when a trigger was last near.
 fn saved_width(plan: &Plan) -> usize {
     let dimension = plan.dimension.count();
     let is_support =
@@ -185,7 +186,8 @@ fn saved_width(plan: &Plan) -> usize {
         _ => false,
     });
     let flowed = if flows { PlasticState::COUNT } else { 0 };
-    2 * dimension + broken + supported + worked + usize::from(damped) + relaxed + flowed
+    let seen = usize::from(may_coarsen(plan));
+    2 * dimension + broken + supported + worked + usize::from(damped) + relaxed + flowed + seen
 }
 
 fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {

@@ -51,6 +51,10 @@ pub struct Trigger {
     /// A condition on the reference position and t without which a point is no trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
+    /// Time (s) out of the sight of triggers after which points become coarser again, by one level at a time;
+    /// never if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coarsen_after: Option<Number>,
 }
 
 fn default_look() -> Spanned<Count> {

@@ -36,6 +36,9 @@ pub struct Trigger {
     pub condition: Option<Expression>,
     /// Which points can be triggers at all, by reference position and time.
     pub only: Option<Expression>,
+    /// Time (s) without a trigger within whose horizon it lies after which what was refined becomes coarser;
+    /// never if not given.
+    pub coarsen_after: Option<f64>,
 }
 
 /// How the horizon goes with the spacing from level to level.

@@ -23,20 +23,21 @@ pub struct Description {
     pub state: bool,
     /// Whether a step that is undone changes it back.
     pub undone: bool,
-    /// What a point that is born during a run gets.
+    /// What a point that is born during a run gets, and what those get that it lies between when it leaves.
     pub birth: Birth,
     /// The name under which decks ask for it.
     pub output: Option<Field>,
 }
 
-/// What a new point gets from those around it.
+/// What a new point gets from those that it lies between, and what a point that leaves gives them, in equal
+/// parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
-    /// The interpolated value.
+    /// The mean value; and its volume times what it has more than that, so that the integral stays.
     Interpolated,
-    /// A share by volume, so that the sum over all points stays.
+    /// A share by volume, so that the sum over all points stays; and all of it.
     Shared,
-    /// What is found anew.
+    /// What is found anew; and nothing.
     FoundAnew,
 }
 
@@ -245,6 +246,14 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
+    /// Time at which a point was last within the horizon of a trigger of refinement, s; none where grids do not
+    /// become coarser again.
+    last_seen: Option<Vec<f64>> = Description {
+        name: "last_seen",
+        unit: "s",
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
     /// Energy taken by viscous damping, J; none without it.
     damped_energy: Option<Vec<f64>> = Description {
         name: "damped_energy",
@@ -267,6 +276,8 @@ pub struct Needs {
     pub damage: bool,
     /// Whether points keep a plastic state.
     pub plasticity: bool,
+    /// Whether grids become coarser again.
+    pub coarsening: bool,
 }
 
 /// The columns of the plastic state; empty where there is none.
@@ -305,6 +316,7 @@ impl<const D: usize> Fields<D> {
             equilibrium_displacement: needs.relaxation.then(|| vector(owned)),
             equilibrium_reaction: (needs.relaxation && needs.supports).then(|| vector(owned)),
             fictitious_density: needs.relaxation.then(scalar),
+            last_seen: needs.coarsening.then(scalar),
             damped_energy: needs.damping.then(scalar),
         }
     }

@@ -1,4 +1,4 @@
-//! Refinement during a run: which points are refined, and what the new ones begin with.
+//! Refinement during a run: which points are refined, what the new ones begin with, and which leave.
 //!
 //! Points with much strain energy or damage are triggers, and all points within a horizon of one are refined
 //! (Dipasquale et al. 2014, §2.1). A new point has the mean of what the points that it lies between have;
@@ -27,14 +27,30 @@ use super::observers::Snapshot;
 use super::observers::history::point_sums;
 use facets::Facets;
 use past::{NOWHERE, Past};
-pub use trigger::is_possible;
+pub use trigger::{is_possible, may_coarsen};
+
+/// Points that came and went at once, over all ranks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Regridded {
+    /// Number of points that were born.
+    pub born: u64,
+    /// Number of points that left.
+    pub left: u64,
+}
+
+impl Regridded {
+    /// Whether there are other points than before.
+    pub fn is_change(self) -> bool {
+        self != Self::default()
+    }
+}
 
 /// What refinements have done since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Refined {
-    /// Kinetic and strain energy that they added, J.
+    /// Kinetic and strain energy that they added, J; less than 0 if they took some.
     pub energy: f64,
-    /// Intact bonds that they added, each counted from both ends.
+    /// Intact bonds that they added, less those that went, each counted from both ends.
     pub bonds: i64,
 }
 
@@ -72,21 +88,23 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .is_some_and(|trigger| self.clock.number().is_multiple_of(trigger.every_steps))
     }
 
-    /// Refines what the triggers of the plan want. Returns how many points were born over all ranks.
+    /// Refines what the triggers of the plan want, and makes coarse what they have not seen for long enough.
     /// Collective.
     ///
     /// # Errors
     /// When METIS fails; the same on all ranks.
-    pub fn refine(&mut self) -> Result<u64> {
+    pub fn refine(&mut self) -> Result<Regridded> {
         let Some(trigger) = self.trigger() else {
-            return Ok(0);
+            return Ok(Regridded::default());
         };
         let start = Instant::now();
         let snapshot = Snapshot::new(self);
-        let picks = self.picks(trigger, &snapshot);
+        let wanted = self.wanted(trigger, &snapshot);
         let mut grids = self.grids.clone();
-        if !grids.refine(&picks) {
-            return Ok(0);
+        let refined = grids.refine(&wanted.finer);
+        let left = grids.coarsen(&wanted.coarser);
+        if !refined && left.is_empty() {
+            return Ok(Regridded::default());
         }
         let facets = Facets::new(self);
         grids.part(&self.grids, &|a, b| {
@@ -94,13 +112,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
         let (energy, bonds) = self.held(&snapshot);
         let before = self.model.total;
-        self.regrid(grids, &facets)?;
+        self.regrid(grids, &left, &facets)?;
         let snapshot = Snapshot::new(self);
         let (new_energy, new_bonds) = self.held(&snapshot);
         self.refined.energy += new_energy - energy;
         self.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
-        Ok(self.model.total - before)
+        let left = left.len() as u64;
+        Ok(Regridded {
+            born: self.model.total + left - before,
+            left,
+        })
     }
 
     /// Kinetic and strain energy (J) together, and intact bonds from both ends, over all ranks.
@@ -117,12 +139,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ///
     /// # Errors
     /// When METIS fails; the same on all ranks.
-    fn regrid(&mut self, grids: Grids<'a>, facets: &Facets) -> Result<()> {
+    fn regrid(&mut self, grids: Grids<'a>, left: &[Pick], facets: &Facets) -> Result<()> {
         let comm = self.comm;
-        let past = Past::new(self, &grids);
+        let past = Past::new(self, &grids, left);
         let pieces = self.pieces_on(&grids);
         let (ids, rows) = past.rows(self, &grids, &pieces);
-        let mut broken = self.broken();
+        let mut all_broken = self.broken();
+        let staying = past.staying(self.model.owned());
+        let mut broken: Vec<Vec<u64>> = staying
+            .map(|k| std::mem::take(&mut all_broken[k]))
+            .collect();
         broken.resize(ids.len(), Vec::new());
         let source = IdOrder::new(comm, &ids, self.model.coarsest);
         let width = past.columns.len();

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::points::Point;
-use crate::refine::{Grids, Place};
+use crate::refine::{Grids, Pick, Place};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
@@ -18,11 +18,18 @@ pub struct Past {
     births: Vec<Birth>,
     /// Local index by body and place, in steps of the finest level.
     at: HashMap<(usize, Place), usize>,
+    /// Which local points leave.
+    leaves: Vec<bool>,
 }
 
 impl Past {
-    /// Collective.
-    pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>, grids: &Grids<'_>) -> Self {
+    /// Before the nodes `left` leave, each with its body, the level of its birth and its place in steps of the
+    /// finest level, the finest level first, the same on all ranks. Collective.
+    pub fn new<const D: usize>(
+        simulation: &mut Simulation<'_, D>,
+        grids: &Grids<'_>,
+        left: &[Pick],
+    ) -> Self {
         let (plan, comm) = (simulation.plan, simulation.comm);
         let model = &simulation.model;
         let (owned, local) = (model.owned(), model.volume.len());
@@ -52,14 +59,88 @@ impl Past {
             Some(((body, place), point))
         };
         let at = (0..local).filter_map(place).collect();
-        Self {
+        let mut past = Self {
             columns,
             births,
             at,
+            leaves: vec![false; local],
+        };
+        past.leave(simulation, grids, left);
+        past
+    }
+
+    /// Lets those that points which leave lie between have what these have, so that volume, mass, momentum and
+    /// energies stay. Collective.
+    fn leave<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        grids: &Grids<'_>,
+        left: &[Pick],
+    ) {
+        let comm = simulation.comm;
+        let owned = simulation.model.owned();
+        let mut volume = simulation.model.volume.clone();
+        for level in left.chunk_by(|a, b| a[1] == b[1]) {
+            let near: Vec<(usize, Vec<usize>)> = level
+                .iter()
+                .filter_map(|pick| self.with_parents(grids, pick))
+                .collect();
+            let part = |point: usize, parents: &[usize]| volume[point] / parents.len() as f64;
+            let mut grown = volume.clone();
+            for (point, parents) in &near {
+                let part = part(*point, parents);
+                parents.iter().for_each(|parent| grown[*parent] += part);
+            }
+            for (column, birth) in self.columns.iter_mut().zip(&self.births) {
+                if *birth == Birth::FoundAnew {
+                    continue;
+                }
+                let mut gain = vec![0.0; owned];
+                for (point, parents) in &near {
+                    let part = part(*point, parents);
+                    let theirs = parents.iter().map(|parent| column[*parent]);
+                    let mean = theirs.sum::<f64>() / parents.len() as f64;
+                    for parent in parents.iter().filter(|parent| **parent < owned) {
+                        let known = match birth {
+                            Birth::Shared => column[*parent],
+                            _ => mean,
+                        };
+                        gain[*parent] += part * (column[*point] - known);
+                    }
+                }
+                for ((value, gain), volume) in column.iter_mut().zip(gain).zip(&grown) {
+                    *value += gain / volume;
+                }
+                simulation.forces.bring(comm, column);
+            }
+            volume = grown;
+            simulation.forces.bring(comm, &mut volume);
+        }
+        for [body, _, x, y, z] in left {
+            if let Some(point) = self.at.get(&(*body as usize, [*x, *y, *z])) {
+                self.leaves[*point] = true;
+            }
         }
     }
 
-    /// Ids and rows of the owned points and of those that are born in this rank's `pieces`.
+    /// The owned points that stay.
+    pub fn staying(&self, owned: usize) -> impl Iterator<Item = usize> {
+        (0..owned).filter(|point| !self.leaves[*point])
+    }
+
+    /// A node and those that it lies between, if this rank has all of them.
+    fn with_parents(
+        &self,
+        grids: &Grids<'_>,
+        [body, _, x, y, z]: &Pick,
+    ) -> Option<(usize, Vec<usize>)> {
+        let (body, place) = (*body as usize, [*x, *y, *z]);
+        let at = |place: Place| self.at.get(&(body, place)).copied();
+        let parents = grids.parents(place).into_iter().map(at);
+        Some((at(place)?, parents.collect::<Option<_>>()?))
+    }
+
+    /// Ids and rows of the owned points that stay and of those that are born in this rank's `pieces`.
     pub fn rows<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
@@ -67,10 +148,10 @@ impl Past {
         pieces: &[Point],
     ) -> (Vec<u64>, Vec<f64>) {
         let model = &simulation.model;
-        let owned = model.owned();
-        let mut ids = model.ids[..owned].to_vec();
+        let mut ids = Vec::new();
         let mut rows: Vec<f64> = Vec::new();
-        for point in 0..owned {
+        for point in self.staying(model.owned()) {
+            ids.push(model.ids[point]);
             rows.extend(self.columns.iter().map(|column| column[point]));
         }
         let mut born = HashMap::new();

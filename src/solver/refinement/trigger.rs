@@ -17,6 +17,17 @@ struct Source {
     horizon: f64,
 }
 
+/// What the triggers want, of all ranks.
+pub struct Wanted {
+    /// Points that are to be refined.
+    pub finer: Vec<Pick>,
+    /// Refined points that are to become coarse again.
+    pub coarser: Vec<Pick>,
+}
+
+/// Damage that is more than rounding.
+const LEAST_DAMAGE: f64 = 1e-9;
+
 /// More places within the horizon of a finer point are not looked at for coarser ones.
 const MOST_PLACES: f64 = 1e4;
 
@@ -74,6 +85,12 @@ pub fn is_possible(plan: &Plan) -> Result<()> {
     Err(plan.source.error(trigger.span.clone(), message))
 }
 
+/// Whether grids become coarser again during a run.
+pub fn may_coarsen(plan: &Plan) -> bool {
+    let trigger = plan.refinement.as_ref().and_then(|r| r.trigger.as_ref());
+    trigger.is_some_and(|trigger| trigger.coarsen_after.is_some())
+}
+
 impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn trigger(&self) -> Option<&'a Trigger> {
         let refinement = self.plan.refinement.as_ref();
@@ -85,14 +102,46 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.trigger().is_some()
     }
 
-    /// The nodes that are to be refined now, of all ranks. Collective.
-    pub(super) fn picks(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<Pick> {
-        let sources = self.sources(trigger, snapshot);
-        all_gather_many(self.comm, &self.visible(&sources))
+    /// What is to be refined now: points within the horizon of a trigger; and what is to become coarse:
+    /// refined points that have been in the horizon of neither a trigger nor a torn point for long enough.
+    /// Collective.
+    pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
+        let triggers = self.triggers(trigger, snapshot);
+        let mut sources = self.sources(|point| triggers[point]);
+        let finer = self.picks(&self.seen(&sources), |block, position| {
+            self.grids.pick(block, position)
+        });
+        let mut coarser = Vec::new();
+        if let Some(limit) = trigger.coarsen_after {
+            let is_torn = |point| snapshot.damage(&self.family_volume, point) > LEAST_DAMAGE;
+            sources.extend(self.sources(is_torn));
+            let now = self.clock.time();
+            let mut silent = vec![false; self.model.owned()];
+            let seen = self.seen(&sources);
+            let last = self.fields.last_seen.iter_mut().flatten();
+            for ((last, seen), silent) in last.zip(seen).zip(&mut silent) {
+                if seen {
+                    *last = now;
+                }
+                *silent = now - *last >= limit;
+            }
+            coarser = self.picks(&silent, |block, position| {
+                self.grids.coarsening(self.plan.body_of(block), position)
+            });
+        }
+        Wanted { finer, coarser }
     }
 
-    /// The triggers of all ranks.
-    fn sources(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<Source> {
+    /// What `pick` makes of the blocks and positions of the marked points of all ranks.
+    fn picks(&self, marked: &[bool], pick: impl Fn(usize, [f64; 3]) -> Option<Pick>) -> Vec<Pick> {
+        let model = &self.model;
+        let points = (0..model.owned()).filter(|point| marked[*point]);
+        let own = points.filter_map(|k| pick(usize::from(model.block[k]), model.position(k)));
+        all_gather_many(self.comm, &own.collect::<Vec<_>>())
+    }
+
+    /// Of the owned points, which are triggers.
+    fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
         let mut most = [0.0_f64];
         for energy in &snapshot.stored.energy {
@@ -104,7 +153,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .map_or(f64::INFINITY, |share| share * most[0]);
         let time = self.clock.time();
         let holds = |condition: &Expression, point| condition.is_true(model.position(point), time);
-        let is_source = |point: usize| {
+        let is_trigger = |point: usize| {
             if trigger
                 .only
                 .as_ref()
@@ -118,7 +167,13 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 || trigger.damage.is_some_and(|least| damage() >= least)
                 || (trigger.condition.as_ref()).is_some_and(|condition| holds(condition, point))
         };
-        let own = (0..model.owned()).filter(|point| is_source(*point));
+        (0..model.owned()).map(is_trigger).collect()
+    }
+
+    /// The marked points of all ranks, with their horizons.
+    fn sources(&self, marked: impl Fn(usize) -> bool) -> Vec<Source> {
+        let model = &self.model;
+        let own = (0..model.owned()).filter(|point| marked(*point));
         let own: Vec<Source> = own
             .map(|point| Source {
                 position: model.position(point),
@@ -128,31 +183,26 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own)
     }
 
-    /// The nodes of this rank that are to be refined: points that can be, within the horizon of a trigger.
-    fn visible(&self, sources: &[Source]) -> Vec<Pick> {
+    /// Which owned points lie within the horizon of one of the sources.
+    fn seen(&self, sources: &[Source]) -> Vec<bool> {
+        let model = &self.model;
         let longest = sources
             .iter()
             .map(|source| source.horizon)
             .fold(0.0, f64::max);
         if longest == 0.0 {
-            return Vec::new();
+            return vec![false; model.owned()];
         }
         let places: Vec<[f64; 3]> = sources.iter().map(|source| source.position).collect();
         let bins = Bins::new(&places, longest * (1.0 + 1e-9));
-        let model = &self.model;
-        let mut picks = Vec::new();
-        for point in 0..model.owned() {
-            let block = usize::from(model.block[point]);
-            let position = model.position(point);
+        let is_seen = |point: usize| {
             let mut seen = false;
-            bins.within(position, |source, square| {
+            bins.within(model.position(point), |source, square| {
                 let horizon = sources[source as usize].horizon * (1.0 + 1e-9);
                 seen |= square <= horizon * horizon;
             });
-            if seen {
-                picks.extend(self.grids.pick(block, position));
-            }
-        }
-        picks
+            seen
+        };
+        (0..model.owned()).map(is_seen).collect()
     }
 }
