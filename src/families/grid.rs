@@ -6,9 +6,8 @@
 //! grid falls into bands, between which there are no bonds. Lines follow one another without gaps, so
 //! a place is one number.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use crate::lanes::WIDTH;
 use crate::partition::Domain;
@@ -75,7 +74,7 @@ pub struct Grid {
     pub(super) blocks: Vec<u16>,
     /// Owned points and ghosts, and where each chunk's runs start.
     runs: [(Vec<Run>, Vec<u32>); 2],
-    by_line: HashMap<[i64; 3], u32>,
+    by_line: FxHashMap<[i64; 3], u32>,
 }
 
 impl Grid {

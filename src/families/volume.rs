@@ -6,7 +6,8 @@
 //! & Schweitzer 2016, eq. 2): closed form in 1-D and 2-D, quadrature over slices in 3-D.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+
+use rustc_hash::FxHashMap;
 
 use crate::deck::plan::VolumeCorrection;
 
@@ -30,7 +31,7 @@ pub struct CellShare {
     horizon: f64,
     edge: f64,
     dimension: usize,
-    known: RefCell<HashMap<[i64; 3], f64>>,
+    known: RefCell<FxHashMap<[i64; 3], f64>>,
 }
 
 impl CellShare {
@@ -65,7 +66,8 @@ impl CellShare {
             }
             VolumeCorrection::Exact => {
                 // Cells and balls look the same along all axes, so few shares are different.
-                let mut key = offset.map(|x| (x.abs() / self.edge / RESOLUTION).round() as i64);
+                let scale = 1.0 / (self.edge * RESOLUTION);
+                let mut key = offset.map(|x| (x.abs() * scale + 0.5) as i64);
                 key.sort_unstable_by(|a, b| b.cmp(a));
                 let share = || {
                     let radius = self.horizon / self.edge;

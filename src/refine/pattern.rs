@@ -1,6 +1,6 @@
 //! Which nodes of a body are refined, and the nodes that follow.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use super::place::{Place, around, between, born, halves, parents};
 
@@ -24,11 +24,11 @@ pub struct Node {
 pub struct Pattern {
     dimension: usize,
     /// One set a level but the finest.
-    refined: Vec<HashSet<Place>>,
+    refined: Vec<FxHashSet<Place>>,
     /// Those that stay refined, by level.
-    lasting: Vec<HashSet<Place>>,
+    lasting: Vec<FxHashSet<Place>>,
     /// Places where no node is born, with the level that it would be born at.
-    parted: HashSet<(u32, Place)>,
+    parted: FxHashSet<(u32, Place)>,
 }
 
 impl Pattern {
@@ -36,9 +36,9 @@ impl Pattern {
     pub fn new(dimension: usize, finest: u32) -> Self {
         Self {
             dimension,
-            refined: vec![HashSet::new(); finest as usize],
-            lasting: vec![HashSet::new(); finest as usize],
-            parted: HashSet::new(),
+            refined: vec![FxHashSet::default(); finest as usize],
+            lasting: vec![FxHashSet::default(); finest as usize],
+            parted: FxHashSet::default(),
         }
     }
 
@@ -89,7 +89,7 @@ impl Pattern {
         let finest = self.finest();
         let (birth, _) = born(finest, place);
         let nodes = (birth..finest).map(|level| (level, place.map(|x| x >> (finest - level))));
-        let is_in = |sets: &[HashSet<Place>], (level, place): &(u32, Place)| {
+        let is_in = |sets: &[FxHashSet<Place>], (level, place): &(u32, Place)| {
             sets[*level as usize].contains(place)
         };
         let node = nodes.rev().find(|node| is_in(&self.refined, node));
@@ -107,7 +107,7 @@ impl Pattern {
         let steps = 1 << (self.finest() - level - 1);
         around(place, self.dimension)
             .filter(move |other| {
-                self.is_possible(body, level + 1, *other) && !self.exists(body, level + 1, *other)
+                !self.is_taken(level + 1, *other) && self.is_possible(body, level + 1, *other)
             })
             .map(move |other| other.map(|x| x * steps))
     }
@@ -120,13 +120,16 @@ impl Pattern {
 
     /// Whether there is a node at a place, in steps of a level's spacing.
     pub fn exists(&self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
+        self.is_taken(level, place) && self.is_possible(body, level, place)
+    }
+
+    /// Whether there is a node at a place, in steps of a level's spacing, if there can be one.
+    fn is_taken(&self, level: u32, place: Place) -> bool {
         let (level, place) = born(level, place);
-        if level == 0 {
-            return body(place);
+        level == 0 || {
+            let refined = &self.refined[level as usize - 1];
+            parents(place).any(|parent| refined.contains(&parent))
         }
-        let refined = &self.refined[level as usize - 1];
-        parents(place).any(|parent| refined.contains(&parent))
-            && self.is_possible(body, level, place)
     }
 
     /// Whether there can be nodes within a cell, its lower sides included, beside the one at its centre
@@ -170,7 +173,7 @@ impl Pattern {
                     continue;
                 }
                 all += 1;
-                if self.exists(body, coarse + 1, other) {
+                if self.is_taken(coarse + 1, other) {
                     taken += 1;
                     // Eq. 12: half of the finer volume on an axis, a quarter on a diagonal.
                     volume -= cell(coarse + 1) >> halves(other);
@@ -220,8 +223,8 @@ impl Pattern {
             let square: f64 = (0..3).map(|k| (offset[k] as f64 * edges[k]).powi(2)).sum();
             let other = std::array::from_fn(|k| here[k] + offset[k]);
             square <= reach * reach
+                && !self.is_taken(level, other)
                 && self.is_possible(body, level, other)
-                && !self.exists(body, level, other)
         })
     }
 
@@ -261,7 +264,7 @@ impl Pattern {
     ) -> Vec<Place> {
         let coarse = level as usize - 1;
         let newly = self.refined[coarse].difference(&earlier.refined[coarse]);
-        let places: HashSet<Place> = newly
+        let places: FxHashSet<Place> = newly
             .flat_map(|place| around(*place, self.dimension))
             .filter(|place| born(level, *place).0 == level)
             .filter(|place| {
@@ -389,7 +392,7 @@ mod tests {
             let left = coarse
                 .iter()
                 .flat_map(|(level, place)| pattern.left(&body, *level, *place));
-            let left: HashSet<Place> = left.collect();
+            let left: FxHashSet<Place> = left.collect();
             let after = is_sound(&pattern);
             let stays = |(place, _): &&(Place, Node)| !left.contains(place);
             let places = |nodes: Vec<&(Place, Node)>| -> Vec<Place> {

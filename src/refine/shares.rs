@@ -1,6 +1,6 @@
 //! Shares of points in what is chosen among those of level 0.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::Grids;
 use super::place::Place;
@@ -10,7 +10,7 @@ use super::place::Place;
 /// of what is chosen stays the same, whatever is refined.
 pub struct Shares<'a, 'b> {
     grids: &'b Grids<'a>,
-    known: HashMap<(usize, Place), f64>,
+    known: FxHashMap<(usize, Place), f64>,
 }
 
 impl<'a, 'b> Shares<'a, 'b> {
@@ -18,7 +18,7 @@ impl<'a, 'b> Shares<'a, 'b> {
     pub fn new(grids: &'b Grids<'a>) -> Self {
         Self {
             grids,
-            known: HashMap::new(),
+            known: FxHashMap::default(),
         }
     }
 

@@ -132,13 +132,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let pieces = refined.points(coarse);
         between()?;
         let mut simulation = Self::of_points(plan, comm, (pieces, refined), None, between)?;
+        simulation.begin();
         simulation.can_bond_new_points()?;
         simulation.times.set_up = start.elapsed();
         Ok(simulation)
     }
 
-    /// Distributes and bonds the points of grids, and evaluates the forces at time 0. `cost` is what this
-    /// rank's points cost, if that is known; see [`Self::set_up`].
+    /// Distributes and bonds the points of grids; forces are not evaluated yet. `cost` is what this rank's
+    /// points cost, if that is known; see [`Self::set_up`].
     pub(super) fn of_points(
         plan: &'a Plan,
         comm: &'a dyn Communicator,
@@ -229,22 +230,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         };
         simulation.scale_density();
         simulation.begin_adapting();
-        simulation
-            .conditions
-            .place(&mut simulation.fields, 0.0, 0.0);
-        simulation
-            .conditions
-            .load(&mut simulation.fields, 0.0, true);
-        simulation.evaluate(match simulation.time_rule().method {
+        Ok(simulation)
+    }
+
+    /// Places what is supported, and evaluates the forces at time 0. Collective.
+    fn begin(&mut self) {
+        self.conditions.place(&mut self.fields, 0.0, 0.0);
+        self.conditions.load(&mut self.fields, 0.0, true);
+        self.evaluate(match self.time_rule().method {
             Method::Explicit => Evolution::Step(0.0),
             // This is no equilibrium.
             Method::Relaxation(_) => Evolution::None,
         });
-        simulation.guide();
-        simulation.fields.add_damped_energy(&simulation.model, 0.0);
-        simulation.bad = simulation.first_bad();
-        simulation.times = Times::default();
-        Ok(simulation)
+        self.guide();
+        self.fields.add_damped_energy(&self.model, 0.0);
+        self.bad = self.first_bad();
+        self.times = Times::default();
     }
 
     /// How the present stage gets to its end.

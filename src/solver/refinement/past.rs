@@ -1,6 +1,6 @@
 //! What points have before a refinement, and what new ones begin with.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use crate::points::Point;
 use crate::refine::{Grids, Pick, Place};
@@ -17,7 +17,7 @@ pub struct Past {
     /// What new points have of each.
     births: Vec<Birth>,
     /// Local index by body and place, in steps of the finest level.
-    at: HashMap<(usize, Place), usize>,
+    at: FxHashMap<(usize, Place), usize>,
     /// Which local points leave.
     leaves: Vec<bool>,
 }
@@ -154,7 +154,7 @@ impl Past {
             ids.push(model.ids[point]);
             rows.extend(self.columns.iter().map(|column| column[point]));
         }
-        let mut born = HashMap::new();
+        let mut born = FxHashMap::default();
         for piece in pieces {
             let body = simulation.plan.body_of(piece.block as usize);
             let Some(place) = grids.place_at(body, piece.position) else {
@@ -174,7 +174,7 @@ impl Past {
         grids: &Grids<'_>,
         body: usize,
         place: Place,
-        born: &mut HashMap<(usize, Place), Vec<f64>>,
+        born: &mut FxHashMap<(usize, Place), Vec<f64>>,
     ) -> Vec<f64> {
         if let Some(point) = self.at.get(&(body, place)) {
             return self.columns.iter().map(|column| column[*point]).collect();
