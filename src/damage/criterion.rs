@@ -77,7 +77,7 @@ impl Criterion {
 
     /// A bit for each bond that breaks; `work` is in J/m⁶, and read only if it is asked for.
     #[inline(always)]
-    pub fn met<S: Simd, L: Law<D>, const D: usize>(
+    pub fn breaking<S: Simd, L: Law<D>, const D: usize>(
         self,
         simd: S,
         bond: &Bond<D>,

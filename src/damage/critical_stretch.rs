@@ -3,7 +3,7 @@
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s_min is the smallest stretch among the
 //! intact bonds of a point now; a bond takes the smaller of its ends' thresholds, so that both ends
 //! agree. α = 0 is the plain critical stretch of Dipasquale et al. 2014, eq. 6. Bonds are compared with it in
-//! [`Criterion::met`](crate::damage::Criterion::met).
+//! [`Criterion::breaking`](crate::damage::Criterion::breaking).
 
 use std::f64::consts::PI;
 

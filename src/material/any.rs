@@ -13,8 +13,8 @@ pub struct Counts {
     pub point: usize,
     /// [`Law::OWN_NUMBERS`].
     pub own: usize,
-    /// [`Law::STAGES`].
-    pub stages: usize,
+    /// [`Law::PASSES`].
+    pub passes: usize,
     /// [`Law::WholeSum`].
     pub whole_sum: usize,
     /// [`Law::Sum`].
@@ -29,7 +29,7 @@ impl Counts {
             constants: L::CONSTANTS,
             point: L::Point::COUNT,
             own: L::OWN_NUMBERS,
-            stages: L::STAGES,
+            passes: L::PASSES,
             whole_sum: L::WholeSum::COUNT,
             sum: L::Sum::COUNT,
             memory: L::Memory::COUNT,
@@ -45,7 +45,7 @@ impl Counts {
             constants: more(self.constants, other.constants),
             point: more(self.point, other.point),
             own: more(self.own, other.own),
-            stages: more(self.stages, other.stages),
+            passes: more(self.passes, other.passes),
             whole_sum: more(self.whole_sum, other.whole_sum),
             sum: more(self.sum, other.sum),
             memory: more(self.memory, other.memory),
@@ -106,7 +106,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     type Sum = [Lanes; MOST.sum];
     type Force = [Lanes; D];
     const VERSIONS: Versions = Versions::Avx2;
-    const STAGES: usize = MOST.stages;
+    const PASSES: usize = MOST.passes;
     const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;
 
@@ -130,8 +130,8 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], plastic: &mut PlasticState) {
-        with_law!(self, law => Law::<D>::point(law, stage, sums, numbers, plastic));
+    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], plastic: &mut PlasticState) {
+        with_law!(self, law => Law::<D>::point(law, pass, sums, numbers, plastic));
     }
 
     fn flows(&self) -> bool {

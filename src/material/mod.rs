@@ -62,7 +62,7 @@ pub trait Described {
 /// run over bonds in these steps:
 ///
 /// 1. once, over the whole family: [`Self::whole_share`] → sums → [`Self::constants`];
-/// 2. before each sum of forces, over the intact bonds, [`Self::STAGES`] times:
+/// 2. before each sum of forces, over the intact bonds, [`Self::PASSES`] times:
 ///    [`Self::share`] → sums → [`Self::point`]; then the numbers are sent to the ghosts;
 /// 3. [`Self::memory`] and [`Self::force`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
@@ -76,7 +76,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// What is summed over the whole family, once.
     type WholeSum: Numbers;
 
-    /// What a stage sums over the intact bonds; stages that sum less leave the rest at 0.
+    /// What a pass sums over the intact bonds; passes that sum less leave the rest at 0.
     type Sum: Numbers;
 
     /// The force state's form.
@@ -86,7 +86,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     const CONSTANTS: usize = 0;
 
     /// How many sums over the bonds come before that of the forces.
-    const STAGES: usize = 0;
+    const PASSES: usize = 0;
 
     /// Numbers of a point that only its own law reads, after those of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
@@ -125,8 +125,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// The constants of a point from the sums over its whole family.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
-    /// What an intact bond adds to the sums of stage `S`, which may use the numbers found by the
-    /// stages before.
+    /// What an intact bond adds to the sums of pass `S`, which may use the numbers found by the
+    /// passes before.
     #[inline(always)]
     fn share<const S: usize>(
         &self,
@@ -137,7 +137,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// The numbers of a point from the sums of a stage: those of [`Self::Point`], then its own ones. What
+    /// The numbers of a point from the sums of a pass: those of [`Self::Point`], then its own ones. What
     /// flow adds to the plastic state is kept in a step alone.
     fn point(
         &self,

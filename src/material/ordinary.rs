@@ -204,7 +204,7 @@ impl<const D: usize> Law<D> for Ordinary {
     type Sum = [Lanes; 1];
     type Force = Along;
     const CONSTANTS: usize = 1;
-    const STAGES: usize = 1;
+    const PASSES: usize = 1;
     const LEAST_DIMENSION: usize = 2;
     /// θ.
     const OWN_NUMBERS: usize = 1;

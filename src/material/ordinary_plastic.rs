@@ -103,7 +103,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     type Sum = [Lanes; 1];
     type Force = Along;
     const CONSTANTS: usize = 1;
-    const STAGES: usize = 2;
+    const PASSES: usize = 2;
     /// θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
@@ -135,9 +135,9 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     #[inline(always)]
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let pull = numbers[0];
-        if stage == 0 {
+        if pass == 0 {
             let [push, dilatation] = self.elastic.dilated(pull, sums[0]);
             numbers[1] = push;
             numbers[2] = dilatation / D as f64;

@@ -133,7 +133,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;
-    const STAGES: usize = 2;
+    const PASSES: usize = 2;
     const OWN_NUMBERS: usize = 2 * D + 1;
     const LEAST_DIMENSION: usize = 2;
     const SUM_READS_STRETCH: bool = false;
@@ -181,10 +181,10 @@ impl<const D: usize> Law<D> for BondAssociated {
         sum
     }
 
-    fn point(&self, stage: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let (direct, inverse) = (Places::direct::<D>(), Places::inverse::<D>());
         let singular = Places::singular::<D>();
-        if stage == 0 {
+        if pass == 0 {
             numbers[Places::WEIGHT..=singular].fill(0.0);
             let shape = ShapeTensor::<D>::new(sums);
             let Some(inverse_shape) = shape.inverse_of_rest(self.modulus, numbers[0]) else {

@@ -193,7 +193,7 @@ impl<const D: usize> Law<D> for Correspondence {
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
     const CONSTANTS: usize = 2;
-    const STAGES: usize = 1;
+    const PASSES: usize = 1;
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;
     const SUM_READS_STRETCH: bool = false;

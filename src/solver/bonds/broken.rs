@@ -15,7 +15,7 @@ use super::evaluate::{Acting, ForceTimes, News};
 use super::force::Evolution;
 use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
-use super::{Forces, Stage};
+use super::{Forces, Pass};
 
 /// Ranges of points between which no more lie than these are worked on as one.
 const GAP: usize = 64;
@@ -89,7 +89,7 @@ impl<const D: usize> Forces<D> {
             }
             same
         });
-        if self.numbers.stages == 0 || !self.breaks {
+        if self.numbers.passes == 0 || !self.breaks {
             return;
         }
         let mut whole = [f64::from(u8::from(self.broken.is_empty()))];
@@ -125,13 +125,13 @@ impl<const D: usize> Forces<D> {
             plastic,
         } = acting;
         let before = self.held(model, points.clone(), plastic);
-        for stage in (0..self.numbers.stages).map(Stage::PointSum) {
-            if stage != Stage::PointSum(0) {
+        for pass in (0..self.numbers.passes).map(Pass::PointSum) {
+            if pass != Pass::PointSum(0) {
                 self.update(News::OwnNumbers, Which::Owned, model, displacement);
             }
-            self.clear(stage, points.clone());
-            self.run(stage, points.clone(), force, Evolution::None);
-            self.finish(stage, points.clone(), model, evolution, plastic);
+            self.clear(pass, points.clone());
+            self.run(pass, points.clone(), force, Evolution::None);
+            self.finish(pass, points.clone(), model, evolution, plastic);
         }
         // Bonds read what lattices show of the points.
         self.update(News::OwnNumbers, Which::Owned, model, displacement);
@@ -211,7 +211,7 @@ impl<const D: usize> Forces<D> {
         for column in force.iter_mut() {
             column[points.clone()].fill(0.0);
         }
-        self.run(Stage::Force, points.clone(), force, Evolution::None);
+        self.run(Pass::Force, points.clone(), force, Evolution::None);
         for (k, point) in points.enumerate() {
             let lost: [f64; D] = std::array::from_fn(|d| before[d][k] - force[d][point]);
             if lost == [0.0; D] {

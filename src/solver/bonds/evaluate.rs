@@ -1,4 +1,4 @@
-//! A force evaluation: its stages, with messages between them.
+//! A force evaluation: its passes, with messages between them.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use super::list_points;
 use super::point_numbers::PlasticColumns;
 use super::point_sums::{SmallestStretch, StageSum};
 use super::sweep::{Source, sweep};
-use super::{Forces, Stage};
+use super::{Forces, Pass};
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
@@ -28,7 +28,7 @@ const CHUNK: usize = 4096;
 /// of a millisecond in space.
 const PIECE: usize = 4096;
 
-/// What a stage reads anew from other ranks.
+/// What a pass reads anew from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum News {
     Displacement,
@@ -92,8 +92,8 @@ impl<const D: usize> Forces<D> {
                 .par_chunks_mut(CHUNK)
                 .for_each(|part| part.fill(0.0));
         }
-        for turn in 0..self.stages.len() {
-            let stage = self.stages[turn];
+        for turn in 0..self.passes.len() {
+            let pass = self.passes[turn];
             let news = self.news(turn);
             let mut halo = std::mem::take(&mut self.halo);
             let first = self.numbers.first_changing;
@@ -107,7 +107,7 @@ impl<const D: usize> Forces<D> {
                 }
                 News::OwnNumbers | News::Nothing => {}
             }
-            self.clear(stage, 0..owned);
+            self.clear(pass, 0..owned);
             let mut timed = |work: &mut dyn FnMut()| {
                 let start = Instant::now();
                 work();
@@ -120,10 +120,10 @@ impl<const D: usize> Forces<D> {
                 while rest.len() > piece && progress() {
                     let next = self.border(rest.start + piece);
                     let points = rest.start..next;
-                    timed(&mut || self.run(stage, points.clone(), force, evolution));
+                    timed(&mut || self.run(pass, points.clone(), force, evolution));
                     rest.start = next;
                 }
-                timed(&mut || self.run(stage, rest.clone(), force, evolution));
+                timed(&mut || self.run(pass, rest.clone(), force, evolution));
             };
             if matches!(news, News::OwnNumbers | News::Nothing) {
                 interior(&mut || false);
@@ -145,8 +145,8 @@ impl<const D: usize> Forces<D> {
             let start = Instant::now();
             self.update(news, Which::Ghosts, model, displacement);
             let border = model.interior..owned;
-            self.run(stage, border, force, evolution);
-            self.finish(stage, 0..owned, model, evolution, &mut plastic);
+            self.run(pass, border, force, evolution);
+            self.finish(pass, 0..owned, model, evolution, &mut plastic);
             in_bonds += start.elapsed();
         }
         times.bonds += in_bonds;
@@ -169,16 +169,16 @@ impl<const D: usize> Forces<D> {
         if end == from { from } else { self.border(end) }
     }
 
-    /// What a stage reads anew from other ranks.
+    /// What a pass reads anew from other ranks.
     fn news(&self, turn: usize) -> News {
         match (
-            turn.checked_sub(1).map(|before| self.stages[before]),
-            self.stages[turn],
+            turn.checked_sub(1).map(|before| self.passes[before]),
+            self.passes[turn],
         ) {
             (None, _) => News::Displacement,
-            (Some(Stage::SmallestStretch), _) => News::Thresholds,
-            (Some(Stage::PointSum(_)), Stage::Force) => News::Numbers,
-            (Some(Stage::PointSum(_)), _) => News::OwnNumbers,
+            (Some(Pass::SmallestStretch), _) => News::Thresholds,
+            (Some(Pass::PointSum(_)), Pass::Force) => News::Numbers,
+            (Some(Pass::PointSum(_)), _) => News::OwnNumbers,
             _ => News::Nothing,
         }
     }
@@ -214,29 +214,29 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Gets ready for a stage at some of the points.
-    pub(super) fn clear(&mut self, stage: Stage, points: Range<usize>) {
-        match stage {
-            Stage::SmallestStretch => self.thresholds[points].fill(f64::INFINITY),
-            Stage::PointSum(_) => {
+    /// Gets ready for a pass at some of the points.
+    pub(super) fn clear(&mut self, pass: Pass, points: Range<usize>) {
+        match pass {
+            Pass::SmallestStretch => self.thresholds[points].fill(f64::INFINITY),
+            Pass::PointSum(_) => {
                 for sums in &mut self.numbers.sums {
                     sums[points.clone()].fill(0.0);
                 }
             }
-            Stage::Force => {}
+            Pass::Force => {}
         }
     }
 
     /// Sums over the bonds of a range of the owned points.
     pub(super) fn run(
         &mut self,
-        stage: Stage,
+        pass: Pass,
         points: Range<usize>,
         force: &mut [Vec<f64>; D],
         evolution: Evolution,
     ) {
-        match stage {
-            Stage::SmallestStretch => {
+        match pass {
+            Pass::SmallestStretch => {
                 // Taken out while it is written.
                 let mut thresholds = [std::mem::take(&mut self.thresholds)];
                 self.for_each_interaction(|interaction, source| {
@@ -246,17 +246,17 @@ impl<const D: usize> Forces<D> {
                 });
                 [self.thresholds] = thresholds;
             }
-            Stage::PointSum(number) => {
+            Pass::PointSum(number) => {
                 let mut sums = std::mem::take(&mut self.numbers.sums);
                 self.for_each_interaction(|interaction, source| {
                     let (bonds, points) = (&mut interaction.bonds, points.clone());
                     with_pair!(interaction.laws, laws => {
-                        sum_stage(number, bonds, points, laws[0], &mut sums, source);
+                        sum_pass(number, bonds, points, laws[0], &mut sums, source);
                     });
                 });
                 self.numbers.sums = sums;
             }
-            Stage::Force => {
+            Pass::Force => {
                 let mut broken = std::mem::take(&mut self.broken);
                 self.for_each_interaction(|interaction, source| {
                     let criterion = if evolution == Evolution::None {
@@ -278,18 +278,18 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Finds what some of the points make of the sums of a stage.
+    /// Finds what some of the points make of the sums of a pass.
     pub(super) fn finish(
         &mut self,
-        stage: Stage,
+        pass: Pass,
         points: Range<usize>,
         model: &Model<D>,
         evolution: Evolution,
         plastic: &mut PlasticColumns<'_>,
     ) {
         let blocks = &self.blocks;
-        match stage {
-            Stage::SmallestStretch => {
+        match pass {
+            Pass::SmallestStretch => {
                 let thresholds = self.thresholds[points.clone()].par_iter_mut();
                 let block = &model.block[points];
                 thresholds
@@ -304,18 +304,18 @@ impl<const D: usize> Forces<D> {
                         };
                     });
             }
-            Stage::PointSum(number) => {
+            Pass::PointSum(number) => {
                 let keeps = evolution != Evolution::None;
                 self.numbers
                     .finish(number, points, model, blocks, plastic, keeps);
             }
-            Stage::Force => {}
+            Pass::Force => {}
         }
     }
 }
 
-/// Runs the kernel of a stage, if the law has so many.
-fn sum_stage<L: Law<D>, const D: usize>(
+/// Runs the kernel of a pass, if the law has so many.
+fn sum_pass<L: Law<D>, const D: usize>(
     number: usize,
     bonds: &mut BlockBonds,
     points: Range<usize>,
@@ -323,18 +323,18 @@ fn sum_stage<L: Law<D>, const D: usize>(
     sums: &mut [Vec<f64>],
     source: Source<'_, D>,
 ) {
-    if number >= L::STAGES {
+    if number >= L::PASSES {
         return;
     }
     let results = L::Sum::columns_mut(sums);
-    // No law has more stages, and no loop is compiled for those that a law does not have.
+    // No law has more passes, and no loop is compiled for those that a law does not have.
     match number {
-        0 if const { L::STAGES > 0 } => {
+        0 if const { L::PASSES > 0 } => {
             sweep(bonds, points, results, &StageSum::<L, 0> { law }, source);
         }
-        1 if const { L::STAGES > 1 } => {
+        1 if const { L::PASSES > 1 } => {
             sweep(bonds, points, results, &StageSum::<L, 1> { law }, source);
         }
-        _ => unreachable!("a law with more stages than loops"),
+        _ => unreachable!("a law with more passes than loops"),
     }
 }

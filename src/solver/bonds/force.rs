@@ -81,8 +81,9 @@ impl<L> Force<L> {
     where
         L: Law<D>,
     {
-        let met = (self.criterion).met::<S, L, D>(simd, &group.bond, self.ends(group), work);
-        group.intact & group.breakable & met
+        let breaking =
+            (self.criterion).breaking::<S, L, D>(simd, &group.bond, self.ends(group), work);
+        group.intact & group.breakable & breaking
     }
 
     #[inline(always)]

@@ -1,8 +1,8 @@
-//! Internal forces: sums over bonds in stages, with messages between them.
+//! Internal forces: sums over bonds in passes, with messages between them.
 //!
-//! A force evaluation is a list of stages, made once from the laws in use. Each is a sum over the
+//! A force evaluation is a list of passes, made once from the laws in use. Each is a sum over the
 //! bonds of every point; what it finds, the next one reads at the own end of bonds or at both. A
-//! stage begins with a message where it reads anew what other ranks find: first the displacements,
+//! pass begins with a message where it reads anew what other ranks find: first the displacements,
 //! then thresholds or numbers of points. Interior points are worked on while messages are in flight.
 //!
 //! Bonds break where the forces are summed, by what the force states of both ends say. What follows for
@@ -13,12 +13,12 @@ mod evaluate;
 mod force;
 mod grid_points;
 mod interaction;
-mod kept;
 mod kernel;
 mod list_points;
 mod measures;
 mod point_numbers;
 mod point_sums;
+mod saved;
 mod seen;
 mod sweep;
 
@@ -43,13 +43,13 @@ pub use broken::Broken;
 pub use evaluate::{Acting, ForceTimes};
 pub use force::Evolution;
 pub use interaction::{BlockLaws, Interaction};
-pub use kept::KeptBonds;
 pub use point_numbers::PlasticColumns;
+pub use saved::KeptBonds;
 pub use seen::Stored;
 
 /// One sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
+enum Pass {
     /// The smallest stretch of each point, which its threshold follows from.
     SmallestStretch,
     /// The sum of this number of the laws that have one.
@@ -70,8 +70,8 @@ pub struct Forces<const D: usize> {
     numbers: PointNumbers,
     /// Threshold of each local point; empty if no damage law needs it.
     thresholds: Vec<f64>,
-    /// The stages of a force evaluation.
-    stages: Vec<Stage>,
+    /// The passes of a force evaluation.
+    passes: Vec<Pass>,
     halo: Halo,
     instructions: Instructions,
     /// Whether any law dissipates energy in intact bonds.
@@ -115,13 +115,13 @@ impl<const D: usize> Forces<D> {
             remembers |= width > 0;
             interaction.bonds.remember(width);
         }
-        let stages = [
-            with_thresholds.then_some(Stage::SmallestStretch),
-            Some(Stage::Force),
+        let passes = [
+            with_thresholds.then_some(Pass::SmallestStretch),
+            Some(Pass::Force),
         ];
-        let mut stages: Vec<Stage> = stages.into_iter().flatten().collect();
-        let force = stages.len() - 1;
-        stages.splice(force..force, (0..numbers.stages).map(Stage::PointSum));
+        let mut passes: Vec<Pass> = passes.into_iter().flatten().collect();
+        let force = passes.len() - 1;
+        passes.splice(force..force, (0..numbers.passes).map(Pass::PointSum));
         let lists = |i: &Interaction| matches!(i.bonds, BlockBonds::List(_));
         let mut forces = Self {
             nodes: if interactions.iter().any(lists) {
@@ -144,7 +144,7 @@ impl<const D: usize> Forces<D> {
             interactions,
             blocks,
             numbers,
-            stages,
+            passes,
             halo,
             instructions,
             remembers,

@@ -13,10 +13,10 @@ const CHUNK: usize = 4096;
 /// Numbers of a point, at most.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
-/// The first of the columns of the plastic state among those that a stage works on.
+/// The first of the columns of the plastic state among those that a pass works on.
 const PLASTIC: usize = NUMBERS + MOST.sum;
 
-/// Columns that a stage works on, at most: numbers, sums and plastic state.
+/// Columns that a pass works on, at most: numbers, sums and plastic state.
 const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 
 /// The columns of the plastic states of the owned points; empty where no law has any.
@@ -32,10 +32,10 @@ pub struct PointNumbers {
     /// The first column that is found anew before each sum of forces.
     pub first_changing: usize,
     /// How many sums come before that of the forces.
-    pub stages: usize,
+    pub passes: usize,
     /// Whether any law has constants.
     pub with_constants: bool,
-    /// Sums of a stage over the bonds, by column.
+    /// Sums of a pass over the bonds, by column.
     pub sums: Vec<Vec<f64>>,
 }
 
@@ -49,12 +49,12 @@ impl PointNumbers {
         let all = read.max(most(|c| c.point + c.own));
         let (owned, local) = (model.owned(), model.volume.len());
         let length = |column: usize| if column < read { local } else { owned };
-        let changing = counts.iter().filter(|c| c.stages > 0);
+        let changing = counts.iter().filter(|c| c.passes > 0);
         Self {
             columns: (0..all).map(|k| vec![0.0; length(k)]).collect(),
             read,
             first_changing: changing.map(|c| c.constants).min().unwrap_or(read),
-            stages: most(|c| c.stages),
+            passes: most(|c| c.passes),
             with_constants: most(|c| c.constants) > 0,
             sums: vec![vec![0.0; owned]; if mixed { MOST.sum } else { most(|c| c.sum) }],
         }
@@ -88,11 +88,11 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Finds the numbers of some owned points that follow from the sums of a stage. `keeps` says whether
+    /// Finds the numbers of some owned points that follow from the sums of a pass. `keeps` says whether
     /// plastic flow is for good.
     pub fn finish<const D: usize>(
         &mut self,
-        stage: usize,
+        pass: usize,
         points: Range<usize>,
         model: &Model<D>,
         blocks: &[BlockLaws],
@@ -113,7 +113,7 @@ impl PointNumbers {
             for (k, point) in points.enumerate() {
                 let law = &blocks[usize::from(model.block[point])].law;
                 let counts = law.counts::<D>();
-                if stage >= counts.stages {
+                if pass >= counts.passes {
                     continue;
                 }
                 let get = |column: usize| columns[column].get(k).copied().unwrap_or(0.0);
@@ -128,7 +128,7 @@ impl PointNumbers {
                 }
                 let before = PlasticState::of(std::array::from_fn(|p| get(PLASTIC + p)));
                 let mut after = before;
-                Law::<D>::point(law, stage, &sums[..counts.sum], &mut numbers, &mut after);
+                Law::<D>::point(law, pass, &sums[..counts.sum], &mut numbers, &mut after);
                 for (column, number) in columns.iter_mut().zip(numbers).take(found) {
                     column[k] = number;
                 }

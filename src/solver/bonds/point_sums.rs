@@ -15,7 +15,7 @@ const fn growth_only(linear: bool) -> Wanted {
     }
 }
 
-/// Sums stage `N` of a law over the intact bonds.
+/// Sums pass `N` of a law over the intact bonds.
 #[derive(Clone, Copy)]
 pub struct StageSum<L, const N: usize> {
     /// The law of the own end.

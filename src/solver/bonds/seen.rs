@@ -59,7 +59,7 @@ impl<const D: usize> Forces<D> {
             });
         });
         let [mut energy, volume, neighbours, dissipated] = columns;
-        if self.numbers.stages > 0 {
+        if self.numbers.passes > 0 {
             for (point, energy) in points.zip(&mut energy) {
                 let law = &self.blocks[usize::from(model.block[point])].law;
                 *energy += Law::<D>::point_energy(law, &self.numbers.of(point));
