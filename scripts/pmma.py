@@ -188,11 +188,12 @@ def history(folder):
 
 
 def branches(folder):
-    """The branches of the crack, an array of places (m) each."""
+    """The branches of the crack, an array of places (m) each, the longest first."""
     with open(folder / "crack_main.csv") as file:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
     numbers = sorted({row[0] for row in rows})
-    return [numpy.array([row[1:3] for row in rows if row[0] == number]) for number in numbers]
+    lines = [numpy.array([row[1:3] for row in rows if row[0] == number]) for number in numbers]
+    return sorted(lines, key=lambda line: -numpy.hypot(*numpy.diff(line, axis=0).T).sum())
 
 
 def deviation(path):

@@ -154,7 +154,7 @@ impl Observer for Log {
             } if self.speaks && self.verbose => {
                 let (born, points) = (count(*born), count(*points));
                 let left = if *left > 0 {
-                    format!(", {} left", count(*left))
+                    format!(", {} removed", count(*left))
                 } else {
                     String::new()
                 };

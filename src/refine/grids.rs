@@ -180,6 +180,25 @@ impl<'a> Grids<'a> {
         }
     }
 
+    /// The faces between nodes next to one another between which no node is born: centre (m), edges of the nodes'
+    /// cells (m), and the axis across.
+    pub fn parted_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
+        let mut faces = Vec::new();
+        for (body, grid) in self.bodies.iter().enumerate() {
+            let Some(grid) = grid else { continue };
+            for (level, place) in grid.pattern.parted() {
+                let mut half_way = (0..3).filter(|k| place[*k] & 1 == 1);
+                let number = self.plan.block_number(body, level - 1, Kind::Whole);
+                if let (Some(axis), None) = (half_way.next(), half_way.next())
+                    && let Some(edges) = self.plan.block(number).spacing()
+                {
+                    faces.push((grid.position(level, place), edges, axis));
+                }
+            }
+        }
+        faces
+    }
+
     /// All nodes that are refined, and all places without nodes with the level that they would be born at.
     pub fn state(&self) -> [Vec<Pick>; 2] {
         let mut state = [Vec::new(), Vec::new()];

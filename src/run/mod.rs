@@ -238,10 +238,9 @@ impl<'a> Job<'a> {
         let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
             if simulation.is_refinement_due() {
-                let regridded = simulation.refine()?;
-                if regridded.is_change() {
+                if let Some(regridded) = simulation.refine()? {
                     recorder.follow(simulation)?;
-                    stable = self.warn_of_step(simulation, stable);
+                    stable = stable.min(self.warn_of_step(simulation, stable));
                     self.observer.message(&Message::Refined {
                         number: simulation.clock.number(),
                         regridded,

@@ -51,8 +51,8 @@ pub struct Trigger {
     /// A condition on the reference position and t without which a point is no trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time (s) out of the sight of triggers after which points become coarser again, by one level at a time;
-    /// never if not given.
+    /// Time (s) out of reach of triggers, and of points that miss bonds, after which points become coarser again, by
+    /// one level at a look; never if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }

@@ -36,7 +36,7 @@ pub struct Trigger {
     pub condition: Option<Expression>,
     /// Which points can be triggers at all, by reference position and time.
     pub only: Option<Expression>,
-    /// Time (s) without a trigger within whose horizon it lies after which what was refined becomes coarser;
+    /// Time (s) out of reach of triggers, and of points that miss bonds, after which points become coarser again;
     /// never if not given.
     pub coarsen_after: Option<f64>,
 }

@@ -17,7 +17,7 @@ use super::broken::Broken;
 use super::force::{Evolution, Force};
 use super::list_points;
 use super::point_numbers::PlasticColumns;
-use super::point_sums::{SmallestStretch, StageSum};
+use super::point_sums::{PassSum, SmallestStretch};
 use super::sweep::{Source, sweep};
 use super::{Forces, Pass};
 
@@ -330,10 +330,10 @@ fn sum_pass<L: Law<D>, const D: usize>(
     // No law has more passes, and no loop is compiled for those that a law does not have.
     match number {
         0 if const { L::PASSES > 0 } => {
-            sweep(bonds, points, results, &StageSum::<L, 0> { law }, source);
+            sweep(bonds, points, results, &PassSum::<L, 0> { law }, source);
         }
         1 if const { L::PASSES > 1 } => {
-            sweep(bonds, points, results, &StageSum::<L, 1> { law }, source);
+            sweep(bonds, points, results, &PassSum::<L, 1> { law }, source);
         }
         _ => unreachable!("a law with more passes than loops"),
     }

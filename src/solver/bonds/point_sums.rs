@@ -17,12 +17,12 @@ const fn growth_only(linear: bool) -> Wanted {
 
 /// Sums pass `N` of a law over the intact bonds.
 #[derive(Clone, Copy)]
-pub struct StageSum<L, const N: usize> {
+pub struct PassSum<L, const N: usize> {
     /// The law of the own end.
     pub law: L,
 }
 
-impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for StageSum<L, N> {
+impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Sums = L::Sum;
     type Broken = [Lanes; 0];
     type Point = L::Point;

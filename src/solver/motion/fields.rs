@@ -33,8 +33,13 @@ pub struct Description {
 /// parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
-    /// The mean value; and its volume times what it has more than that, so that the integral stays.
+    /// The mean value; and nothing.
     Interpolated,
+    /// The mean value; and its volume times what it has beyond that, so that momentum stays, and so do values that
+    /// are linear in place.
+    Conserved,
+    /// The mean value; and its own by volume, so that no value leaves the range that there was.
+    Mixed,
     /// A share by volume, so that the sum over all points stays; and all of it.
     Shared,
     /// What is found anew; and nothing.
@@ -138,6 +143,7 @@ fields! {
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",
+        birth: Birth::Conserved,
         output: Some(Field::Velocity),
         ..STATE
     };
@@ -190,12 +196,14 @@ fields! {
     plastic_strain: Option<[Vec<f64>; 6]> = Description {
         name: "plastic_strain",
         unit: "1",
+        birth: Birth::Mixed,
         ..STATE
     };
     /// Equivalent plastic strain of a point; none where no points flow.
     plastic_strain_equivalent: Option<Vec<f64>> = Description {
         name: "plastic_strain_equivalent",
         unit: "1",
+        birth: Birth::Mixed,
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
@@ -203,6 +211,7 @@ fields! {
     plastic_work: Option<Vec<f64>> = Description {
         name: "plastic_work",
         unit: "J/m^3",
+        birth: Birth::Mixed,
         ..STATE
     };
     /// Work done by loads and supports, J; none without them.
@@ -246,8 +255,8 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Time at which a point was last within the horizon of a trigger of refinement, s; none where grids do not
-    /// become coarser again.
+    /// Time at which a point was last within the horizon of a trigger of refinement or of a point that misses
+    /// bonds, s; none where grids do not become coarser again.
     last_seen: Option<Vec<f64>> = Description {
         name: "last_seen",
         unit: "s",

@@ -8,7 +8,8 @@ use crate::solver::assign::cutoffs;
 /// How much larger than a cell's side a face is, so that rounding opens no gap.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
-/// The faces between points next to one another whose bond is broken, of all ranks.
+/// The faces between points next to one another whose bond is broken, or was when the grid there was refined, of
+/// all ranks.
 pub struct Facets {
     all: Vec<Facet>,
     bins: Bins,
@@ -46,6 +47,15 @@ impl Facets {
                 });
             }
         });
+        // Of those that were parted on a coarser grid bonds may be too short to tell. All ranks know the same.
+        if comm.rank() == 0 {
+            let faces = simulation.grids.parted_faces().into_iter();
+            own.extend(faces.map(|(centre, edges, axis)| Facet {
+                centre,
+                edges,
+                axis: axis as u64,
+            }));
+        }
         let all = all_gather_many(comm, &own);
         let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
         let centres: Vec<[f64; 3]> = all.iter().map(|facet| facet.centre).collect();

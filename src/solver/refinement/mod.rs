@@ -38,13 +38,6 @@ pub struct Regridded {
     pub left: u64,
 }
 
-impl Regridded {
-    /// Whether there are other points than before.
-    pub fn is_change(self) -> bool {
-        self != Self::default()
-    }
-}
-
 /// What refinements have done since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Refined {
@@ -84,18 +77,20 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Whether it is time to look for points to be refined.
     pub fn is_refinement_due(&self) -> bool {
-        self.trigger()
-            .is_some_and(|trigger| self.clock.number().is_multiple_of(trigger.every_steps))
+        self.trigger().is_some_and(|trigger| {
+            // The step that a stage begins with is not that of the one before.
+            self.clock.number().is_multiple_of(trigger.every_steps) && !self.is_stage_over()
+        })
     }
 
     /// Refines what the triggers of the plan want, and makes coarse what they have not seen for long enough.
-    /// Collective.
+    /// Returns what came of it if the points were dealt out anew. Collective.
     ///
     /// # Errors
     /// When METIS fails; the same on all ranks.
-    pub fn refine(&mut self) -> Result<Regridded> {
+    pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
-            return Ok(Regridded::default());
+            return Ok(None);
         };
         let start = Instant::now();
         let snapshot = Snapshot::new(self);
@@ -104,7 +99,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let refined = grids.refine(&wanted.finer);
         let left = grids.coarsen(&wanted.coarser);
         if !refined && left.is_empty() {
-            return Ok(Regridded::default());
+            return Ok(None);
         }
         let facets = Facets::new(self);
         grids.part(&self.grids, &|a, b| {
@@ -119,10 +114,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.refined.bonds += new_bonds as i64 - bonds as i64;
         self.times.regridding += start.elapsed();
         let left = left.len() as u64;
-        Ok(Regridded {
+        Ok(Some(Regridded {
             born: self.model.total + left - before,
             left,
-        })
+        }))
     }
 
     /// Kinetic and strain energy (J) together, and intact bonds from both ends, over all ranks.
@@ -177,6 +172,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         other.conditions.place(&mut other.fields, time, 0.0);
         other.find_anew();
+        other.guide();
         *self = other;
         Ok(())
     }
@@ -202,6 +198,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if grids.refine_to(state) {
             let pieces = self.pieces_on(&grids);
             *self = self.on(grids, pieces)?;
+        } else {
+            self.grids = grids;
         }
         Ok(())
     }

@@ -92,7 +92,7 @@ impl Past {
                 parents.iter().for_each(|parent| grown[*parent] += part);
             }
             for (column, birth) in self.columns.iter_mut().zip(&self.births) {
-                if *birth == Birth::FoundAnew {
+                if matches!(birth, Birth::FoundAnew | Birth::Interpolated) {
                     continue;
                 }
                 let mut gain = vec![0.0; owned];
@@ -101,9 +101,10 @@ impl Past {
                     let theirs = parents.iter().map(|parent| column[*parent]);
                     let mean = theirs.sum::<f64>() / parents.len() as f64;
                     for parent in parents.iter().filter(|parent| **parent < owned) {
-                        let known = match birth {
-                            Birth::Shared => column[*parent],
-                            _ => mean,
+                        let known = if *birth == Birth::Conserved {
+                            mean
+                        } else {
+                            column[*parent]
                         };
                         gain[*parent] += part * (column[*point] - known);
                     }
@@ -193,7 +194,7 @@ impl Past {
         for (value, birth) in row.iter_mut().zip(&self.births) {
             *value = match birth {
                 Birth::FoundAnew => 0.0,
-                Birth::Interpolated | Birth::Shared => *value / parents.len() as f64,
+                _ => *value / parents.len() as f64,
             };
         }
         *row.last_mut().expect("the block") = NOWHERE;
