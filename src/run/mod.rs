@@ -237,16 +237,16 @@ impl<'a> Job<'a> {
         let mut stable = simulation.scaled_stable_step();
         let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
-            if simulation.is_refinement_due() {
-                if let Some(regridded) = simulation.refine()? {
-                    recorder.follow(simulation)?;
-                    stable = stable.min(self.warn_of_step(simulation, stable));
-                    self.observer.message(&Message::Refined {
-                        number: simulation.clock.number(),
-                        regridded,
-                        points: simulation.model.total,
-                    });
-                }
+            if simulation.is_refinement_due()
+                && let Some(regridded) = simulation.refine()?
+            {
+                recorder.follow(simulation)?;
+                stable = stable.min(self.warn_of_step(simulation, stable));
+                self.observer.message(&Message::Refined {
+                    number: simulation.clock.number(),
+                    regridded,
+                    points: simulation.model.total,
+                });
             }
             simulation.advance();
             let clock = simulation.clock;
