@@ -3,7 +3,8 @@
 Runs inputs/crack_branching_adaptive.toml with horizons of 3 and 6 of its finer spacings, and with two levels, and
 the same plate on the coarse grid and on grids that are fine everywhere, one after the other on one core. Prints for
 each the points, the time of the run, the fracture energy, the length of the crack and, for a refined grid, the largest
-distance of its crack from that of the uniform fine grid; draws the cracks into the output folder.
+distance of its crack from that of the uniform fine grid, and from that of a uniform grid whose points lie where the
+refined one has them, on the line of the notch as well; draws the cracks into the output folder.
 """
 
 import argparse
@@ -33,6 +34,27 @@ def uniform(spacing, horizon):
     return re.sub(r'(?m)^horizon = "3\*dx"', f"horizon = {horizon}", text)
 
 
+def same_places(ratio):
+    """The plate on a fine grid with points at the places of the coarse one and half-way between them, but on the notch."""
+    text = uniform(COARSE / 2, ratio * COARSE / 2)
+    shift = COARSE / 4
+    whole = 'shape.box = { lower = [0, "-height/2"], upper = ["length", "height/2"] }'
+    box = f'lower = [{shift}, "-height/2 + {shift}"], upper = ["length - {shift}", "height/2 - {shift}"]'
+    notch = 'lower = [0, "-dx/4"], upper = ["length/2 + dx/4", "dx/4"]'
+    changes = {
+        "[grid]\n": f"[grid]\norigin = [{shift}, {shift}]\n",
+        whole: f"shape.difference = [{{ box = {{ {box} }} }}, {{ box = {{ {notch} }} }}]",
+        'where = "y > height/2 - dx"': 'where = "y > height/2 - 1.5*dx"',
+        'where = "y < -height/2 + dx"': 'where = "y < -height/2 + 1.5*dx"',
+        'from = ["length/2 + 5*dx", 0]': 'from = ["length/2 + 20*dx", "4*dx"]',
+    }
+    for old, new in changes.items():
+        if text.count(old) != 1:
+            raise SystemExit(f"error: {DECK} should have `{old.strip()}` once")
+        text = text.replace(old, new)
+    return text
+
+
 def refined(ratio):
     """The plate on a grid that is refined once, with so many finer spacings a horizon there."""
     return re.sub(r"(?m)^m = \S+", f"m = {ratio}", DECK.read_text(), count=1)
@@ -45,15 +67,17 @@ def refined_twice():
     return re.sub(r"(?m)^interface_factor = .*\n", "", text)
 
 
-# Name, deck, and the uniform grid that it is compared with.
+# Name, deck, and the uniform grids that it is compared with.
 CASES = [
-    ("coarse", uniform(COARSE, 3 * COARSE), None),
-    ("fine, m = 3", uniform(COARSE / 2, 1.5 * COARSE), None),
-    ("refined, m = 3", refined(3), "fine, m = 3"),
-    ("fine, m = 6", uniform(COARSE / 2, 3 * COARSE), None),
-    ("refined, m = 6", refined(6), "fine, m = 6"),
-    ("finer, m = 3", uniform(COARSE / 4, 0.75 * COARSE), None),
-    ("refined twice, m = 3", refined_twice(), "finer, m = 3"),
+    ("coarse", uniform(COARSE, 3 * COARSE), []),
+    ("fine, m = 3", uniform(COARSE / 2, 1.5 * COARSE), []),
+    ("same places, m = 3", same_places(3), ["fine, m = 3"]),
+    ("refined, m = 3", refined(3), ["fine, m = 3", "same places, m = 3"]),
+    ("fine, m = 6", uniform(COARSE / 2, 3 * COARSE), []),
+    ("same places, m = 6", same_places(6), ["fine, m = 6"]),
+    ("refined, m = 6", refined(6), ["fine, m = 6", "same places, m = 6"]),
+    ("finer, m = 3", uniform(COARSE / 4, 0.75 * COARSE), []),
+    ("refined twice, m = 3", refined_twice(), ["finer, m = 3"]),
 ]
 
 
@@ -112,8 +136,8 @@ def main():
     parser.add_argument("--repeat", type=int, default=1, help="runs of each case, of which the fastest counts [1]")
     arguments = parser.parse_args()
     found = {}
-    print("grid                   points at start, end    time, s   fracture, mJ   length, mm   branches   apart, mm")
-    for name, text, reference in CASES:
+    print("grid                   points at start, end    time, s   fracture, mJ   length, mm   branches   apart from fine, same places, mm")
+    for name, text, references in CASES:
         out, seconds = run(arguments, name, text)
         with h5py.File(out / "result.vtkhdf") as file:
             table = file["history"]
@@ -123,7 +147,7 @@ def main():
             length = 1e3 * history["crack_notch_length"]
         branches = lines(out)
         found[name] = branches
-        gap = f"{1e3 * apart(branches, found[reference]):9.2f}" if reference else "        -"
+        gap = "".join(f"{1e3 * apart(branches, found[other]):9.2f}" for other in references)
         print(
             f"{name:20} {counts[0]:8} {counts[-1]:8} {seconds:15.2f} {energy:14.2f} {length:12.1f} {len(branches):10} {gap}",
             flush=True,
