@@ -124,12 +124,17 @@ def arguments():
             raise argparse.ArgumentTypeError(f"must be a spacing in m, at most 5e-3, is `{text}`")
         return value
 
+    def load_steps(text):
+        if not text.isdigit() or int(text) == 0:
+            raise argparse.ArgumentTypeError(f"must be a number of load steps, 1 or more, is `{text}`")
+        return int(text)
+
     binary = os.environ.get("FISSURE", ROOT / "target/release/fissure")
     add = parser.add_argument
     add("--laws", type=several_laws, default=list(LAWS), metavar="LIST", help="[all]")
     add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
     add("--small", action="store_true", help="2 mm and a fast press")
-    add("--relaxation", type=int, metavar="STEPS", help="equilibria, in so many load steps [explicit]")
+    add("--relaxation", type=load_steps, metavar="STEPS", help="equilibria, in so many load steps [explicit]")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
     add("--reuse", action="store_true", help="take the runs that are there")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")

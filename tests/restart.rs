@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::support::command::{Folder, finish, fissure, succeed, text, wait};
-use crate::support::datasets::{datasets, difference};
+use crate::support::datasets::{datasets, difference, points_left};
 use fissure::output::ResultReader;
 
 /// Exit code of a run that stopped and can be continued.
@@ -151,6 +151,9 @@ fn survives_kills(name: &str, text: &str) {
     succeed(&mut run(2, &deck, &whole, &[]));
     let duration = begin.elapsed();
     let expected = datasets(&result(&whole));
+    if text.contains("coarsen_after") {
+        assert!(points_left(&expected), "no point has left");
+    }
     let table = std::fs::read_to_string(whole.join("history.csv")).unwrap();
 
     let mut random = u64::from(std::process::id());

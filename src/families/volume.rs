@@ -30,6 +30,8 @@ pub struct CellShare {
     correction: VolumeCorrection,
     horizon: f64,
     edge: f64,
+    /// By which offsets are multiplied to be told apart, 1/m.
+    fineness: f64,
     dimension: usize,
     known: RefCell<FxHashMap<[i64; 3], f64>>,
 }
@@ -41,6 +43,7 @@ impl CellShare {
             correction,
             horizon,
             edge,
+            fineness: 1.0 / (edge * RESOLUTION),
             dimension,
             known: RefCell::default(),
         }
@@ -66,8 +69,7 @@ impl CellShare {
             }
             VolumeCorrection::Exact => {
                 // Cells and balls look the same along all axes, so few shares are different.
-                let scale = 1.0 / (self.edge * RESOLUTION);
-                let mut key = offset.map(|x| (x.abs() * scale + 0.5) as i64);
+                let mut key = offset.map(|x| (x.abs() * self.fineness + 0.5) as i64);
                 key.sort_unstable_by(|a, b| b.cmp(a));
                 let share = || {
                     let radius = self.horizon / self.edge;

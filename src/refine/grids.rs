@@ -31,6 +31,11 @@ struct BodyGrid<'a> {
 /// A node that is to be refined: body, level, and place in steps of the level.
 pub type Pick = [i64; 5];
 
+/// An order of nodes in which finer ones come first.
+fn finest_first([body, level, x, y, z]: &Pick) -> Pick {
+    [-level, *body, *z, *y, *x]
+}
+
 impl<'a> Grids<'a> {
     /// Grids in which nothing is refined, of a plan with so many points of level 0 over all ranks; without
     /// refinement there is none.
@@ -131,7 +136,7 @@ impl<'a> Grids<'a> {
     pub fn coarsen(&mut self, picks: &[Pick]) -> Vec<Pick> {
         let mut coarse: Vec<Pick> = picks.to_vec();
         // Finer nodes first, for they need the coarser ones.
-        coarse.sort_unstable_by_key(|[body, level, x, y, z]| (-level, *body, *z, *y, *x));
+        coarse.sort_unstable_by_key(finest_first);
         coarse.retain(|[body, level, x, y, z]| {
             let grid = self.bodies[*body as usize].as_mut();
             grid.is_some_and(|grid| grid.pattern.coarsen(*level as u32, [*x, *y, *z]))
@@ -145,7 +150,7 @@ impl<'a> Grids<'a> {
             let gone = pattern.left(&body, level as u32, [x, y, z]);
             left.extend(gone.map(|[x, y, z]| [number, level + 1, x, y, z]));
         }
-        left.sort_unstable_by_key(|[body, level, x, y, z]| (-level, *body, *z, *y, *x));
+        left.sort_unstable_by_key(finest_first);
         left.dedup();
         left
     }

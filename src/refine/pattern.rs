@@ -1,5 +1,7 @@
 //! Which nodes of a body are refined, and the nodes that follow.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashSet;
 
 use super::place::{Place, around, between, born, halves, parents};
@@ -26,7 +28,7 @@ pub struct Pattern {
     /// One set a level but the finest.
     refined: Vec<FxHashSet<Place>>,
     /// Those that stay refined, by level.
-    lasting: Vec<FxHashSet<Place>>,
+    lasting: Arc<[FxHashSet<Place>]>,
     /// Places where no node is born, with the level that it would be born at.
     parted: FxHashSet<(u32, Place)>,
 }
@@ -37,7 +39,7 @@ impl Pattern {
         Self {
             dimension,
             refined: vec![FxHashSet::default(); finest as usize],
-            lasting: vec![FxHashSet::default(); finest as usize],
+            lasting: vec![FxHashSet::default(); finest as usize].into(),
             parted: FxHashSet::default(),
         }
     }
@@ -80,7 +82,7 @@ impl Pattern {
 
     /// Makes the nodes that are refined now last.
     pub fn make_last(&mut self) {
-        self.lasting.clone_from(&self.refined);
+        self.lasting = self.refined.as_slice().into();
     }
 
     /// The finest level at which a place, in steps of the finest level, is a refined node, if it is not to last

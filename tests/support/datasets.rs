@@ -36,6 +36,15 @@ pub fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
     all
 }
 
+/// Whether there were fewer points in some row of the history than in the one before.
+pub fn points_left(found: &BTreeMap<String, Vec<u64>>) -> bool {
+    let points: Vec<f64> = found["history points"]
+        .iter()
+        .map(|bits| f64::from_bits(*bits))
+        .collect();
+    points.windows(2).any(|pair| pair[1] < pair[0])
+}
+
 /// The first dataset in which two results differ, if any.
 pub fn difference(
     expected: &BTreeMap<String, Vec<u64>>,

@@ -47,16 +47,14 @@ impl Facets {
                 });
             }
         });
-        // Of those that were parted on a coarser grid bonds may be too short to tell. All ranks know the same.
-        if comm.rank() == 0 {
-            let faces = simulation.grids.parted_faces().into_iter();
-            own.extend(faces.map(|(centre, edges, axis)| Facet {
-                centre,
-                edges,
-                axis: axis as u64,
-            }));
-        }
-        let all = all_gather_many(comm, &own);
+        let mut all = all_gather_many(comm, &own);
+        // Of those that were parted on a coarser grid bonds may be too short to tell.
+        let faces = simulation.grids.parted_faces().into_iter();
+        all.extend(faces.map(|(centre, edges, axis)| Facet {
+            centre,
+            edges,
+            axis: axis as u64,
+        }));
         let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
         let centres: Vec<[f64; 3]> = all.iter().map(|facet| facet.centre).collect();
         let widest = all.iter().flat_map(|facet| facet.edges[..D].iter());

@@ -95,6 +95,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let start = Instant::now();
         let snapshot = Snapshot::new(self);
         let wanted = self.wanted(trigger, &snapshot);
+        if wanted.finer.is_empty() && wanted.coarser.is_empty() {
+            return Ok(None);
+        }
         let mut grids = self.grids.clone();
         let refined = grids.refine(&wanted.finer);
         let left = grids.coarsen(&wanted.coarser);

@@ -65,7 +65,9 @@ impl Past {
             at,
             leaves: vec![false; local],
         };
-        past.leave(simulation, grids, left);
+        if !left.is_empty() {
+            past.leave(simulation, grids, left);
+        }
         past
     }
 

@@ -85,16 +85,19 @@ pub fn is_possible(plan: &Plan) -> Result<()> {
     Err(plan.source.error(trigger.span.clone(), message))
 }
 
+fn trigger(plan: &Plan) -> Option<&Trigger> {
+    let refinement = plan.refinement.as_ref();
+    refinement.and_then(|refinement| refinement.trigger.as_ref())
+}
+
 /// Whether grids become coarser again during a run.
 pub fn may_coarsen(plan: &Plan) -> bool {
-    let trigger = plan.refinement.as_ref().and_then(|r| r.trigger.as_ref());
-    trigger.is_some_and(|trigger| trigger.coarsen_after.is_some())
+    trigger(plan).is_some_and(|trigger| trigger.coarsen_after.is_some())
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn trigger(&self) -> Option<&'a Trigger> {
-        let refinement = self.plan.refinement.as_ref();
-        refinement.and_then(|refinement| refinement.trigger.as_ref())
+        trigger(self.plan)
     }
 
     /// Whether points may be born during the run.
@@ -107,24 +110,23 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
-        let mut sources = self.sources(|point| triggers[point]);
-        let finer = self.picks(&self.seen(&sources), |block, position| {
-            self.grids.pick(block, position)
-        });
+        let seen = self.seen(&self.sources(|point| triggers[point]));
+        let finer = self.picks(&seen, |block, position| self.grids.pick(block, position));
         let mut coarser = Vec::new();
         if let Some(limit) = trigger.coarsen_after {
             let is_torn = |point| snapshot.damage(&self.family_volume, point) > LEAST_DAMAGE;
-            sources.extend(self.sources(is_torn));
+            let at_torn = self.seen(&self.sources(is_torn));
             let now = self.clock.time();
-            let mut silent = vec![false; self.model.owned()];
-            let seen = self.seen(&sources);
             let last = self.fields.last_seen.iter_mut().flatten();
-            for ((last, seen), silent) in last.zip(seen).zip(&mut silent) {
-                if seen {
-                    *last = now;
-                }
-                *silent = now - *last >= limit;
-            }
+            let silent = last
+                .zip(seen.iter().zip(at_torn))
+                .map(|(last, (seen, at_torn))| {
+                    if *seen || at_torn {
+                        *last = now;
+                    }
+                    now - *last >= limit
+                });
+            let silent: Vec<bool> = silent.collect();
             coarser = self.picks(&silent, |block, position| {
                 self.grids.coarsening(self.plan.body_of(block), position)
             });
