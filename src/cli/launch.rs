@@ -181,8 +181,10 @@ pub fn start_threads(threads: usize) -> Result<()> {
             cores_of_host()
         )));
     }
+    // This thread is one of them: work that it hands out and then waits for would begin some microseconds later.
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
+        .use_current_thread()
         .build_global()
         .map_err(|error| Error::run(format!("cannot start {threads} threads: {error}")))
 }
