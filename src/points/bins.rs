@@ -2,7 +2,8 @@
 
 use super::distance_squared;
 
-/// Boxes of an edge of at least the search radius over a cloud of positions.
+/// Boxes over a cloud of positions, at least half as wide as the search radius: smaller ones hold less that is
+/// not looked for.
 pub struct Bins {
     lower: [f64; 3],
     inverse_edge: f64,
@@ -24,7 +25,7 @@ impl Bins {
                 upper[k] = upper[k].max(position[k]);
             }
         }
-        let (edge, counts) = boxes(lower, upper, radius, positions.len());
+        let (edge, counts) = boxes(lower, upper, 0.5 * radius, positions.len());
         let mut bins = Self {
             lower,
             inverse_edge: 1.0 / edge,
@@ -67,14 +68,27 @@ impl Bins {
         if self.entries.is_empty() {
             return;
         }
-        let centre = self.coordinates(position);
-        let range = |k: usize| {
-            let last = self.counts[k] as isize - 1;
-            (centre[k] - 1).max(0)..=(centre[k] + 1).min(last)
+        // In units of a box. Beside a point exactly at the radius rounding must not matter.
+        let radius_squared = self.radius_squared * (self.inverse_edge * self.inverse_edge);
+        let radius_squared = radius_squared * (1.0 + 1e-6);
+        let centre: [f64; 3] =
+            std::array::from_fn(|k| (position[k] - self.lower[k]) * self.inverse_edge);
+        // What of the radius is left across a layer of boxes, squared.
+        let left = |radius_squared: f64, k: usize, layer: isize| {
+            let [below, above] = [layer as f64 - centre[k], centre[k] - (layer + 1) as f64];
+            let gap = below.max(above).max(0.0);
+            radius_squared - gap * gap
         };
-        for z in range(2) {
-            for y in range(1) {
-                let xs = range(0);
+        let range = |radius_squared: f64, k: usize| {
+            let radius = radius_squared.max(0.0).sqrt();
+            let last = self.counts[k] as isize - 1;
+            let [first, end] = [centre[k] - radius, centre[k] + radius].map(|x| x.floor() as isize);
+            first.max(0)..=end.min(last)
+        };
+        for z in range(radius_squared, 2) {
+            let in_layer = left(radius_squared, 2, z);
+            for y in range(in_layer, 1) {
+                let xs = range(left(in_layer, 1, y), 0);
                 if xs.is_empty() {
                     continue;
                 }
