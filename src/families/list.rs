@@ -1,8 +1,13 @@
 //! The list family: for each point the indices of its neighbours, in groups of eight, and one bit a
 //! bond that says whether it is intact. Serves any cloud of points.
 
+use rayon::prelude::*;
+
 use super::store::{Groups, Store};
 use crate::lanes::{Lanes, WIDTH};
+
+/// Rows handled by one task.
+const CHUNK: usize = 512;
 
 /// The bonds from points of one block to points of one block.
 #[derive(Debug, Clone, Default)]
@@ -107,18 +112,31 @@ impl BondList {
 
     /// Sets what volumes are multiplied by in the sums of one end, 0 the own, 1 the far one: `weight`
     /// of the two local indices.
-    pub fn weigh(&mut self, end: usize, weight: impl Fn(usize, usize) -> f64) {
+    pub fn weigh(&mut self, end: usize, weight: impl Fn(usize, usize) -> f64 + Sync) {
         let mut weights = vec![Lanes::splat(0.0); self.neighbours.len()];
-        for row in 0..self.points.len() {
-            let own = self.points[row];
-            for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours[group].iter().enumerate() {
-                    if *there != own {
-                        weights[group].0[k] = weight(own as usize, *there as usize);
+        let mut rest = &mut weights[..];
+        let mut tasks = Vec::new();
+        for first in (0..self.points.len()).step_by(CHUNK) {
+            let rows = first..(first + CHUNK).min(self.points.len());
+            let groups = self.starts[rows.end] - self.starts[rows.start];
+            let (weights, others) = std::mem::take(&mut rest).split_at_mut(groups);
+            rest = others;
+            tasks.push((rows, weights));
+        }
+        tasks.into_par_iter().for_each(|(rows, weights)| {
+            let mut weights = weights.iter_mut();
+            for row in rows {
+                let own = self.points[row];
+                let groups = &self.neighbours[self.starts[row]..self.starts[row + 1]];
+                for (group, weights) in groups.iter().zip(weights.by_ref()) {
+                    for (there, value) in group.iter().zip(&mut weights.0) {
+                        if *there != own {
+                            *value = weight(own as usize, *there as usize);
+                        }
                     }
                 }
             }
-        }
+        });
         self.weights[end] = Some(weights);
     }
 
@@ -138,10 +156,13 @@ impl BondList {
         self.store.breakable = Some(breakable);
     }
 
-    /// Breaks the bonds for which `cut` (of the two local indices) holds.
-    pub fn cut(&mut self, cut: impl Fn(usize, usize) -> bool) {
+    /// See [`super::BlockBonds::cut`].
+    pub fn cut(&mut self, concerned: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
         for row in 0..self.points.len() {
             let own = self.points[row];
+            if !concerned(own as usize) {
+                continue;
+            }
             for group in self.starts[row]..self.starts[row + 1] {
                 for (k, there) in self.neighbours[group].iter().enumerate() {
                     if *there != own && cut(own as usize, *there as usize) {

@@ -5,7 +5,8 @@
 //! taper at δ. `exact` is the share of the cell that lies within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl
 //! & Schweitzer 2016, eq. 2): closed form in 1-D and 2-D, quadrature over slices in 3-D.
 
-use std::cell::RefCell;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use rustc_hash::FxHashMap;
 
@@ -18,6 +19,15 @@ const SLICES: u32 = 256;
 
 /// Offsets are told apart to this share of the cell's edge.
 const RESOLUTION: f64 = 1e-6;
+
+/// So many of these are a quarter of the edge: offsets on a grid that has been refined are multiples of it.
+const QUARTER: i64 = 250_000;
+
+/// The most multiples that are looked up by their number.
+const MOST_MULTIPLES: usize = 1 << 17;
+
+/// Bits of a share that has not been found yet.
+const UNKNOWN: u64 = u64::MAX;
 
 /// The longest bond (m) whose cell counts, where those of a length (m) count nothing any more: what
 /// rounding makes of them must not matter.
@@ -33,20 +43,35 @@ pub struct CellShare {
     /// By which offsets are multiplied to be told apart, 1/m.
     fineness: f64,
     dimension: usize,
-    known: RefCell<FxHashMap<[i64; 3], f64>>,
+    /// The square of the longest bond that counts, m².
+    reach_squared: f64,
+    /// Multiples of a quarter of the edge, in each direction, within the longest bond that counts.
+    multiples: usize,
+    /// The bits of their shares.
+    at_multiples: OnceLock<Vec<AtomicU64>>,
+    elsewhere: Mutex<FxHashMap<[i64; 3], f64>>,
 }
 
 impl CellShare {
     /// For families of a horizon (m) and neighbours in cells of an edge (m).
     pub fn new(correction: VolumeCorrection, horizon: f64, edge: f64, dimension: usize) -> Self {
-        Self {
+        let mut share = Self {
             correction,
             horizon,
             edge,
             fineness: 1.0 / (edge * RESOLUTION),
             dimension,
-            known: RefCell::default(),
+            reach_squared: 0.0,
+            multiples: 0,
+            at_multiples: OnceLock::default(),
+            elsewhere: Mutex::default(),
+        };
+        share.reach_squared = share.cutoff().powi(2);
+        let multiples = 4.0 * share.cutoff() / edge + 1.0;
+        if multiples.powi(dimension as i32) <= MOST_MULTIPLES as f64 {
+            share.multiples = multiples as usize;
         }
+        share
     }
 
     /// The longest bond (m) that counts. A cell's farthest overlap with the ball is at a corner.
@@ -67,18 +92,65 @@ impl CellShare {
             VolumeCorrection::Linear => {
                 ((self.horizon - squared.sqrt()) / self.edge + 0.5).clamp(0.0, 1.0)
             }
-            VolumeCorrection::Exact => {
-                // Cells and balls look the same along all axes, so few shares are different.
-                let mut key = offset.map(|x| (x.abs() * self.fineness + 0.5) as i64);
-                key.sort_unstable_by(|a, b| b.cmp(a));
-                let share = || {
-                    let radius = self.horizon / self.edge;
-                    overlap(key.map(|k| k as f64 * RESOLUTION), radius, self.dimension)
-                };
-                *self.known.borrow_mut().entry(key).or_insert_with(share)
-            }
+            VolumeCorrection::Exact if squared > self.reach_squared => 0.0,
+            VolumeCorrection::Exact => match self.multiple(offset) {
+                Some((known, place)) => {
+                    // Whoever finds it first finds the same.
+                    let bits = known.load(Ordering::Relaxed);
+                    if bits != UNKNOWN {
+                        return f64::from_bits(bits);
+                    }
+                    let share = self.overlap(place.map(|k| k * QUARTER));
+                    known.store(share.to_bits(), Ordering::Relaxed);
+                    share
+                }
+                None => {
+                    let place = ordered(offset.map(|x| (x.abs() * self.fineness + 0.5) as i64));
+                    let shares = self.elsewhere.lock();
+                    let mut shares = shares.unwrap_or_else(PoisonError::into_inner);
+                    *shares.entry(place).or_insert_with(|| self.overlap(place))
+                }
+            },
         }
     }
+
+    /// An offset in quarters of the edge, if it is a multiple of them, and where its share is kept.
+    #[inline]
+    fn multiple(&self, offset: [f64; 3]) -> Option<(&AtomicU64, [i64; 3])> {
+        let quarters = offset.map(|x| x.abs() * self.fineness / QUARTER as f64);
+        let place = quarters.map(|x| (x + 0.5) as i64);
+        let mut index = 0;
+        for k in (0..self.dimension).rev() {
+            let is_multiple = (quarters[k] - place[k] as f64).abs() < 0.5 / QUARTER as f64;
+            if !is_multiple || place[k] as usize >= self.multiples {
+                return None;
+            }
+            index = index * self.multiples + place[k] as usize;
+        }
+        Some((
+            &self.at_multiples.get_or_init(|| self.unknown())[index],
+            place,
+        ))
+    }
+
+    #[cold]
+    fn unknown(&self) -> Vec<AtomicU64> {
+        let count = self.multiples.pow(self.dimension as u32);
+        (0..count).map(|_| AtomicU64::new(UNKNOWN)).collect()
+    }
+
+    /// The share of a cell at a place in steps of [`RESOLUTION`].
+    fn overlap(&self, place: [i64; 3]) -> f64 {
+        let place = ordered(place);
+        let radius = self.horizon / self.edge;
+        overlap(place.map(|k| k as f64 * RESOLUTION), radius, self.dimension)
+    }
+}
+
+/// Cells and balls look the same along all axes, so few shares are different.
+fn ordered(mut place: [i64; 3]) -> [i64; 3] {
+    place.sort_unstable_by(|a, b| b.cmp(a));
+    place
 }
 
 /// The part of a unit cell centred at `centre` within the ball of a radius around the origin.
@@ -180,6 +252,23 @@ mod tests {
         let counted = f64::from(within) / f64::from(cells).powi(3);
         let found = share.at([0.002, -0.001, -0.002]);
         assert!((found - counted).abs() < 1e-3, "{found} {counted}");
+    }
+
+    #[test]
+    fn shares_that_are_kept_are_those_of_the_place() {
+        for horizon in [1.5, 3.0] {
+            let share = CellShare::new(VolumeCorrection::Exact, horizon, 1.0, 3);
+            // On the grid that is refined twice, beside it, and beyond what counts; the second time it is kept.
+            for step in [0.25, 0.3, 0.25, 0.3] {
+                let axis = || (0..16).map(|k| f64::from(k) * step);
+                for place in axis().flat_map(|x| axis().map(move |y| [x, -y, 0.5])) {
+                    let mut ordered = place.map(f64::abs);
+                    ordered.sort_by(|a, b| b.total_cmp(a));
+                    let expected = overlap(ordered, horizon, 3);
+                    assert!((share.at(place) - expected).abs() < 1e-12, "{place:?}");
+                }
+            }
+        }
     }
 
     #[test]

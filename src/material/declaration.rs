@@ -290,7 +290,7 @@ pub struct Built {
     /// The law.
     pub law: AnyLaw,
     /// What bonds of a length (m) are multiplied by in all sums of a point; 1 if there is none.
-    pub influence: Option<Box<dyn Fn(f64) -> f64>>,
+    pub influence: Option<Box<dyn Fn(f64) -> f64 + Sync>>,
 }
 
 impl Built {
@@ -305,7 +305,7 @@ impl Built {
     /// With an influence of the bond's length (m).
     pub fn with_influence(
         law: impl Into<AnyLaw>,
-        influence: impl Fn(f64) -> f64 + 'static,
+        influence: impl Fn(f64) -> f64 + Sync + 'static,
     ) -> Self {
         Self {
             law: law.into(),
