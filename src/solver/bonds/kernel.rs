@@ -101,6 +101,10 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether it wants to know of broken bonds.
     const WHOLE: bool = false;
 
+    /// Whether its sums follow from where points lie undeformed and which bonds are intact: in a lattice they are
+    /// then found once for all points that are alike in that.
+    const UNDEFORMED: bool = false;
+
     /// Whether it reads the numbers of the far ends; else they are 0.
     const READS_FAR: bool = true;
 

@@ -63,6 +63,7 @@ impl<const D: usize> Kernel<D> for FamilyVolume {
     type Memory = [Lanes; 0];
     // At every set-up and after every refinement.
     const VERSIONS: Versions = Versions::Avx2;
+    const UNDEFORMED: bool = true;
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
@@ -105,6 +106,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     // At every set-up and after every refinement.
     const VERSIONS: Versions = Versions::Avx2;
+    const UNDEFORMED: bool = L::Point::COUNT == 0;
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]

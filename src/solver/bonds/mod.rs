@@ -240,10 +240,15 @@ impl<const D: usize> Forces<D> {
         &self.halo
     }
 
-    /// Breaks the bonds for which `crosses` (of the two local indices) holds.
-    pub fn cut(&mut self, crosses: impl Fn(usize, usize) -> bool) {
+    /// Breaks the bonds for which `crosses` (of the two local indices) holds, of those points (by local index)
+    /// that are concerned.
+    pub fn cut(
+        &mut self,
+        concerned: impl Fn(usize) -> bool,
+        crosses: impl Fn(usize, usize) -> bool,
+    ) {
         for interaction in &mut self.interactions {
-            interaction.bonds.cut(&crosses);
+            interaction.bonds.cut(&concerned, &crosses);
         }
     }
 

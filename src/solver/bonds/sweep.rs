@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use rustc_hash::FxHashMap;
+
 use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
@@ -17,6 +19,12 @@ use super::list_points::{ListPoints, Node, store_memory};
 
 /// Bonds by groups of eight below which a task is not split further.
 const LEAF: usize = 2048;
+
+/// As [`LEAF`], where the sums of one vector serve others of its task.
+const UNDEFORMED_LEAF: usize = 128 * LEAF;
+
+/// So many different families are known in a task; a body with more of them has more damage than sums to share.
+const MOST_KNOWN: usize = 256;
 
 /// What kernels read of the points.
 #[derive(Clone, Copy)]
@@ -120,7 +128,8 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
     let several = rayon::current_num_threads() > 1;
     let leaf = |groups: usize| {
         if several {
-            (LEAF / groups.max(1)).max(1)
+            let leaf = if K::UNDEFORMED { UNDEFORMED_LEAF } else { LEAF };
+            (leaf / groups.max(1)).max(1)
         } else {
             usize::MAX
         }
@@ -370,6 +379,33 @@ impl Turns {
     }
 }
 
+/// The sums over the bonds of vectors by which of these are intact, for kernels of the
+/// [undeformed](Kernel::UNDEFORMED).
+struct Known<N>(FxHashMap<Box<[u8]>, N>);
+
+impl<N> Default for Known<N> {
+    fn default() -> Self {
+        Self(FxHashMap::default())
+    }
+}
+
+impl<N: Numbers> Known<N> {
+    fn sums<'b>(
+        &mut self,
+        vector: &mut Adjacent<'b>,
+        sum: impl FnOnce(&mut Adjacent<'b>) -> N,
+    ) -> N {
+        if let Some(sums) = self.0.get(&*vector.groups.intact) {
+            return *sums;
+        }
+        let sums = sum(vector);
+        if self.0.len() < MOST_KNOWN {
+            self.0.insert(Box::from(&*vector.groups.intact), sums);
+        }
+        sums
+    }
+}
+
 /// The sums over the bonds of a vector; nothing if one is marked.
 ///
 /// # Safety
@@ -515,16 +551,24 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
         let mut turns = Turns::new(&kernel);
+        let mut known = Known::default();
         for k in 0..vectors.len() {
             let mut vector: Adjacent<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
-            let (sums, gone) = turns.sum::<K, S, D>(
-                simd,
-                &mut vector,
-                // SAFETY: the vectors are those of the grid that `points` was made for.
-                |vector| unsafe { near_vector(simd, kernel, points, vector) },
-                |vector| unsafe { whole_vector(simd, kernel, points, whole, vector) },
-            );
+            let mut sum = |vector: &mut Adjacent<'_>| {
+                turns.sum::<K, S, D>(
+                    simd,
+                    vector,
+                    // SAFETY: the vectors are those of the grid that `points` was made for.
+                    |vector| unsafe { near_vector(simd, kernel, points, vector) },
+                    |vector| unsafe { whole_vector(simd, kernel, points, whole, vector) },
+                )
+            };
+            let (sums, gone) = if const { K::UNDEFORMED } {
+                (known.sums(&mut vector, |vector| sum(vector).0), 0)
+            } else {
+                sum(&mut vector)
+            };
             let first = vector.point - base;
             for quantity in 0..K::Sums::COUNT {
                 let column = K::Sums::column_mut(&mut results, quantity);

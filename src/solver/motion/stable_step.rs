@@ -6,6 +6,7 @@
 //! 2005) uses the trace of D instead: it is √3 times smaller in 3-D, √2 times in 2-D.
 
 use nalgebra::Matrix3;
+use rayon::prelude::*;
 
 use crate::comm::{self, Communicator};
 
@@ -19,11 +20,12 @@ pub fn stable_step<const D: usize>(
     stiffness: &[Vec<f64>; 6],
 ) -> f64 {
     let own = (0..model.owned())
+        .into_par_iter()
         .map(|point| {
             let entries = stiffness.each_ref().map(|column| column[point]);
             (2.0 * model.density_of(point) / largest_eigenvalue(&entries)).sqrt()
         })
-        .fold(f64::INFINITY, f64::min);
+        .reduce(|| f64::INFINITY, f64::min);
     let mut step = [own];
     comm::min(comm, &mut step);
     step[0]
