@@ -348,9 +348,10 @@ fn new_bonds_do_not_join_what_a_crack_has_parted() {
         // A crack from the tip of the notch to the right, along a row of faces.
         let y: Vec<f64> = simulation.model.reference[1].clone();
         let (x, limit) = (simulation.model.reference[0].clone(), 18e-3);
-        simulation
-            .forces
-            .cut(|a, b| y[a] * y[b] < 0.0 && 0.5 * (x[a] + x[b]) < limit);
+        simulation.forces.cut(
+            |_| true,
+            |a, b| y[a] * y[b] < 0.0 && 0.5 * (x[a] + x[b]) < limit,
+        );
         simulation.advance();
         assert!(simulation.refine().unwrap().unwrap().born > 100);
         let model = &simulation.model;
@@ -530,9 +531,10 @@ fn points_near_a_crack_stay() {
         simulation.advance();
         assert!(simulation.refine().unwrap().unwrap().born > 100);
         let [x, y] = [0, 1].map(|d| simulation.model.reference[d].clone());
-        simulation
-            .forces
-            .cut(|a, b| crosses_at(8.1e-3, [&x, &y], a, b).is_some_and(|x| x > 14e-3));
+        simulation.forces.cut(
+            |_| true,
+            |a, b| crosses_at(8.1e-3, [&x, &y], a, b).is_some_and(|x| x > 14e-3),
+        );
         let [_, left] = go_on(&mut simulation, 20);
         assert!(left > 300, "{left}");
         let model = &simulation.model;
@@ -589,9 +591,10 @@ fn velocities_that_are_linear_in_place_stay_so() {
 fn a_crack_of_the_coarse_grid_stays_when_finer_ones_have_come_and_gone() {
     simulate::<2, _>(&passing_and_brittle(), |mut simulation| {
         let [x, y] = [0, 1].map(|d| simulation.model.reference[d].clone());
-        simulation
-            .forces
-            .cut(|a, b| crosses_at(8e-3, [&x, &y], a, b).is_some_and(|x| x > 12e-3));
+        simulation.forces.cut(
+            |_| true,
+            |a, b| crosses_at(8e-3, [&x, &y], a, b).is_some_and(|x| x > 12e-3),
+        );
         let mut finest = 0;
         for _ in 0..30 {
             simulation.advance();

@@ -158,7 +158,11 @@ impl BondLattice {
             }
             let within = |k: i64| (0..target.length as i64).contains(&(first + k));
             let bit = |k: usize| u8::from(within(k as i64)) << k;
-            let inside = (0..WIDTH).fold(0, |all, k| all | bit(k));
+            let inside = if within(0) && within(WIDTH as i64 - 1) {
+                u8::MAX
+            } else {
+                (0..WIDTH).fold(0, |all, k| all | bit(k))
+            };
             let place = (target.start as i64 + first) as usize;
             *bits = own & inside & mask(grid, place, self.there);
         }
@@ -291,15 +295,21 @@ impl BondLattice {
         self.store.breakable = Some(breakable);
     }
 
-    /// Breaks the bonds for which `cut` (of the two local indices) holds.
-    pub fn cut(&mut self, cut: impl Fn(usize, usize) -> bool) {
-        let mut intact = self.store.intact.clone();
-        self.for_each(|byte, lane, [here, there]| {
-            if cut(here, there) {
-                intact[byte] &= !(1 << lane);
+    /// See [`super::BlockBonds::cut`].
+    pub fn cut(&mut self, concerned: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
+        let mut gone = Vec::new();
+        for k in 0..self.vectors.len() {
+            if self.points_of(k).any(&concerned) {
+                self.for_each_of(&self.store.intact, k, &mut |byte, lane, [here, there]| {
+                    if concerned(here) && cut(here, there) {
+                        gone.push((byte, lane));
+                    }
+                });
             }
-        });
-        self.store.intact = intact;
+        }
+        for (byte, lane) in gone {
+            self.store.intact[byte] &= !(1 << lane);
+        }
     }
 
     /// Calls `found` with the local indices of both ends of every intact bond.

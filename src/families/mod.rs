@@ -71,9 +71,10 @@ impl BlockBonds {
         with!(self, bonds => bonds.protect(protected));
     }
 
-    /// Breaks the bonds for which `cut` (of the two local indices) holds.
-    pub fn cut(&mut self, cut: impl Fn(usize, usize) -> bool) {
-        with!(self, bonds => bonds.cut(cut));
+    /// Breaks the bonds for which `cut` (of the two local indices) holds, of those points (by local index) that
+    /// are concerned.
+    pub fn cut(&mut self, concerned: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
+        with!(self, bonds => bonds.cut(concerned, cut));
     }
 
     /// Calls `found` with the local indices of both ends of every intact bond.

@@ -1,5 +1,7 @@
 //! Which bonds cross a pre-crack.
 
+use std::array;
+
 use nalgebra::Vector3;
 
 use crate::deck::plan::Crack;
@@ -66,6 +68,38 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
             })
         }
     }
+}
+
+/// Whether a bond of a length (m) from a position (m) could cross the crack; many that could do not.
+pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
+    let (corners, width) = match crack {
+        Crack::Segment { from, to, width } => (vec![*from, *to], width),
+        Crack::Rectangle {
+            corner,
+            edge_a,
+            edge_b,
+            width,
+        } => {
+            let at = |a: f64, b: f64| array::from_fn(|k| corner[k] + a * edge_a[k] + b * edge_b[k]);
+            let corners = [at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)];
+            (corners.to_vec(), width)
+        }
+        Crack::Disc {
+            centre,
+            radius,
+            width,
+            ..
+        } => {
+            let corner = |sign: f64| centre.map(|x| x + sign * radius);
+            (vec![corner(-1.0), corner(1.0)], width)
+        }
+    };
+    (0..3).all(|k| {
+        let lower = corners.iter().map(|c| c[k]).fold(f64::MAX, f64::min);
+        let upper = corners.iter().map(|c| c[k]).fold(f64::MIN, f64::max);
+        let slack = length + width + 1e-6 * (length + width + upper - lower);
+        (lower - slack..=upper + slack).contains(&position[k])
+    })
 }
 
 /// The part of a bond between the faces of a crack, in the plane through `origin`, with a width (m); of

@@ -430,8 +430,15 @@ fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<
     if plan.cracks.is_empty() {
         return Vec::new();
     }
+    let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
+    let in_reach = |point: usize| {
+        let position = model.position(point);
+        let mut cracks = plan.cracks.iter();
+        cracks.any(|crack| points::crack::is_in_reach(&crack.surface, position, longest))
+    };
+    let in_reach: Vec<bool> = (0..model.owned()).map(in_reach).collect();
     let counts = vec![Cell::new(0); plan.cracks.len()];
-    forces.cut(|here, there| {
+    let crosses = |here, there| {
         let (first, second) = if model.ids[here] < model.ids[there] {
             (here, there)
         } else {
@@ -446,7 +453,8 @@ fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<
             }
         }
         cut
-    });
+    };
+    forces.cut(|point| in_reach[point], crosses);
     counts.into_iter().map(Cell::into_inner).collect()
 }
 

@@ -244,7 +244,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let starts: Vec<usize> = std::iter::once(0).chain(ends).collect();
         let cutoffs = cutoffs(self.plan);
         let count = self.plan.block_count();
-        let near = vec![OnceCell::new(); model.owned()];
+        let near: Vec<OnceCell<Vec<u32>>> = vec![OnceCell::new(); model.owned()];
+        let near = |point: usize| near[point].get_or_init(|| facets.near(model.position(point)));
+        let concerned = |point: usize| starts[point] < starts[point + 1] || !near(point).is_empty();
         let cut = |here: usize, there: usize| {
             let [a, b] = [here, there].map(|point| model.position(point));
             let [old, other] = [was[here], was[there]];
@@ -255,14 +257,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
                     return own.binary_search(&model.ids[there]).is_ok();
                 }
             }
-            let near = near[here].get_or_init(|| facets.near(a));
+            let near = near(here);
             if model.ids[here] < model.ids[there] {
                 facets.lie_between(near, a, b)
             } else {
                 facets.lie_between(near, b, a)
             }
         };
-        self.forces.cut(cut);
+        self.forces.cut(concerned, cut);
     }
 
     /// Takes the state of the owned points from rows, of which the last number is none of it.
