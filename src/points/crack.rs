@@ -73,7 +73,7 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
 /// Whether a bond of a length (m) from a position (m) could cross the crack; many that could do not.
 pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     let (corners, width) = match crack {
-        Crack::Segment { from, to, width } => (vec![*from, *to], width),
+        Crack::Segment { from, to, width } => ([*from, *to, *from, *to], width),
         Crack::Rectangle {
             corner,
             edge_a,
@@ -82,7 +82,7 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
         } => {
             let at = |a: f64, b: f64| array::from_fn(|k| corner[k] + a * edge_a[k] + b * edge_b[k]);
             let corners = [at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)];
-            (corners.to_vec(), width)
+            (corners, width)
         }
         Crack::Disc {
             centre,
@@ -90,8 +90,8 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
             width,
             ..
         } => {
-            let corner = |sign: f64| centre.map(|x| x + sign * radius);
-            (vec![corner(-1.0), corner(1.0)], width)
+            let [lower, upper] = [-radius, *radius].map(|radius| centre.map(|x| x + radius));
+            ([lower, upper, lower, upper], width)
         }
     };
     (0..3).all(|k| {
@@ -167,6 +167,7 @@ fn piercing(origin: Vector, normal: Vector, [from, to]: [Vector; 2]) -> Option<V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::{array, prelude::*};
 
     #[test]
     fn a_segment_cuts_what_crosses_it_and_no_more() {
@@ -266,5 +267,30 @@ mod tests {
         assert!(crosses(&disc, [-1.2, 0.3, 0.1], [1.2, 0.3, 0.1]));
         assert!(!crosses(&disc, [-1.2, 0.3, 0.31], [1.2, 0.3, 0.31]));
         assert!(!crosses(&disc, [1.5, 0.0, 0.3], [0.9, 0.0, 0.9]));
+    }
+
+    proptest! {
+        #[test]
+        fn bonds_that_cross_come_from_points_in_reach(
+            [corner, edge_a, edge_b, from, to] in
+                array::uniform5(array::uniform3(-1.0..1.0_f64)),
+            width in prop_oneof![Just(0.0), 0.0..0.5_f64],
+        ) {
+            let flat = |[x, y, _]: [f64; 3]| [x, y, 0.0];
+            let normal: [f64; 3] = Vector::from(edge_a).normalize().into();
+            let cracks = [
+                Crack::Segment { from: flat(corner), to: flat(edge_a), width },
+                Crack::Rectangle { corner, edge_a, edge_b, width },
+                Crack::Disc { centre: corner, normal, radius: edge_b[0].abs(), width },
+            ];
+            for crack in &cracks {
+                let is_flat = matches!(crack, Crack::Segment { .. });
+                let ends = if is_flat { [flat(from), flat(to)] } else { [from, to] };
+                let length = (Vector::from(ends[0]) - Vector::from(ends[1])).norm();
+                let in_reach = ends.map(|end| is_in_reach(crack, end, length));
+                prop_assert!(in_reach == [true; 2] || !crosses(crack, ends[0], ends[1]));
+                prop_assert!(!is_in_reach(crack, [9.0, 0.0, 0.0], length.min(4.0)));
+            }
+        }
     }
 }
