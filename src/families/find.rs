@@ -61,9 +61,18 @@ pub fn find(
                 .map(BlockBonds::List),
         );
     }
+    let mut is_there = vec![[false; 2]; blocks];
+    for (k, point) in domain.points.iter().enumerate() {
+        let [owned, local] = &mut is_there[point.block as usize];
+        *owned |= k < domain.owned;
+        *local = true;
+    }
     for (pair, cutoff) in cutoffs.iter().enumerate() {
+        let ends = [pair / blocks, pair % blocks];
+        if !is_there[ends[0]][0] || !is_there[ends[1]][1] {
+            continue;
+        }
         if let Some(index) = shared(pair) {
-            let ends = [pair / blocks, pair % blocks];
             let grid = grids[index].clone();
             let lattice = BondLattice::new(index, grid, domain, ends, *cutoff, dimension);
             if !lattice.is_empty() {

@@ -142,6 +142,10 @@ impl BondLattice {
         let line = &grid.lines[vector.line as usize];
         let x = line.first + vector.place as i64 - line.start as i64;
         let own = vector.members & mask(grid, vector.place as usize, self.here);
+        if own == 0 {
+            bits.fill(0);
+            return;
+        }
         let mut around = usize::MAX;
         let mut target = None;
         for (offset, bits) in self.offsets.iter().zip(bits) {

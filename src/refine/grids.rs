@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::comm::{Communicator, agree, all_gather_many};
-use crate::deck::plan::{Block, Kind, Plan, PreCrack};
+use crate::deck::plan::{Block, Kind, Plan, PreCrack, Refinement};
 use crate::error::Result;
 use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
@@ -317,14 +317,18 @@ impl<'a> Grids<'a> {
 
     fn block(&self, body: usize, grid: &BodyGrid, place: Place, node: &Node) -> usize {
         let number = |kind| self.plan.block_number(body, node.level, kind);
-        let kind = if grid.is_at_coarser(self.plan.block(number(Kind::Whole)), place) {
+        let block = self.plan.block(number(Kind::Whole));
+        // Else their horizon is that of the others, with which they can share a lattice.
+        let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
+        let at_coarser = self.plan.refinement.as_ref().is_some_and(is_enlarged)
+            && grid.is_at_coarser(block, place);
+        number(if at_coarser {
             Kind::AtCoarser
         } else if node.whole {
             Kind::Whole
         } else {
             Kind::Partial
-        };
-        number(kind)
+        })
     }
 }
 
