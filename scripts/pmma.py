@@ -135,6 +135,7 @@ def arguments():
     add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
     add("--small", action="store_true", help="2 mm and a fast press")
     add("--relaxation", type=load_steps, metavar="STEPS", help="equilibria, in so many load steps [explicit]")
+    add("--opening", action="store_true", help="bonds of correspondence break so that opening the plate costs G")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
     add("--reuse", action="store_true", help="take the runs that are there")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
@@ -147,7 +148,7 @@ def arguments():
     return options
 
 
-def deck(law, load_steps):
+def deck(law, load_steps, opening):
     """The deck's text with another law; with relaxation, if there are load steps."""
     text = DECK.read_text()
 
@@ -159,6 +160,8 @@ def deck(law, load_steps):
 
     if LAWS[law] is not None:
         replace(r"(?s)\[material\.pmma\..*?(?=\[body\.plate\])", LAWS[law])
+    elif opening:
+        replace(r"(?m)^\[damage\.brittle\.energy\]$", '[damage.brittle.energy]\ncalibration = "opening"')
     if load_steps:
         for pattern, new in RELAXED.items():
             replace(pattern, new.format(steps=load_steps))
@@ -167,13 +170,13 @@ def deck(law, load_steps):
 
 def run(options, law):
     """Runs the deck with a law; returns its folder."""
-    way = "-relaxed" if options.relaxation else ""
+    way = ("-relaxed" if options.relaxation else "") + ("-opening" if options.opening else "")
     folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
     folder.mkdir(parents=True, exist_ok=True)
     if options.reuse and (folder / "crack_main.csv").exists():
         return folder
     written = folder / "deck.toml"
-    written.write_text(deck(law, options.relaxation))
+    written.write_text(deck(law, options.relaxation, options.opening))
     command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
     for assignment in [f"dx={options.dx!r}", *options.set]:
         command += ["--set", assignment]
