@@ -172,7 +172,8 @@ def deck(law, load_steps, opening):
 
 def run(options, law):
     """Runs the deck with a law; returns its folder."""
-    way = ("-relaxed" if options.relaxation else "") + ("-opening" if options.opening else "")
+    way = "-relaxed" if options.relaxation else ""
+    way += "-opening" if options.opening and LAWS[law] is None else ""
     folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
     folder.mkdir(parents=True, exist_ok=True)
     if options.reuse and (folder / "crack_main.csv").exists():

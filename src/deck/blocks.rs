@@ -15,7 +15,7 @@ pub enum Kind {
     Whole,
     /// Another volume, next to finer points or at the edge of the body.
     Partial,
-    /// A place within the horizon of coarser points, where that enlarges theirs.
+    /// Coarser points within their horizon, where it is enlarged for that.
     AtCoarser,
 }
 

@@ -45,7 +45,8 @@ pub struct CellShare {
     dimension: usize,
     /// The square of the longest bond that counts, m².
     reach_squared: f64,
-    /// Multiples of a quarter of the edge, in each direction, within the longest bond that counts.
+    /// Multiples of a quarter of the edge, in each direction, within the longest bond that counts; 0 where they are
+    /// too many.
     multiples: usize,
     /// The bits of their shares.
     at_multiples: OnceLock<Vec<AtomicU64>>,
@@ -95,7 +96,7 @@ impl CellShare {
             VolumeCorrection::Exact if squared > self.reach_squared => 0.0,
             VolumeCorrection::Exact => match self.multiple(offset) {
                 Some((known, place)) => {
-                    // Whoever finds it first finds the same.
+                    // Threads that find it at the same time find the same.
                     let bits = known.load(Ordering::Relaxed);
                     if bits != UNKNOWN {
                         return f64::from_bits(bits);
@@ -106,9 +107,17 @@ impl CellShare {
                 }
                 None => {
                     let place = ordered(offset.map(|x| (x.abs() * self.fineness + 0.5) as i64));
-                    let shares = self.elsewhere.lock();
-                    let mut shares = shares.unwrap_or_else(PoisonError::into_inner);
-                    *shares.entry(place).or_insert_with(|| self.overlap(place))
+                    let shares = || {
+                        self.elsewhere
+                            .lock()
+                            .unwrap_or_else(PoisonError::into_inner)
+                    };
+                    let known = shares().get(&place).copied();
+                    known.unwrap_or_else(|| {
+                        let share = self.overlap(place);
+                        shares().insert(place, share);
+                        share
+                    })
                 }
             },
         }

@@ -106,10 +106,9 @@ impl Bins {
     }
 }
 
-/// Edge (m) and number of boxes by direction, at least the radius wide and not many more boxes than
-/// points.
-pub fn boxes(lower: [f64; 3], upper: [f64; 3], radius: f64, points: usize) -> (f64, [usize; 3]) {
-    let mut edge = radius * (1.0 + 1e-6);
+/// Edge (m) and number of boxes by direction, at least so wide (m) and not many more boxes than points.
+pub fn boxes(lower: [f64; 3], upper: [f64; 3], least: f64, points: usize) -> (f64, [usize; 3]) {
+    let mut edge = least * (1.0 + 1e-6);
     loop {
         let counts: [f64; 3] =
             std::array::from_fn(|k| ((upper[k] - lower[k]).max(0.0) / edge).floor() + 1.0);

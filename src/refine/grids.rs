@@ -318,7 +318,7 @@ impl<'a> Grids<'a> {
     fn block(&self, body: usize, grid: &BodyGrid, place: Place, node: &Node) -> usize {
         let number = |kind| self.plan.block_number(body, node.level, kind);
         let block = self.plan.block(number(Kind::Whole));
-        // Else their horizon is that of the others, with which they can share a lattice.
+        // Where no horizon is enlarged they can share a lattice with the others.
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         let at_coarser = self.plan.refinement.as_ref().is_some_and(is_enlarged)
             && grid.is_at_coarser(block, place);

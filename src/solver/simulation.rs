@@ -430,7 +430,7 @@ fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<
     if plan.cracks.is_empty() {
         return Vec::new();
     }
-    let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
+    let longest = cutoffs(plan).into_iter().fold(0.0, f64::max) * (1.0 + SLACK);
     let in_reach = |point: usize| {
         let position = model.position(point);
         let mut cracks = plan.cracks.iter();

@@ -101,8 +101,8 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether it wants to know of broken bonds.
     const WHOLE: bool = false;
 
-    /// Whether its sums follow from where points lie undeformed and which bonds are intact: in a lattice they are
-    /// then found once for all points that are alike in that.
+    /// Whether its sums follow from where points lie undeformed and which bonds are intact, and it neither breaks nor
+    /// changes any: in a lattice they are then found once for all points that are alike in that.
     const UNDEFORMED: bool = false;
 
     /// Whether it reads the numbers of the far ends; else they are 0.

@@ -23,7 +23,7 @@ const LEAF: usize = 2048;
 /// As [`LEAF`], where the sums of one vector serve others of its task.
 const UNDEFORMED_LEAF: usize = 128 * LEAF;
 
-/// So many different families are known in a task; a body with more of them has more damage than sums to share.
+/// So many different families are known at once; at curved surfaces there are many, which do not come again.
 const MOST_KNOWN: usize = 256;
 
 /// What kernels read of the points.
@@ -126,10 +126,9 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
 ) -> Vec<BrokenSums> {
     let instructions = source.instructions;
     let several = rayon::current_num_threads() > 1;
-    let leaf = |groups: usize| {
+    let leaf = |most: usize, groups: usize| {
         if several {
-            let leaf = if K::UNDEFORMED { UNDEFORMED_LEAF } else { LEAF };
-            (leaf / groups.max(1)).max(1)
+            (most / groups.max(1)).max(1)
         } else {
             usize::MAX
         }
@@ -143,7 +142,7 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
                 ..
             } = source;
             let rows = list.rows_below(points.start)..list.rows_below(points.end);
-            let leaf = leaf(list.groups_a_row());
+            let leaf = leaf(LEAF, list.groups_a_row());
             let points = ListPoints::new(kernel, list.reach(), nodes, numbers, thresholds);
             let runner = OverRows { kernel, points };
             split(list.rows(rows), base, results, &runner, leaf, instructions)
@@ -162,7 +161,8 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
                 points,
                 whole,
             };
-            let leaf = leaf(lattice.offsets());
+            let most = if K::UNDEFORMED { UNDEFORMED_LEAF } else { LEAF };
+            let leaf = leaf(most, lattice.offsets());
             let part = lattice.vectors(vectors);
             split(part, base, results, &runner, leaf, instructions)
         }
@@ -399,9 +399,10 @@ impl<N: Numbers> Known<N> {
             return *sums;
         }
         let sums = sum(vector);
-        if self.0.len() < MOST_KNOWN {
-            self.0.insert(Box::from(&*vector.groups.intact), sums);
+        if self.0.len() == MOST_KNOWN {
+            self.0.clear();
         }
+        self.0.insert(Box::from(&*vector.groups.intact), sums);
         sums
     }
 }

@@ -77,6 +77,13 @@ impl Facets {
         near
     }
 
+    /// Whether there are any that a bond of a point at a position (m) may cross.
+    pub fn are_near(&self, position: [f64; 3]) -> bool {
+        let mut any = false;
+        self.bins.within(position, |_, _| any = true);
+        any
+    }
+
     /// Whether one of those `near` an end lies between the ends (m).
     pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);

@@ -245,8 +245,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let cutoffs = cutoffs(self.plan);
         let count = self.plan.block_count();
         let near: Vec<OnceCell<Vec<u32>>> = vec![OnceCell::new(); model.owned()];
-        let near = |point: usize| near[point].get_or_init(|| facets.near(model.position(point)));
-        let concerned = |point: usize| starts[point] < starts[point + 1] || !near(point).is_empty();
+        let concerned = |point: usize| {
+            starts[point] < starts[point + 1] || facets.are_near(model.position(point))
+        };
+        let concerned: Vec<bool> = (0..model.owned()).map(concerned).collect();
         let cut = |here: usize, there: usize| {
             let [a, b] = [here, there].map(|point| model.position(point));
             let [old, other] = [was[here], was[there]];
@@ -257,14 +259,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
                     return own.binary_search(&model.ids[there]).is_ok();
                 }
             }
-            let near = near(here);
+            let near = near[here].get_or_init(|| facets.near(a));
             if model.ids[here] < model.ids[there] {
                 facets.lie_between(near, a, b)
             } else {
                 facets.lie_between(near, b, a)
             }
         };
-        self.forces.cut(concerned, cut);
+        self.forces.cut(|point| concerned[point], cut);
     }
 
     /// Takes the state of the owned points from rows, of which the last number is none of it.
