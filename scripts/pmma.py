@@ -28,7 +28,7 @@ examples:
   scripts/pmma --dx 1e-3                     a coarse grid
   scripts/pmma --dx 0.31e-3 --threads 2      the paper's grid
   scripts/pmma --laws correspondence --dx 0.31e-3 --set fracture_energy=305
-                                             what agrees with the measurement
+                                             no second crack, see docs/pmma.md
   scripts/pmma --relaxation 60               from equilibrium to equilibrium, in 60 load steps
   scripts/pmma --set speed=0.01              another parameter of the deck; may be repeated
   scripts/pmma --reuse                       tables and pictures of runs that are there

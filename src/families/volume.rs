@@ -274,6 +274,7 @@ mod tests {
                     let mut ordered = place.map(f64::abs);
                     ordered.sort_by(|a, b| b.total_cmp(a));
                     let expected = overlap(ordered, horizon, 3);
+                    // Rounding: all of these places are told apart exactly.
                     assert!((share.at(place) - expected).abs() < 1e-12, "{place:?}");
                 }
             }

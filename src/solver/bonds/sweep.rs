@@ -383,12 +383,6 @@ impl Turns {
 /// [undeformed](Kernel::UNDEFORMED).
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
-impl<N> Default for Known<N> {
-    fn default() -> Self {
-        Self(FxHashMap::default())
-    }
-}
-
 impl<N: Numbers> Known<N> {
     fn sums<'b>(
         &mut self,
@@ -552,7 +546,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
         let mut turns = Turns::new(&kernel);
-        let mut known = Known::default();
+        let mut known = Known(FxHashMap::default());
         for k in 0..vectors.len() {
             let mut vector: Adjacent<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
