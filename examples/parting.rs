@@ -8,7 +8,7 @@
 use std::process::ExitCode;
 
 use fissure::deck::plan::{
-    Calibration, Damage, DamageRule, Law, Material, Plan, Sense, Shape, Toughness,
+    Calibration, Damage, DamageRule, Law, Material, Plan, Sense, Shape, Toughness, WorkRule,
 };
 use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
@@ -56,7 +56,10 @@ fn print_table() -> Result<()> {
 fn rules() -> [(&'static str, DamageRule); 3] {
     let work = |sense| DamageRule::Energy {
         calibration: Calibration::Energy,
-        sense,
+        work: WorkRule {
+            sense,
+            family_correction: false,
+        },
     };
     [
         ("stretch", DamageRule::CriticalStretch),

@@ -33,6 +33,7 @@ mod restart;
 mod stable_step;
 mod stages;
 mod support;
+mod surfaces;
 mod survey;
 mod undo;
 mod waves;

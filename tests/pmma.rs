@@ -51,6 +51,7 @@ fn a_coarse_plate_cracks_from_the_tip_of_its_notch() {
     let parameters = [
         ("dx", "2e-3"),
         ("speed", "0.1"),
+        ("fracture_energy", "100"),
         ("end_displacement", "0.35e-3"),
     ];
     simulate_input::<2, _>("pmma_mixed_mode", &parameters, |mut simulation| {

@@ -136,11 +136,11 @@ pub fn parting(report: &mut Report, plan: &Plan, body: usize) {
     let Some(damage) = &plan.bodies[body].damage else {
         return;
     };
-    let DamageRule::Energy { sense, .. } = damage.rule else {
+    let DamageRule::Energy { work, .. } = damage.rule else {
         return;
     };
     let mut ways = vec![("cost of opening", 0.0)];
-    if sense == Sense::Either && plan.dimension.count() > 1 {
+    if work.sense == Sense::Either && plan.dimension.count() > 1 {
         ways.push(("cost of sliding", FRAC_PI_2));
     }
     for (name, angle) in ways {

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use super::Sense;
+use super::WorkRule;
 use crate::dimension::Dimension;
 
 /// How w_c follows from the fracture energy.
@@ -31,8 +31,8 @@ pub struct BondEnergy {
     pub alpha: f64,
     /// The critical stretch s0 that belongs to the same fracture energy, which α acts on.
     pub stretch: f64,
-    /// Whether pressed bonds break.
-    pub sense: Sense,
+    /// How the work of bonds is looked at.
+    pub rule: WorkRule,
 }
 
 impl Calibration {
@@ -75,6 +75,7 @@ impl BondEnergy {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::damage::Sense;
 
     /// All bonds across a unit area, by the midpoint rule, over the fracture energy.
     fn taken(dimension: Dimension) -> f64 {
@@ -130,7 +131,10 @@ mod tests {
             critical: 4.0,
             alpha: 0.5,
             stretch: 0.02,
-            sense: Sense::Pulled,
+            rule: WorkRule {
+                sense: Sense::Pulled,
+                family_correction: false,
+            },
         };
         // s0 − α s_min = 0.03 is 1.5 s0.
         assert!((law.threshold(-0.02) - 9.0).abs() < 1e-12);

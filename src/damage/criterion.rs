@@ -16,9 +16,19 @@ pub enum Criterion {
     /// blocks are the part of it that a law may scale, 0 where a block has none.
     Thresholds([f64; 2]),
     /// When the work of the force states reaches this much, J/m⁶.
-    Work(f64, Sense),
+    Work(f64, WorkRule),
     /// When the work of the force states reaches the smaller of the thresholds of the two points, J/m⁶.
-    WorkThresholds(Sense),
+    WorkThresholds(WorkRule),
+}
+
+/// How the work of bonds is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WorkRule {
+    /// Which bonds break.
+    pub sense: Sense,
+    /// Whether those of points whose families are not whole may hold [as many times as much](Law::overload) as they
+    /// have to.
+    pub family_correction: bool,
 }
 
 /// Which bonds break by their work.
@@ -91,9 +101,9 @@ impl Criterion {
             Self::Stretch(critical) if !L::SCALED => {
                 simd.at_least(bond.growth, Lanes::splat(growth_of(critical)))
             }
-            Self::Work(_, sense) | Self::WorkThresholds(sense) => {
+            Self::Work(_, rule) | Self::WorkThresholds(rule) => {
                 let spent = simd.at_least(work, self.threshold(ends));
-                match sense {
+                match rule.sense {
                     Sense::Pulled => spent & bond.growth.above(0.0),
                     Sense::Either => spent,
                 }
@@ -116,7 +126,8 @@ impl Criterion {
         match self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
-            Self::Stretch(critical) | Self::Work(critical, _) => Lanes::splat(critical),
+            Self::Stretch(critical) => Lanes::splat(critical),
+            Self::Work(critical, rule) => rule.corrected(Lanes::splat(critical), ends),
             Self::Thresholds(critical) => {
                 let [mut here, mut there] = *ends.thresholds;
                 if L::SCALED {
@@ -126,7 +137,9 @@ impl Criterion {
                 }
                 here.min(there)
             }
-            Self::WorkThresholds(_) => ends.thresholds[0].min(ends.thresholds[1]),
+            Self::WorkThresholds(rule) => {
+                rule.corrected(ends.thresholds[0].min(ends.thresholds[1]), ends)
+            }
         }
     }
 
@@ -147,5 +160,35 @@ impl Criterion {
             ratio * ratio
         };
         (Lanes::splat(1.0) - ratio).max(Lanes::splat(0.0))
+    }
+}
+
+impl WorkRule {
+    /// That of bonds between points with this and another one: a pressed bond breaks, and surfaces are corrected, where
+    /// both say so.
+    pub fn of_both(self, other: Self) -> Self {
+        Self {
+            sense: if self.sense == Sense::Either {
+                other.sense
+            } else {
+                Sense::Pulled
+            },
+            family_correction: self.family_correction && other.family_correction,
+        }
+    }
+
+    /// The threshold of bonds whose ends may have more to hold: half of the work is each end's.
+    #[inline(always)]
+    fn corrected<L: Law<D>, const D: usize>(
+        self,
+        threshold: Lanes,
+        ends: Ends<'_, L, L::Point>,
+    ) -> Lanes {
+        if !self.family_correction {
+            return threshold;
+        }
+        let [here, there] = ends.points;
+        let both = ends.laws[0].overload(here) + ends.laws[1].overload(there);
+        threshold * (both * 0.5)
     }
 }

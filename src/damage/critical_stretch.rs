@@ -99,7 +99,7 @@ mod tests {
                 poisson_ratio: dimension.bond_based_poisson_ratio(),
             };
             let expected = CriticalStretch::from_energy(dimension, elastic, 50.0, 0.002);
-            let law = Ordinary::new(dimension, elastic).unwrap();
+            let law = Ordinary::new(dimension, elastic, 1.0).unwrap();
             let influence = Influence::Inverse;
             let found = CriticalStretch::from_energy_ordinary(&law, influence, 50.0, 0.002);
             assert!((found / expected - 1.0).abs() < 1e-9, "{dimension:?}");

@@ -6,7 +6,7 @@ mod critical_stretch;
 mod pull_apart;
 
 pub use bond_energy::{BondEnergy, Calibration};
-pub use criterion::{Criterion, Ends, Sense};
+pub use criterion::{Criterion, Ends, Sense, WorkRule};
 pub use critical_stretch::CriticalStretch;
 
 /// The damage law of a block.

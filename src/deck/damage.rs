@@ -4,7 +4,7 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Text};
 use super::number::Number;
-use super::plan::{self, Calibration, DamageRule, Sense, Toughness};
+use super::plan::{self, Calibration, DamageRule, Sense, Toughness, WorkRule};
 use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::error::Result;
@@ -49,13 +49,16 @@ pub fn damage(
                 grammar::Calibration::Opening => Calibration::Opening(None),
                 grammar::Calibration::Willberg2022 => Calibration::Willberg2022,
             };
-            let sense = if law.tension_only {
-                Sense::Pulled
-            } else {
-                Sense::Either
+            let work = WorkRule {
+                sense: if law.tension_only {
+                    Sense::Pulled
+                } else {
+                    Sense::Either
+                },
+                family_correction: law.family_correction,
             };
             Ok(plan::Damage {
-                rule: DamageRule::Energy { calibration, sense },
+                rule: DamageRule::Energy { calibration, work },
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,

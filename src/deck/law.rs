@@ -94,11 +94,16 @@ impl Law {
             DamageRule::CriticalStretch => {
                 (|law| law.critical_stretch.is_some(), "by their stretch")
             }
-            DamageRule::Energy { sense, .. } => {
-                if sense == Sense::Either && !self.declaration.any_poisson_ratio {
+            DamageRule::Energy { work, .. } => {
+                let wanted = [
+                    (work.sense == Sense::Either, "tension_only = false"),
+                    (work.family_correction, "family_correction = true"),
+                ];
+                let wanted = wanted.into_iter().find_map(|(is, key)| is.then_some(key));
+                if let Some(key) = wanted.filter(|_| !self.declaration.any_poisson_ratio) {
                     return Some(format!(
                         "bonds of the bond-based law `{}` break by their stretch, of the same fracture energy: \
-                         `tension_only = false` is for laws with any Poisson's ratio",
+                         `{key}` is for laws with any Poisson's ratio",
                         self.declaration.name
                     ));
                 }
@@ -219,8 +224,8 @@ mod tests {
             "law `elastic_plastic_pmb`, yield_stretch: must be above 0, is -0.1"
         );
         assert_eq!(
-            error(law("pmb").with("surface_correction", 0.1)),
-            "law `pmb`, surface_correction: must be \"none\" or \"energy\", is 0.1"
+            error(law("pmb").with("family_correction", 0.1)),
+            "law `pmb`, family_correction: must be \"none\" or \"energy\", is 0.1"
         );
         assert_eq!(
             error(law("normalised_pmb").with("form", "energi")),

@@ -181,6 +181,11 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
     }
 
+    #[inline(never)]
+    fn overload(&self, end: &Self::Point) -> Lanes {
+        with_law!(self, law => Law::<D>::overload(law, &first(end)))
+    }
+
     fn resists_across(&self) -> bool {
         with_law!(self, law => Law::<D>::resists_across(law))
     }

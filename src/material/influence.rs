@@ -2,6 +2,10 @@
 //!
 //! Silling et al. 2007; the forms are those in common use (Peridigm, Peridynamics.jl).
 
+use std::f64::consts::PI;
+
+use crate::dimension::Dimension;
+
 /// An influence function of |ξ|/δ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Influence {
@@ -16,6 +20,19 @@ pub enum Influence {
 }
 
 impl Influence {
+    /// The weighted volume ∫ ω |ξ|² dV (m⁵) of a whole family with this horizon (m).
+    pub fn weighted_volume(self, dimension: Dimension, horizon: f64) -> f64 {
+        match dimension {
+            Dimension::Space => 4.0 * PI * horizon.powi(5) * self.moment(4),
+            Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
+                2.0 * PI * thickness * horizon.powi(4) * self.moment(3)
+            }
+            Dimension::Line { cross_section } => {
+                2.0 * cross_section * horizon.powi(3) * self.moment(2)
+            }
+        }
+    }
+
     /// ω of a length and a horizon, both in m; never negative.
     pub fn at(self, length: f64, horizon: f64) -> f64 {
         let ratio = length / horizon;

@@ -222,6 +222,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
+    /// How many times as much a bond of a point holds whose family is not whole as one inside, at the same strain:
+    /// fewer bonds have to hold the energy of the point.
+    #[inline(always)]
+    fn overload(&self, _end: &Self::Point) -> Lanes {
+        Lanes::splat(1.0)
+    }
+
     /// What the critical stretch of a bond is multiplied by; the same from both ends.
     #[inline(always)]
     fn toughness_scale(&self, _here: &Self::Point, _other: &Self, _there: &Self::Point) -> Lanes {

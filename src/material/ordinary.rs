@@ -35,11 +35,14 @@ pub struct Ordinary {
     volumetric: f64,
     /// A, Pa.
     extensional: f64,
+    /// m of a whole family, m⁵.
+    whole: f64,
 }
 
 impl Ordinary {
-    /// From the elastic constants; `None` in 1-D, where the Poisson ratio has no meaning.
-    pub fn new(dimension: Dimension, elastic: Isotropic) -> Option<Self> {
+    /// From the elastic constants and the weighted volume (m⁵) of a whole family; `None` in 1-D, where the Poisson
+    /// ratio has no meaning.
+    pub fn new(dimension: Dimension, elastic: Isotropic, whole: f64) -> Option<Self> {
         let (modulus, shear) = (bulk_modulus(dimension, elastic)?, elastic.shear_modulus());
         let (count, extensional) = match dimension {
             Dimension::Space => (3.0, 15.0 * shear),
@@ -49,12 +52,15 @@ impl Ordinary {
             dimension: count,
             volumetric: modulus - extensional / (count * count),
             extensional,
+            whole,
         })
     }
 
-    /// From what a body has, in the plane or in space.
-    pub(super) fn of(given: &Given) -> Self {
-        Self::new(given.dimension, given.elastic).expect("the law declares that it has no 1-D form")
+    /// From what a body has, in the plane or in space, and the influence of its bonds.
+    pub(super) fn of(given: &Given, influence: Influence) -> Self {
+        let whole = influence.weighted_volume(given.dimension, given.horizon);
+        Self::new(given.dimension, given.elastic, whole)
+            .expect("the law declares that it has no 1-D form")
     }
 
     /// d κ θ/m (N/m⁷) and θ from A/m and Σ ω|ξ|εṼ.
@@ -83,6 +89,17 @@ impl Ordinary {
     /// A, Pa.
     pub fn extensional(&self) -> f64 {
         self.extensional
+    }
+
+    /// m of a whole family, m⁵.
+    pub(super) fn whole(&self) -> f64 {
+        self.whole
+    }
+
+    /// What a bond holds over what it would if the family were whole, from A/m.
+    #[inline(always)]
+    pub(super) fn overload_of(&self, pull: Lanes) -> Lanes {
+        pull * (self.whole / self.extensional)
     }
 }
 
@@ -133,7 +150,7 @@ impl Declared for Ordinary {
 }
 
 fn build(given: &Given) -> Built {
-    with_influence(Ordinary::of(given), given)
+    with_influence(Ordinary::of(given, influence(given)), given)
 }
 
 /// A law with the influence that is asked for.
@@ -145,7 +162,7 @@ pub(super) fn with_influence(law: impl Into<AnyLaw>, given: &Given) -> Built {
     }
 }
 
-fn influence(given: &Given) -> Influence {
+pub(super) fn influence(given: &Given) -> Influence {
     match given.values.word(INFLUENCE.name) {
         "linear" => Influence::Linear,
         "gaussian" => Influence::Gaussian,
@@ -155,7 +172,7 @@ fn influence(given: &Given) -> Influence {
 }
 
 pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
-    let law = Ordinary::of(given);
+    let law = Ordinary::of(given, influence(given));
     CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
 
@@ -262,6 +279,11 @@ impl<const D: usize> Law<D> for Ordinary {
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
         self.dilatation_energy(numbers[2])
+    }
+
+    #[inline(always)]
+    fn overload(&self, [pull, _]: &[Lanes; 2]) -> Lanes {
+        self.overload_of(*pull)
     }
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.

@@ -10,12 +10,10 @@
 //! ψ₀ = (5/2) σ_y²/m and (4/3) σ_y²/m. With the m of a whole ball the first is Mitchell's
 //! 25σ_y²/(8πδ⁵); his plane value 75σ_y²/(8πhδ⁴) belongs to A = 15G, which the plane law does not have.
 
-use std::f64::consts::PI;
-
 use super::ordinary::{Ordinary, eased_energy, eased_force};
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
-    PlasticState, Word,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind,
+    Law, PlasticState, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::Lanes;
@@ -66,19 +64,16 @@ impl Declared for OrdinaryPlastic {
 
 fn build(given: &Given) -> Built {
     let stress = given.values.number(YIELD_STRESS.name);
-    let horizon = given.horizon;
-    let (factor, whole) = match given.dimension {
-        Dimension::Space => (2.5, 0.8 * PI * horizon.powi(5)),
-        Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
-            (4.0 / 3.0, 0.5 * PI * thickness * horizon.powi(4))
-        }
-        Dimension::Line { .. } => unreachable!("the law declares that it has no 1-D form"),
+    let factor = match given.dimension {
+        Dimension::Space => 2.5,
+        _ => 4.0 / 3.0,
     };
     let of_family = given.values.word(CALIBRATION.name) == "family";
+    let elastic = Ordinary::of(given, Influence::Constant);
     Built::plain(OrdinaryPlastic {
-        elastic: Ordinary::of(given),
+        elastic,
         strength: factor * stress * stress,
-        whole: (!of_family).then_some(whole),
+        whole: (!of_family).then_some(elastic.whole()),
     })
 }
 
@@ -196,6 +191,11 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     #[inline(always)]
     fn dissipated(&self, _: Lanes, [_, loss]: &[Lanes; 2]) -> Lanes {
         *loss
+    }
+
+    #[inline(always)]
+    fn overload(&self, [pull, ..]: &[Lanes; 4]) -> Lanes {
+        self.elastic.overload_of(*pull)
     }
 
     #[inline(always)]

@@ -9,7 +9,7 @@
 //! β = 1 − (τ/Δt)(1 − a). The constants are those of the instantaneous response; in the end the shear
 //! modulus is (1 − λ) of it.
 
-use super::ordinary::{INFLUENCE, Ordinary, eased_energy, eased_force};
+use super::ordinary::{INFLUENCE, Ordinary, eased_energy, eased_force, influence};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
     PlasticState,
@@ -64,7 +64,7 @@ impl Declared for OrdinaryViscoelastic {
 
 fn build(given: &Given) -> Built {
     let law = OrdinaryViscoelastic {
-        elastic: Ordinary::of(given),
+        elastic: Ordinary::of(given, influence(given)),
         relaxation_time: given.values.number(RELAXATION_TIME.name),
         relaxing_share: given.values.number(RELAXING_SHARE.name),
     };
@@ -183,6 +183,11 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     #[inline(always)]
     fn dissipated(&self, _: Lanes, [.., loss]: &[Lanes; 3]) -> Lanes {
         *loss
+    }
+
+    #[inline(always)]
+    fn overload(&self, [pull, ..]: &[Lanes; 3]) -> Lanes {
+        self.elastic.overload_of(*pull)
     }
 
     #[inline(always)]

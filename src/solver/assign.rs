@@ -1,6 +1,6 @@
 //! From the plan to the law, the failure rule and the weights of every family.
 
-use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, Sense};
+use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, WorkRule};
 use crate::deck::plan::{
     self, Block, Body, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
 };
@@ -200,12 +200,12 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
     };
     let (critical, alpha) = (stretch(energy), damage.alpha);
     Some(match damage.rule {
-        DamageRule::Energy { sense, .. } if breaks_by_work(body, damage) => {
+        DamageRule::Energy { work, .. } if breaks_by_work(body, damage) => {
             DamageLaw::BondEnergy(BondEnergy {
                 critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
                 alpha,
                 stretch: critical,
-                sense,
+                rule: work,
             })
         }
         _ => DamageLaw::CriticalStretch(CriticalStretch { critical, alpha }),
@@ -220,22 +220,16 @@ fn criterion(blocks: &[BlockLaws], ends: [usize; 2], per_point: bool) -> Criteri
     let Some(smallest) = critical.into_iter().flatten().reduce(f64::min) else {
         return Criterion::Never;
     };
-    let sense = |law: DamageLaw| match law {
-        DamageLaw::BondEnergy(law) => Some(law.sense),
+    let rule = |law: DamageLaw| match law {
+        DamageLaw::BondEnergy(law) => Some(law.rule),
         DamageLaw::CriticalStretch(_) => None,
     };
-    let senses: Vec<Sense> = laws.into_iter().flatten().filter_map(sense).collect();
-    // A pressed bond breaks where the laws of both ends say so.
-    let sense = if senses.contains(&Sense::Pulled) {
-        Sense::Pulled
-    } else {
-        Sense::Either
-    };
-    match (senses.is_empty(), per_point) {
-        (false, true) => Criterion::WorkThresholds(sense),
-        (false, false) => Criterion::Work(smallest, sense),
-        (true, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
-        (true, false) => Criterion::Stretch(smallest),
+    let rules = laws.into_iter().flatten().filter_map(rule);
+    match (rules.reduce(WorkRule::of_both), per_point) {
+        (Some(rule), true) => Criterion::WorkThresholds(rule),
+        (Some(rule), false) => Criterion::Work(smallest, rule),
+        (None, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
+        (None, false) => Criterion::Stretch(smallest),
     }
 }
 

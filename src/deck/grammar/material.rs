@@ -123,6 +123,10 @@ pub struct BondEnergy {
     /// shear crack.
     #[serde(default = "yes")]
     pub tension_only: bool,
+    /// Whether bonds of points at surfaces, of which fewer hold the energy of a point, may hold as much more before they
+    /// break; if not, a body breaks at its surfaces first.
+    #[serde(default)]
+    pub family_correction: bool,
     /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
     #[serde(default = "no_alpha")]
     pub alpha: Number,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use super::{Calibration, Law, Sense};
+use super::{Calibration, Law, WorkRule};
 use crate::deck::expression::Expression;
 use crate::elastic::Isotropic;
 
@@ -142,8 +142,8 @@ pub enum DamageRule {
     Energy {
         /// How the critical work follows.
         calibration: Calibration,
-        /// Whether pressed bonds break; for laws that are not bond-based.
-        sense: Sense,
+        /// How the work is looked at; for laws that are not bond-based.
+        work: WorkRule,
     },
 }
 

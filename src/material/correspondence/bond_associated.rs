@@ -20,7 +20,9 @@
 //! largest modulus and λ the smallest eigenvalue of K: a spring constant of c (1/λ + 1/(|ξ|² Σ ω Ṽ)) holds
 //! as much at least.
 
-use super::super::{Bond, Built, Declaration, Declared, Described, Given, Key, Law, PlasticState};
+use super::super::{
+    Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Law, PlasticState,
+};
 use super::family::{
     FamilyShare, ShapeTensor, family_share, from_entries, from_rows, shape_share, to_entries,
     to_rows,
@@ -37,6 +39,8 @@ pub struct BondAssociated {
     stress: Stress,
     /// [`Stress::largest_modulus`], Pa.
     modulus: f64,
+    /// The trace of the shape tensor of a whole family, m⁵.
+    whole: f64,
 }
 
 const KEYS: &[Key] = hooke::keys_with_hooke![STRESS];
@@ -71,6 +75,7 @@ fn build(given: &Given) -> Built {
     Built::plain(BondAssociated {
         stress,
         modulus: stress.largest_modulus(),
+        whole: Influence::Constant.weighted_volume(given.dimension, given.horizon),
     })
 }
 
@@ -80,16 +85,16 @@ impl Described for BondAssociated {
     }
 }
 
-/// Two constants, of which the stiffness is c/λ and c/(|ξ|² Σ ω Ṽ); 1/Σ ω Ṽ of the intact bonds; then H, and
-/// Z K⁻¹.
-type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
+/// Three constants: two of which the stiffness is c/λ and c/(|ξ|² Σ ω Ṽ), and the trace of a whole family's shape
+/// tensor over its own; 1/Σ ω Ṽ of the intact bonds; then H, and Z K⁻¹.
+type Point<const D: usize> = ([Lanes; 4], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
 /// The places of a point's numbers.
 struct Places;
 
 impl Places {
-    const WEIGHT: usize = 2;
-    const GRADIENT: usize = 3;
+    const WEIGHT: usize = 3;
+    const GRADIENT: usize = 4;
 
     const fn direct<const D: usize>() -> usize {
         Self::GRADIENT + D * D
@@ -132,7 +137,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     /// K as in the whole sum, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ; then Z Σ ω Ṽ (N m), and whether a bond has no stress.
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
-    const CONSTANTS: usize = 2;
+    const CONSTANTS: usize = 3;
     const PASSES: usize = 2;
     const OWN_NUMBERS: usize = 2 * D + 1;
     const LEAST_DIMENSION: usize = 2;
@@ -149,7 +154,9 @@ impl<const D: usize> Law<D> for BondAssociated {
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         let shape = ShapeTensor::<D>::new(sums);
+        numbers[2] = 1.0;
         if shape.inverse().is_some() {
+            numbers[2] = self.whole / shape.trace();
             numbers[0] = self.modulus / shape.smallest();
             numbers[1] = self.modulus / sums[2 * D];
         }
@@ -235,6 +242,11 @@ impl<const D: usize> Law<D> for BondAssociated {
         self.stresses(bond, gradient).energy * *weight
     }
 
+    #[inline(always)]
+    fn overload(&self, ([_, _, overload, _], _): &Point<D>) -> Lanes {
+        *overload
+    }
+
     fn needs_shape(&self) -> bool {
         true
     }
@@ -244,7 +256,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, ([whole, along, _], _): &Point<D>) -> Lanes {
+    fn stiffness(&self, length: Lanes, ([whole, along, ..], _): &Point<D>) -> Lanes {
         *whole + *along / (length * length)
     }
 

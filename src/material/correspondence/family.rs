@@ -130,6 +130,11 @@ impl<const D: usize> ShapeTensor<D> {
         }
     }
 
+    /// Σ ω |ξ|² Ṽ, m⁵.
+    pub fn trace(&self) -> f64 {
+        self.0.trace()
+    }
+
     /// The smallest eigenvalue, m⁵.
     pub fn smallest(&self) -> f64 {
         extremes(&self.0)[0]

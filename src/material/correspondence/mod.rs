@@ -23,8 +23,8 @@ mod tensor;
 
 use super::bond::Weights;
 use super::{
-    Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, PlasticState,
-    Values, Word,
+    Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind, Law,
+    PlasticState, Values, Word,
 };
 use crate::lanes::{Lanes, Numbers, Simd};
 pub use bond_associated::BondAssociated;
@@ -43,6 +43,8 @@ pub struct Correspondence {
     modulus: f64,
     control: Control,
     plastic: Option<Plastic>,
+    /// The trace of the shape tensor of a whole family, m⁵.
+    whole: f64,
 }
 
 const STRESS: Key = Key {
@@ -123,6 +125,7 @@ fn build(given: &Given) -> Built {
         modulus: stress.largest_modulus(),
         control: Control::of(given, hooke),
         plastic: Plastic::of(given),
+        whole: Influence::Constant.weighted_volume(given.dimension, given.horizon),
     })
 }
 
@@ -139,9 +142,12 @@ impl Described for Correspondence {
     }
 }
 
-/// The constants of a point: a spring constant that its energy nowhere exceeds, and that of Silling's
-/// control (N/m⁷); then A, and the diagonal and mixed entries of B.
-type Point<const D: usize> = ([Lanes; 2], Tensors<D>);
+/// The constants of a point: a spring constant that its energy nowhere exceeds, that of Silling's
+/// control (N/m⁷), and the trace of K⁻¹ over that of a whole family; then A, and the diagonal and mixed
+/// entries of B.
+type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
+
+const CONSTANTS: usize = 3;
 
 /// W − ½ P : H (J/m³), and whether the shape tensor is singular.
 const OWN: usize = 2;
@@ -192,7 +198,7 @@ impl<const D: usize> Law<D> for Correspondence {
     /// K as in the whole sum, and Σ ω η⊗ξ Ṽ (m⁵).
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
-    const CONSTANTS: usize = 2;
+    const CONSTANTS: usize = CONSTANTS;
     const PASSES: usize = 1;
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;
@@ -208,12 +214,13 @@ impl<const D: usize> Law<D> for Correspondence {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let weight = sums[2 * D];
         numbers[1] = self.control.constant(weight);
-        numbers[0] = match shape.inverse() {
-            None => 0.0,
+        [numbers[0], numbers[2]] = match shape.inverse() {
+            None => [0.0, 1.0],
             Some(inverse) => {
                 let control = self.control.matrix(&inverse, numbers[1]);
                 let [_, largest] = extremes(&control);
-                (self.modulus / shape.smallest()).max(largest)
+                let stiffness = (self.modulus / shape.smallest()).max(largest);
+                [stiffness, inverse.trace() * self.whole / (D * D) as f64]
             }
         };
     }
@@ -225,7 +232,7 @@ impl<const D: usize> Law<D> for Correspondence {
 
     fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], state: &mut PlasticState) {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
-        let (constants, found) = numbers.split_at_mut(2);
+        let (constants, found) = numbers.split_at_mut(CONSTANTS);
         let own = D * D + 2 * D;
         found[..own + OWN].fill(0.0);
         let moved = from_rows::<D>(&sums[2 * D..]);
@@ -287,7 +294,7 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
-        numbers[2 + D * D + 2 * D]
+        numbers[CONSTANTS + D * D + 2 * D]
     }
 
     fn flows(&self) -> bool {
@@ -295,12 +302,17 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     fn is_singular(&self, numbers: &[f64]) -> bool {
-        numbers[2 + D * D + 2 * D + 1] > 0.0
+        numbers[CONSTANTS + D * D + 2 * D + 1] > 0.0
     }
 
     #[inline(always)]
     fn stiffness(&self, _: Lanes, end: &Point<D>) -> Lanes {
         end.0[0]
+    }
+
+    #[inline(always)]
+    fn overload(&self, ([.., overload], _): &Point<D>) -> Lanes {
+        *overload
     }
 
     fn needs_shape(&self) -> bool {
