@@ -58,7 +58,7 @@ fn rules() -> [(&'static str, DamageRule); 3] {
         calibration: Calibration::Energy,
         work: WorkRule {
             sense,
-            family_correction: false,
+            family_correction: 0.0,
         },
     };
     [

@@ -358,7 +358,8 @@ fn blocks_of_the_normalised_law() {
 fn blocks_of_bond_associated_correspondence() {
     let law =
         "bond_associated_correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
-    let deck = with_one_law(law).replace("brittle.critical_stretch", "brittle.energy");
+    let rule = "brittle.energy]\nfamily_correction = 0.5";
+    let deck = with_one_law(law).replace("brittle.critical_stretch]", rule);
     same_with_either_family("associated", &deck);
 }
 
@@ -371,7 +372,7 @@ fn blocks_of_ordinary_laws_whose_bonds_remember() {
         let law = format!(
             "ordinary_{name} = {{ density = 2, youngs_modulus = 5, poisson_ratio = 0.3, {more} }}"
         );
-        let rule = "brittle.energy]\ntension_only = false\nfamily_correction = true";
+        let rule = "brittle.energy]\ntension_only = false\nfamily_correction = 1";
         let deck = with_one_law(&law).replace("brittle.critical_stretch]", rule);
         same_with_either_family(&format!("ordinary-{name}"), &deck);
     }
@@ -381,7 +382,7 @@ fn blocks_of_ordinary_laws_whose_bonds_remember() {
 fn blocks_of_a_law_whose_points_flow() {
     let law = "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, \
                yield_stress = 0.05, hardening_modulus = 0.2 }";
-    let rule = "brittle.energy]\nfamily_correction = true";
+    let rule = "brittle.energy]\nfamily_correction = 1";
     let deck = with_one_law(law).replace("brittle.critical_stretch]", rule);
     let deck = deck.replace("'stress'", "'stress', 'plastic_strain_equivalent'");
     same_with_either_family("flowing", &deck);

@@ -62,8 +62,7 @@ impl Case {
         let pulled = by_energy.then(|| energy(0.004, ""));
         // With more, for the motions here press bonds so that all would break.
         let either = by_energy && self.law.any_poisson_ratio;
-        let either =
-            either.then(|| energy(0.04, ", tension_only = false, family_correction = true"));
+        let either = either.then(|| energy(0.04, ", tension_only = false, family_correction = 1"));
         stretch.into_iter().chain(pulled).chain(either).collect()
     }
 

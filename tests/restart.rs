@@ -476,7 +476,10 @@ fn goes_on(name: &str, law: &str, family: &str) -> BTreeMap<String, Vec<u64>> {
         );
     let text = if law.starts_with("correspondence") {
         let plain = "critical_stretch = { fracture_energy = 135, alpha = 0.25 }";
-        text.replace(plain, "energy = { fracture_energy = 135 }")
+        text.replace(
+            plain,
+            "energy = { fracture_energy = 135, family_correction = 1 }",
+        )
     } else {
         text
     };

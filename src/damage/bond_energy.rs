@@ -133,7 +133,7 @@ mod tests {
             stretch: 0.02,
             rule: WorkRule {
                 sense: Sense::Pulled,
-                family_correction: false,
+                family_correction: 0.0,
             },
         };
         // s0 − α s_min = 0.03 is 1.5 s0.

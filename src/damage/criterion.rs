@@ -22,13 +22,13 @@ pub enum Criterion {
 }
 
 /// How the work of bonds is looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkRule {
     /// Which bonds break.
     pub sense: Sense,
-    /// Whether those of points whose families are not whole may hold [as many times as much](Law::overload) as they
-    /// have to.
-    pub family_correction: bool,
+    /// The share, from 0 to 1, of what bonds hold [more](Law::overload) where families are not whole that their
+    /// threshold grows by.
+    pub family_correction: f64,
 }
 
 /// Which bonds break by their work.
@@ -164,8 +164,8 @@ impl Criterion {
 }
 
 impl WorkRule {
-    /// That of bonds between points with this and another one: a pressed bond breaks, and surfaces are corrected, where
-    /// both say so.
+    /// That of bonds between points with this and another one: a pressed bond breaks where both say so, and the smaller
+    /// correction counts.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             sense: if self.sense == Sense::Either {
@@ -173,22 +173,23 @@ impl WorkRule {
             } else {
                 Sense::Pulled
             },
-            family_correction: self.family_correction && other.family_correction,
+            family_correction: self.family_correction.min(other.family_correction),
         }
     }
 
-    /// The threshold of bonds whose ends may have more to hold: half of the work is each end's.
+    /// The threshold of bonds by that of whole families: half of the work is each end's.
     #[inline(always)]
     fn corrected<L: Law<D>, const D: usize>(
         self,
         threshold: Lanes,
         ends: Ends<'_, L, L::Point>,
     ) -> Lanes {
-        if !self.family_correction {
+        let share = self.family_correction;
+        if share == 0.0 {
             return threshold;
         }
         let [here, there] = ends.points;
-        let both = ends.laws[0].overload(here) + ends.laws[1].overload(there);
-        threshold * (both * 0.5)
+        let mean = (ends.laws[0].overload(here) + ends.laws[1].overload(there)) * 0.5;
+        threshold * (mean * share + Lanes::splat(1.0 - share))
     }
 }

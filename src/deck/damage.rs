@@ -55,7 +55,7 @@ pub fn damage(
                 } else {
                     Sense::Either
                 },
-                family_correction: law.family_correction,
+                family_correction: family_correction(scope, &law.family_correction, &key)?,
             };
             Ok(plan::Damage {
                 rule: DamageRule::Energy { calibration, work },
@@ -98,6 +98,11 @@ fn measure<T>(
 fn alpha(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
     let words = "at least 0 and below 1";
     scope.within(number, &format!("{key} alpha"), 0.0..1.0, words)
+}
+
+fn family_correction(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
+    let (key, range) = (format!("{key} family_correction"), 0.0..1_f64.next_up());
+    scope.within(number, &key, range, "from 0 to 1")
 }
 
 fn no_failure(scope: &Scope, sets: &[plan::Set], names: &[Text], key: &str) -> Result<Vec<usize>> {

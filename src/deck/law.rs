@@ -97,7 +97,7 @@ impl Law {
             DamageRule::Energy { work, .. } => {
                 let wanted = [
                     (work.sense == Sense::Either, "tension_only = false"),
-                    (work.family_correction, "family_correction = true"),
+                    (work.family_correction > 0.0, "family_correction"),
                 ];
                 let wanted = wanted.into_iter().find_map(|(is, key)| is.then_some(key));
                 if let Some(key) = wanted.filter(|_| !self.declaration.any_poisson_ratio) {
@@ -224,8 +224,8 @@ mod tests {
             "law `elastic_plastic_pmb`, yield_stretch: must be above 0, is -0.1"
         );
         assert_eq!(
-            error(law("pmb").with("family_correction", 0.1)),
-            "law `pmb`, family_correction: must be \"none\" or \"energy\", is 0.1"
+            error(law("pmb").with("surface_correction", 0.1)),
+            "law `pmb`, surface_correction: must be \"none\" or \"energy\", is 0.1"
         );
         assert_eq!(
             error(law("normalised_pmb").with("form", "energi")),

@@ -222,8 +222,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// How many times as much a bond of a point holds whose family is not whole as one inside, at the same strain:
-    /// fewer bonds have to hold the energy of the point.
+    /// How many times as much the bonds of a point hold as those of a point inside, at the same strain: where a family is
+    /// not whole, fewer bonds hold the energy of the point. 1 if bonds hold the same everywhere.
     #[inline(always)]
     fn overload(&self, _end: &Self::Point) -> Lanes {
         Lanes::splat(1.0)

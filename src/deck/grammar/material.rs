@@ -123,12 +123,13 @@ pub struct BondEnergy {
     /// shear crack.
     #[serde(default = "yes")]
     pub tension_only: bool,
-    /// Whether bonds of points at surfaces, of which fewer hold the energy of a point, may hold as much more before they
-    /// break; if not, a body breaks at its surfaces first.
-    #[serde(default)]
-    pub family_correction: bool,
+    /// How much of this is corrected, from 0 to 1: bonds beside surfaces hold more than those inside at the same strain, for
+    /// their points have fewer of them, so that a body breaks at its surfaces first. 0 if not given; with 1 their critical work
+    /// is larger by as much.
+    #[serde(default = "nothing")]
+    pub family_correction: Number,
     /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
-    #[serde(default = "no_alpha")]
+    #[serde(default = "nothing")]
     pub alpha: Number,
     /// Sets of points whose bonds never break.
     #[serde(default)]
@@ -152,7 +153,7 @@ fn yes() -> bool {
     true
 }
 
-fn no_alpha() -> Number {
+fn nothing() -> Number {
     default_number(0.0)
 }
 
