@@ -98,6 +98,8 @@ no_failure = ["left", "right"]
 
 """,
 }
+# A parameter that only damage by work has.
+OF_WORK = "family_correction"
 COLOURS = ("#1b6ca8", "#d1495b", "#66a182", "#8d6a9f")
 
 FORCES_AT = (0.1e-3, 0.2e-3, 0.3e-3, 0.4e-3)  # m
@@ -163,6 +165,7 @@ def deck(law, load_steps, opening):
 
     if LAWS[law] is not None:
         replace(r"(?s)\[material\.pmma\..*?(?=\[body\.plate\])", LAWS[law])
+        replace(rf"(?m)^{OF_WORK} = .*\n", "")
     elif opening:
         replace(r"(?m)^\[damage\.brittle\.energy\]$", '[damage.brittle.energy]\ncalibration = "opening"')
     if load_steps:
@@ -183,7 +186,8 @@ def run(options, law):
     written.write_text(deck(law, options.relaxation, options.opening))
     command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
     for assignment in [f"dx={options.dx!r}", *options.set]:
-        command += ["--set", assignment]
+        if LAWS[law] is None or not assignment.startswith(f"{OF_WORK}="):
+            command += ["--set", assignment]
     if options.threads:
         command += ["--threads", str(options.threads)]
     done = subprocess.run(command)

@@ -343,6 +343,24 @@ fn blocks_of_different_laws() {
 }
 
 #[test]
+fn blocks_of_different_laws_whose_bonds_break_by_work() {
+    let constants = "{ density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    let mut deck = LAWS.replace(
+        "brittle.critical_stretch]",
+        "brittle.energy]\nfamily_correction = 1",
+    );
+    for (name, law) in [
+        ("first", "ordinary"),
+        ("second", "correspondence"),
+        ("third", "bond_associated_correspondence"),
+    ] {
+        let line = LAWS.lines().find(|line| line.starts_with(name)).unwrap();
+        deck = deck.replace(line, &format!("{name}.{law} = {constants}"));
+    }
+    same_everywhere("laws-by-work", &deck, true);
+}
+
+#[test]
 fn blocks_of_the_ordinary_law() {
     let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
     same_everywhere("ordinary", &with_one_law(law), true);

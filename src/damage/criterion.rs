@@ -193,3 +193,20 @@ impl WorkRule {
         threshold * (mean * share + Lanes::splat(1.0 - share))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_two_bodies_the_smaller_correction_counts() {
+        let rule = |sense, family_correction| WorkRule {
+            sense,
+            family_correction,
+        };
+        let both = rule(Sense::Either, 1.0).of_both(rule(Sense::Pulled, 0.5));
+        assert_eq!(both, rule(Sense::Pulled, 0.5));
+        let both = rule(Sense::Either, 0.0).of_both(rule(Sense::Either, 1.0));
+        assert_eq!(both, rule(Sense::Either, 0.0));
+    }
+}

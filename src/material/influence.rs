@@ -88,4 +88,34 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn weighted_volumes_in_closed_form() {
+        let (horizon, thickness) = (3e-3_f64, 0.01);
+        for (influence, dimension, expected) in [
+            (
+                Influence::Constant,
+                Dimension::Space,
+                0.8 * PI * horizon.powi(5),
+            ),
+            (
+                Influence::Linear,
+                Dimension::PlaneStress { thickness },
+                0.1 * PI * thickness * horizon.powi(4),
+            ),
+            (
+                Influence::Inverse,
+                Dimension::Line {
+                    cross_section: 2e-4,
+                },
+                2e-4 * horizon.powi(3),
+            ),
+        ] {
+            let found = influence.weighted_volume(dimension, horizon);
+            assert!(
+                (found / expected - 1.0).abs() < 1e-11,
+                "{influence:?}: {found} {expected}"
+            );
+        }
+    }
 }
