@@ -47,8 +47,28 @@ pub struct Ends<'a, L, P> {
     pub laws: &'a [L; 2],
     /// The numbers of the points.
     pub points: [&'a P; 2],
-    /// The ends' thresholds.
-    pub thresholds: &'a [Lanes; 2],
+    /// What criteria alone read of them.
+    pub limits: &'a [Limits; 2],
+}
+
+/// What criteria read of eight points, where they read it.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// The stretches or works (J/m⁶) at which their bonds break.
+    pub thresholds: Lanes,
+    /// Their [`Law::overload`].
+    pub overloads: Lanes,
+}
+
+impl Limits {
+    /// Where no criterion reads them.
+    #[inline(always)]
+    pub fn unread() -> Self {
+        Self {
+            thresholds: Lanes::splat(0.0),
+            overloads: Lanes::splat(1.0),
+        }
+    }
 }
 
 impl Criterion {
@@ -56,6 +76,15 @@ impl Criterion {
     #[inline(always)]
     pub fn reads_thresholds(self) -> bool {
         matches!(self, Self::Thresholds(_) | Self::WorkThresholds(_))
+    }
+
+    /// Whether it depends on the overloads of the ends.
+    #[inline(always)]
+    pub fn reads_overloads(self) -> bool {
+        match self {
+            Self::Work(_, rule) | Self::WorkThresholds(rule) => rule.family_correction > 0.0,
+            Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
+        }
     }
 
     /// Whether it asks for the work of the force states.
@@ -127,9 +156,9 @@ impl Criterion {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
             Self::Stretch(critical) => Lanes::splat(critical),
-            Self::Work(critical, rule) => rule.corrected(Lanes::splat(critical), ends),
+            Self::Work(critical, rule) => rule.corrected(Lanes::splat(critical), ends.limits),
             Self::Thresholds(critical) => {
-                let [mut here, mut there] = *ends.thresholds;
+                let [mut here, mut there] = ends.limits.map(|limits| limits.thresholds);
                 if L::SCALED {
                     let growth = scale() - Lanes::splat(1.0);
                     here += growth * critical[0];
@@ -138,7 +167,8 @@ impl Criterion {
                 here.min(there)
             }
             Self::WorkThresholds(rule) => {
-                rule.corrected(ends.thresholds[0].min(ends.thresholds[1]), ends)
+                let [here, there] = ends.limits;
+                rule.corrected(here.thresholds.min(there.thresholds), ends.limits)
             }
         }
     }
@@ -179,17 +209,12 @@ impl WorkRule {
 
     /// The threshold of bonds by that of whole families: half of the work is each end's.
     #[inline(always)]
-    fn corrected<L: Law<D>, const D: usize>(
-        self,
-        threshold: Lanes,
-        ends: Ends<'_, L, L::Point>,
-    ) -> Lanes {
+    fn corrected(self, threshold: Lanes, [here, there]: &[Limits; 2]) -> Lanes {
         let share = self.family_correction;
         if share == 0.0 {
             return threshold;
         }
-        let [here, there] = ends.points;
-        let mean = (ends.laws[0].overload(here) + ends.laws[1].overload(there)) * 0.5;
+        let mean = (here.overloads + there.overloads) * 0.5;
         threshold * (mean * share + Lanes::splat(1.0 - share))
     }
 }

@@ -6,7 +6,7 @@ mod critical_stretch;
 mod pull_apart;
 
 pub use bond_energy::{BondEnergy, Calibration};
-pub use criterion::{Criterion, Ends, Sense, WorkRule};
+pub use criterion::{Criterion, Ends, Limits, Sense, WorkRule};
 pub use critical_stretch::CriticalStretch;
 
 /// The damage law of a block.
@@ -32,6 +32,14 @@ impl DamageLaw {
         match self {
             Self::CriticalStretch(law) => law.alpha,
             Self::BondEnergy(law) => law.alpha,
+        }
+    }
+
+    /// The share of [`WorkRule::family_correction`].
+    pub fn family_correction(&self) -> f64 {
+        match self {
+            Self::CriticalStretch(_) => 0.0,
+            Self::BondEnergy(law) => law.rule.family_correction,
         }
     }
 

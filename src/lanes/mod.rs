@@ -3,11 +3,13 @@
 //! Plain arrays and IEEE operations without contraction: whatever instructions the compiler picks,
 //! the bits are the same. Operations of which this does not hold are in [`simd`].
 
+mod column;
 pub mod instructions;
 pub mod numbers;
 pub mod simd;
 mod versions;
 
+pub use column::Column;
 pub use instructions::Instructions;
 pub use numbers::Numbers;
 pub use simd::Simd;

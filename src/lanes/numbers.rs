@@ -1,5 +1,7 @@
 //! A fixed number of [`Lanes`], and the columns of plain numbers that they are read from and added to.
 
+use std::ops::{Deref, DerefMut};
+
 use super::{Lanes, WIDTH};
 
 /// Several quantities of eight bonds or points: `[Lanes; N]`, or a pair of such.
@@ -26,13 +28,13 @@ pub trait Numbers: Copy + Send + Sync {
     ///
     /// # Panics
     /// When there are fewer.
-    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_>;
+    fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
     /// The first columns of several, to add to.
     ///
     /// # Panics
     /// When there are fewer.
-    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_>;
+    fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_>;
 
     /// One of the columns.
     fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64];
@@ -74,11 +76,11 @@ impl<const N: usize> Numbers for [Lanes; N] {
         &mut self[quantity]
     }
 
-    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_> {
+    fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_> {
         std::array::from_fn(|k| &all[k][..])
     }
 
-    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_> {
+    fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_> {
         let mut all = all.iter_mut();
         std::array::from_fn(|_| &mut all.next().expect("a column for each quantity")[..])
     }
@@ -131,11 +133,11 @@ impl<const N: usize, const M: usize> Numbers for [[Lanes; N]; M] {
         &mut self[quantity / N][quantity % N]
     }
 
-    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_> {
+    fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_> {
         std::array::from_fn(|row| <[Lanes; N]>::columns(&all[row * N..]))
     }
 
-    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_> {
+    fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_> {
         let mut rows = all.chunks_mut(N);
         std::array::from_fn(|_| {
             <[Lanes; N]>::columns_mut(rows.next().expect("a column for each quantity"))
@@ -193,11 +195,11 @@ impl<A: Numbers, B: Numbers> Numbers for (A, B) {
         }
     }
 
-    fn columns(all: &[Vec<f64>]) -> Self::Columns<'_> {
+    fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_> {
         (A::columns(all), B::columns(&all[A::COUNT..]))
     }
 
-    fn columns_mut(all: &mut [Vec<f64>]) -> Self::ColumnsMut<'_> {
+    fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_> {
         let (first, second) = all.split_at_mut(A::COUNT);
         (A::columns_mut(first), B::columns_mut(second))
     }

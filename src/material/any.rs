@@ -181,9 +181,8 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
     }
 
-    #[inline(never)]
-    fn overload(&self, end: &Self::Point) -> Lanes {
-        with_law!(self, law => Law::<D>::overload(law, &first(end)))
+    fn overload(&self, sums: &[f64]) -> f64 {
+        with_law!(self, law => Law::<D>::overload(law, sums))
     }
 
     fn resists_across(&self) -> bool {

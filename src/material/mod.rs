@@ -222,11 +222,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// How many times as much the bonds of a point hold as those of a point inside, at the same strain: where a family is
-    /// not whole, fewer bonds hold the energy of the point. 1 if bonds hold the same everywhere.
-    #[inline(always)]
-    fn overload(&self, _end: &Self::Point) -> Lanes {
-        Lanes::splat(1.0)
+    /// How many times as much the bonds of a point hold as those of a point inside, at the same strain, from the sums
+    /// of [`Self::whole_share`]: where a family is not whole, fewer bonds hold the energy of the point. 1 if bonds hold
+    /// the same everywhere.
+    fn overload(&self, _sums: &[f64]) -> f64 {
+        1.0
     }
 
     /// What the critical stretch of a bond is multiplied by; the same from both ends.

@@ -96,10 +96,9 @@ impl Ordinary {
         self.whole
     }
 
-    /// What a bond holds over what it would if the family were whole, from A/m.
-    #[inline(always)]
-    pub(super) fn overload_of(&self, pull: Lanes) -> Lanes {
-        pull * (self.whole / self.extensional)
+    /// What a bond holds over what it would if the family were whole, from m.
+    pub(super) fn overload_of(&self, sum: f64) -> f64 {
+        if sum > 0.0 { self.whole / sum } else { 1.0 }
     }
 }
 
@@ -281,9 +280,8 @@ impl<const D: usize> Law<D> for Ordinary {
         self.dilatation_energy(numbers[2])
     }
 
-    #[inline(always)]
-    fn overload(&self, [pull, _]: &[Lanes; 2]) -> Lanes {
-        self.overload_of(*pull)
+    fn overload(&self, sums: &[f64]) -> f64 {
+        self.overload_of(sums[0])
     }
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.

@@ -193,9 +193,8 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         *loss
     }
 
-    #[inline(always)]
-    fn overload(&self, [pull, ..]: &[Lanes; 4]) -> Lanes {
-        self.elastic.overload_of(*pull)
+    fn overload(&self, sums: &[f64]) -> f64 {
+        self.elastic.overload_of(sums[0])
     }
 
     #[inline(always)]

@@ -185,9 +185,8 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         *loss
     }
 
-    #[inline(always)]
-    fn overload(&self, [pull, ..]: &[Lanes; 3]) -> Lanes {
-        self.elastic.overload_of(*pull)
+    fn overload(&self, sums: &[f64]) -> f64 {
+        self.elastic.overload_of(sums[0])
     }
 
     #[inline(always)]

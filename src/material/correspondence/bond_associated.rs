@@ -85,16 +85,15 @@ impl Described for BondAssociated {
     }
 }
 
-/// Three constants: two of which the stiffness is c/λ and c/(|ξ|² Σ ω Ṽ), and the trace of a whole family's shape
-/// tensor over its own; 1/Σ ω Ṽ of the intact bonds; then H, and Z K⁻¹.
-type Point<const D: usize> = ([Lanes; 4], (Tensor<Lanes, D>, Tensor<Lanes, D>));
+/// Two constants, of which the stiffness is c/λ and c/(|ξ|² Σ ω Ṽ); 1/Σ ω Ṽ of the intact bonds; then H, and Z K⁻¹.
+type Point<const D: usize> = ([Lanes; 3], (Tensor<Lanes, D>, Tensor<Lanes, D>));
 
 /// The places of a point's numbers.
 struct Places;
 
 impl Places {
-    const WEIGHT: usize = 3;
-    const GRADIENT: usize = 4;
+    const WEIGHT: usize = 2;
+    const GRADIENT: usize = 3;
 
     const fn direct<const D: usize>() -> usize {
         Self::GRADIENT + D * D
@@ -137,7 +136,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     /// K as in the whole sum, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ; then Z Σ ω Ṽ (N m), and whether a bond has no stress.
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
-    const CONSTANTS: usize = 3;
+    const CONSTANTS: usize = 2;
     const PASSES: usize = 2;
     const OWN_NUMBERS: usize = 2 * D + 1;
     const LEAST_DIMENSION: usize = 2;
@@ -154,11 +153,19 @@ impl<const D: usize> Law<D> for BondAssociated {
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         let shape = ShapeTensor::<D>::new(sums);
-        numbers[2] = 1.0;
         if shape.inverse().is_some() {
-            numbers[2] = self.whole / shape.trace();
             numbers[0] = self.modulus / shape.smallest();
             numbers[1] = self.modulus / sums[2 * D];
+        }
+    }
+
+    /// The trace of a whole family's shape tensor over its own.
+    fn overload(&self, sums: &[f64]) -> f64 {
+        let shape = ShapeTensor::<D>::new(sums);
+        if shape.inverse().is_some() {
+            self.whole / shape.trace()
+        } else {
+            1.0
         }
     }
 
@@ -240,11 +247,6 @@ impl<const D: usize> Law<D> for BondAssociated {
         _: &[Lanes; 0],
     ) -> Lanes {
         self.stresses(bond, gradient).energy * *weight
-    }
-
-    #[inline(always)]
-    fn overload(&self, ([_, _, overload, _], _): &Point<D>) -> Lanes {
-        *overload
     }
 
     fn needs_shape(&self) -> bool {

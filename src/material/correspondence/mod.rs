@@ -142,12 +142,11 @@ impl Described for Correspondence {
     }
 }
 
-/// The constants of a point: a spring constant that its energy nowhere exceeds, that of Silling's
-/// control (N/m⁷), and the trace of K⁻¹ over that of a whole family; then A, and the diagonal and mixed
-/// entries of B.
+/// The constants of a point: a spring constant that its energy nowhere exceeds, and that of Silling's
+/// control (N/m⁷); then A, and the diagonal and mixed entries of B.
 type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
-const CONSTANTS: usize = 3;
+const CONSTANTS: usize = 2;
 
 /// W − ½ P : H (J/m³), and whether the shape tensor is singular.
 const OWN: usize = 2;
@@ -214,15 +213,19 @@ impl<const D: usize> Law<D> for Correspondence {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let weight = sums[2 * D];
         numbers[1] = self.control.constant(weight);
-        [numbers[0], numbers[2]] = match shape.inverse() {
-            None => [0.0, 1.0],
-            Some(inverse) => {
-                let control = self.control.matrix(&inverse, numbers[1]);
-                let [_, largest] = extremes(&control);
-                let stiffness = (self.modulus / shape.smallest()).max(largest);
-                [stiffness, inverse.trace() * self.whole / (D * D) as f64]
-            }
-        };
+        if let Some(inverse) = shape.inverse() {
+            let control = self.control.matrix(&inverse, numbers[1]);
+            let [_, largest] = extremes(&control);
+            numbers[0] = (self.modulus / shape.smallest()).max(largest);
+        }
+    }
+
+    /// The trace of K⁻¹ over that of a whole family.
+    fn overload(&self, sums: &[f64]) -> f64 {
+        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
+        shape
+            .inverse()
+            .map_or(1.0, |inverse| inverse.trace() * self.whole / (D * D) as f64)
     }
 
     #[inline(always)]
@@ -308,11 +311,6 @@ impl<const D: usize> Law<D> for Correspondence {
     #[inline(always)]
     fn stiffness(&self, _: Lanes, end: &Point<D>) -> Lanes {
         end.0[0]
-    }
-
-    #[inline(always)]
-    fn overload(&self, ([.., overload], _): &Point<D>) -> Lanes {
-        *overload
     }
 
     fn needs_shape(&self) -> bool {

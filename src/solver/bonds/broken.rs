@@ -180,12 +180,14 @@ impl<const D: usize> Forces<D> {
         let Self { numbers, halo, .. } = self;
         let changing = numbers.first_changing..numbers.read;
         let columns = numbers.columns[changing.clone()].iter();
-        let columns: Vec<&Vec<f64>> = columns.chain([&flags]).collect();
-        halo.pack(columns.iter().map(|column| column.as_slice()));
+        let columns = columns.map(|column| &column[..]);
+        let columns: Vec<&[f64]> = columns.chain([&flags[..]]).collect();
+        halo.pack(columns.into_iter());
         halo.exchange(comm, &mut |_| {});
         let columns = numbers.columns[changing].iter_mut();
-        let mut columns: Vec<&mut Vec<f64>> = columns.chain([&mut flags]).collect();
-        halo.unpack(columns.iter_mut().map(|column| column.as_mut_slice()));
+        let columns = columns.map(|column| &mut column[..]);
+        let columns: Vec<&mut [f64]> = columns.chain([&mut flags[..]]).collect();
+        halo.unpack(columns.into_iter());
         times.halo += start.elapsed();
         self.update(News::Numbers, Which::All, model, displacement);
         let mut changed = own.clone();

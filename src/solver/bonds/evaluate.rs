@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::comm::Communicator;
 use crate::damage::Criterion;
 use crate::families::{BlockBonds, Which};
-use crate::lanes::{Lanes, Numbers};
+use crate::lanes::{Column, Lanes, Numbers};
 use crate::material::bond::stretch_of;
 use crate::material::{Law, with_pair};
 use crate::solver::model::Model;
@@ -100,10 +100,10 @@ impl<const D: usize> Forces<D> {
             let changing = first..self.numbers.read.max(first);
             match news {
                 News::Displacement => halo.pack(displacement.iter().map(Vec::as_slice)),
-                News::Thresholds => halo.pack([&self.thresholds[..]].into_iter()),
+                News::Thresholds => halo.pack([&self.limits.thresholds[..]].into_iter()),
                 News::Numbers => {
                     let columns = &self.numbers.columns[changing.clone()];
-                    halo.pack(columns.iter().map(Vec::as_slice));
+                    halo.pack(columns.iter().map(|column| &column[..]));
                 }
                 News::OwnNumbers | News::Nothing => {}
             }
@@ -134,10 +134,10 @@ impl<const D: usize> Forces<D> {
                 News::Displacement => {
                     halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
                 }
-                News::Thresholds => halo.unpack([&mut self.thresholds[..]].into_iter()),
+                News::Thresholds => halo.unpack([&mut self.limits.thresholds[..]].into_iter()),
                 News::Numbers => {
                     let columns = &mut self.numbers.columns[changing];
-                    halo.unpack(columns.iter_mut().map(Vec::as_mut_slice));
+                    halo.unpack(columns.iter_mut().map(|column| &mut column[..]));
                 }
                 News::OwnNumbers | News::Nothing => {}
             }
@@ -194,7 +194,7 @@ impl<const D: usize> Forces<D> {
         for grid in &mut self.grids {
             match news {
                 News::Displacement => grid.update_displacement(which, displacement),
-                News::Thresholds => grid.update_thresholds(which, &self.thresholds),
+                News::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
                 News::OwnNumbers if which == Which::Ghosts => {}
                 News::Numbers | News::OwnNumbers => {
                     let first = self.numbers.first_changing;
@@ -217,7 +217,7 @@ impl<const D: usize> Forces<D> {
     /// Gets ready for a pass at some of the points.
     pub(super) fn clear(&mut self, pass: Pass, points: Range<usize>) {
         match pass {
-            Pass::SmallestStretch => self.thresholds[points].fill(f64::INFINITY),
+            Pass::SmallestStretch => self.limits.thresholds[points].fill(f64::INFINITY),
             Pass::PointSum(_) => {
                 for sums in &mut self.numbers.sums {
                     sums[points.clone()].fill(0.0);
@@ -238,13 +238,13 @@ impl<const D: usize> Forces<D> {
         match pass {
             Pass::SmallestStretch => {
                 // Taken out while it is written.
-                let mut thresholds = [std::mem::take(&mut self.thresholds)];
+                let mut thresholds = [std::mem::take(&mut self.limits.thresholds)];
                 self.for_each_interaction(|interaction, source| {
                     let results = <[Lanes; 1]>::columns_mut(&mut thresholds);
                     let bonds = &mut interaction.bonds;
                     sweep(bonds, points.clone(), results, &SmallestStretch, source);
                 });
-                [self.thresholds] = thresholds;
+                [self.limits.thresholds] = thresholds;
             }
             Pass::PointSum(number) => {
                 let mut sums = std::mem::take(&mut self.numbers.sums);
@@ -290,7 +290,7 @@ impl<const D: usize> Forces<D> {
         let blocks = &self.blocks;
         match pass {
             Pass::SmallestStretch => {
-                let thresholds = self.thresholds[points.clone()].par_iter_mut();
+                let thresholds = self.limits.thresholds[points.clone()].par_iter_mut();
                 let block = &model.block[points];
                 thresholds
                     .with_min_len(CHUNK)
@@ -320,7 +320,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
     law: L,
-    sums: &mut [Vec<f64>],
+    sums: &mut [Column],
     source: Source<'_, D>,
 ) {
     if number >= L::PASSES {

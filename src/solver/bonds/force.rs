@@ -94,7 +94,7 @@ impl<L> Force<L> {
         Ends {
             laws: &self.laws,
             points: group.points(),
-            thresholds: &group.thresholds,
+            limits: &group.limits,
         }
     }
 }

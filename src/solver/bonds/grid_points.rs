@@ -3,32 +3,36 @@
 
 use std::sync::Arc;
 
+use crate::damage::Limits;
 use crate::families::{Adjacent, Grid, Offset, Which};
 use crate::lanes::numbers::eight;
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{Column, Lanes, Numbers, Simd};
 use crate::material::bond::{Reference, Weights, deform};
 
 use super::kernel::{Group, Kernel};
+use super::limit_columns::{LimitColumns, ReadLimits};
 use super::list_points::load_memory;
 
 /// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
 /// but are finite.
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
-    displacement: [Vec<f64>; D],
+    displacement: [Column; D],
     /// Those numbers that bonds read.
-    numbers: Vec<Vec<f64>>,
-    thresholds: Vec<f64>,
+    numbers: Vec<Column>,
+    limits: LimitColumns,
 }
 
 impl<const D: usize> GridValues<D> {
-    /// For a grid at rest, whose bonds read so many numbers of each point.
-    pub fn new(grid: Arc<Grid>, numbers: usize, with_thresholds: bool) -> Self {
+    /// For a grid at rest, whose bonds read so many numbers of each point and limits as these.
+    pub fn new(grid: Arc<Grid>, numbers: usize, limits: &LimitColumns) -> Self {
         let count = grid.places();
         Self {
-            displacement: std::array::from_fn(|_| vec![0.0; count]),
-            numbers: vec![vec![0.0; count]; numbers],
-            thresholds: vec![0.0; if with_thresholds { count } else { 0 }],
+            displacement: std::array::from_fn(|d| Column::new(d, count, 0.0)),
+            numbers: (0..numbers)
+                .map(|k| Column::new(D + k, count, 0.0))
+                .collect(),
+            limits: limits.alike(D + numbers, count),
             grid,
         }
     }
@@ -41,7 +45,7 @@ impl<const D: usize> GridValues<D> {
     }
 
     /// Takes the numbers of some of the local points, from the first wanted one on.
-    pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Vec<f64>]) {
+    pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);
         }
@@ -49,14 +53,20 @@ impl<const D: usize> GridValues<D> {
 
     /// Takes the thresholds of some of the local points.
     pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
-        self.grid.update(which, values, &mut self.thresholds);
+        self.grid.update(which, values, &mut self.limits.thresholds);
+    }
+
+    /// Takes the overloads of the local points.
+    pub fn update_overloads(&mut self, values: &[f64]) {
+        let places = &mut self.limits.overloads;
+        self.grid.update(Which::All, values, places);
     }
 
     /// Memory, that of the grid included, bytes.
     pub fn bytes(&self) -> usize {
         let columns = self.displacement.iter().chain(&self.numbers);
-        let count: usize = columns.map(Vec::len).sum();
-        size_of::<f64>() * (count + self.thresholds.len()) + self.grid.bytes()
+        let count: usize = columns.map(|column| column.len()).sum();
+        size_of::<f64>() * count + self.limits.bytes() + self.grid.bytes()
     }
 }
 
@@ -64,8 +74,7 @@ impl<const D: usize> GridValues<D> {
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
     numbers: <K::Point as Numbers>::Columns<'a>,
-    thresholds: &'a [f64],
-    with_thresholds: bool,
+    limits: ReadLimits<'a>,
     limit: f64,
     /// Of the own and the far ends, m³.
     volumes: [Lanes; 2],
@@ -84,7 +93,7 @@ impl<K: Kernel<D>, const D: usize> Copy for GridPoints<'_, K, D> {}
 pub struct Here<P, const D: usize> {
     displacement: [Lanes; D],
     numbers: P,
-    threshold: Lanes,
+    limits: Limits,
 }
 
 impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
@@ -93,20 +102,17 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Panics
     /// When an array that the kernel reads does not cover the grid.
     pub fn new(kernel: &K, values: &'a GridValues<D>, volumes: [f64; 2]) -> Self {
-        let with_thresholds = kernel.criterion().reads_thresholds();
         let numbers = K::Point::columns(&values.numbers);
         let covers = |column: &[f64]| column.len() >= values.grid.places();
         assert!(
             values.displacement.iter().all(|column| covers(column))
-                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k)))
-                && (!with_thresholds || covers(&values.thresholds)),
+                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k))),
             "an array is too short for the grid"
         );
         Self {
-            displacement: values.displacement.each_ref().map(Vec::as_slice),
+            displacement: values.displacement.each_ref().map(|column| &column[..]),
             numbers,
-            thresholds: &values.thresholds,
-            with_thresholds,
+            limits: ReadLimits::new(kernel.criterion(), &values.limits, values.grid.places()),
             limit: kernel.criterion().limit(),
             volumes: volumes.map(Lanes::splat),
         }
@@ -135,13 +141,12 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// As for [`Self::numbers`].
     #[inline(always)]
-    unsafe fn thresholds<const ONLY_NEAR: bool>(&self, place: usize) -> Lanes {
-        if !ONLY_NEAR && self.with_thresholds {
-            // SAFETY: `new` has checked the length.
-            unsafe { eight(self.thresholds, place) }
-        } else {
-            Lanes::splat(0.0)
+    unsafe fn limits<const ONLY_NEAR: bool>(&self, place: usize) -> Limits {
+        if ONLY_NEAR {
+            return Limits::unread();
         }
+        // SAFETY: `new` has checked the lengths.
+        (self.limits).eight(|column| unsafe { eight(column, place) })
     }
 
     /// The own ends of the bonds of eight points from a place on.
@@ -155,7 +160,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             Here {
                 displacement: Numbers::each(|d| eight(self.displacement[d], place)),
                 numbers: self.numbers(place),
-                threshold: self.thresholds::<false>(place),
+                limits: self.limits::<false>(place),
             }
         }
     }
@@ -175,14 +180,14 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
         // SAFETY: the offset is one of the vector's, so `far` is a place of the grid with seven more after it.
-        let (displacement, numbers, threshold) = unsafe {
+        let (displacement, numbers, limits) = unsafe {
             let far = vector.far(offset);
             let component = |d| eight(self.displacement[d], far);
             let displacement: [Lanes; D] = Numbers::each(component);
             (
                 displacement,
                 self.far_numbers(far),
-                self.thresholds::<ONLY_NEAR>(far),
+                self.limits::<ONLY_NEAR>(far),
             )
         };
         let eta = Numbers::each(|d: usize| displacement[d] - here.displacement[d]);
@@ -204,7 +209,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             },
             own: &here.numbers,
             far: numbers,
-            thresholds: [here.threshold, threshold],
+            limits: [here.limits, limits],
             memory: load_memory::<K::Memory>(&mut vector.groups, o),
             intact,
             whole: 0,

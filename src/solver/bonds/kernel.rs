@@ -3,7 +3,7 @@
 //! A kernel sees eight bonds at a time and adds to eight sums. It is written once for any dimension,
 //! law and storage: the bonds may be those of one point or those of eight.
 
-use crate::damage::Criterion;
+use crate::damage::{Criterion, Limits};
 use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
@@ -22,8 +22,8 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub own: &'a K::Point,
     /// The numbers of the far ends.
     pub far: K::Point,
-    /// Stretches at which the bonds of the own and the far ends break, where the kernel reads them.
-    pub thresholds: [Lanes; 2],
+    /// What the criterion reads of the own and the far ends.
+    pub limits: [Limits; 2],
     /// What the bonds keep for their own and their far ends.
     pub memory: [K::Memory; 2],
     /// A bit for each bond that is intact.

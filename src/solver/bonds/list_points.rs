@@ -5,13 +5,15 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::damage::Limits;
 use crate::families::{Groups, Row};
 use crate::lanes::numbers::gather;
-use crate::lanes::{Lanes, Numbers, Simd, WIDTH};
+use crate::lanes::{Column, Lanes, Numbers, Simd, WIDTH};
 use crate::material::bond::{Reference, Weights, deform};
 use crate::solver::model::Model;
 
 use super::kernel::{Group, Kernel};
+use super::limit_columns::{LimitColumns, ReadLimits};
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
@@ -59,8 +61,7 @@ pub fn update<const D: usize>(
 pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     nodes: &'a [Node],
     numbers: <K::Point as Numbers>::Columns<'a>,
-    thresholds: &'a [f64],
-    with_thresholds: bool,
+    limits: ReadLimits<'a>,
     limit: f64,
 }
 
@@ -79,7 +80,7 @@ pub struct Here<P, const D: usize> {
     displacement: [Lanes; D],
     volume: Lanes,
     numbers: P,
-    threshold: Lanes,
+    limits: Limits,
 }
 
 impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
@@ -91,23 +92,20 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         kernel: &K,
         reach: usize,
         nodes: &'a [Node],
-        numbers: &'a [Vec<f64>],
-        thresholds: &'a [f64],
+        numbers: &'a [Column],
+        limits: &'a LimitColumns,
     ) -> Self {
-        let with_thresholds = kernel.criterion().reads_thresholds();
         let numbers = K::Point::columns(numbers);
         let covers = |column: &[f64]| column.len() >= reach;
         assert!(
             nodes.len() >= reach
-                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k)))
-                && (!with_thresholds || covers(thresholds)),
+                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k))),
             "an array is too short for the bonds"
         );
         Self {
             nodes,
             numbers,
-            thresholds,
-            with_thresholds,
+            limits: ReadLimits::new(kernel.criterion(), limits, reach),
             limit: kernel.criterion().limit(),
         }
     }
@@ -135,13 +133,9 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// # Safety
     /// The indices must be below the reach.
     #[inline(always)]
-    unsafe fn thresholds(&self, indices: &[u32; 8]) -> Lanes {
-        if self.with_thresholds {
-            // SAFETY: `new` has checked the length.
-            unsafe { gather(self.thresholds, indices) }
-        } else {
-            Lanes::splat(0.0)
-        }
+    unsafe fn limits(&self, indices: &[u32; 8]) -> Limits {
+        // SAFETY: `new` has checked the lengths.
+        (self.limits).eight(|column| unsafe { gather(column, indices) })
     }
 
     /// The own end of a point's bonds.
@@ -153,11 +147,11 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         debug_assert!(point < self.nodes.len());
         let own = [point as u32; 8];
         // SAFETY: `new` has checked the lengths.
-        let (node, numbers, threshold) = unsafe {
+        let (node, numbers, limits) = unsafe {
             (
                 &self.nodes.get_unchecked(point).0,
                 self.numbers(&own),
-                self.thresholds(&own),
+                self.limits(&own),
             )
         };
         Here {
@@ -165,7 +159,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             displacement: Numbers::each(|d| Lanes::splat(node[DISPLACEMENT + d])),
             volume: Lanes::splat(node[VOLUME]),
             numbers,
-            threshold,
+            limits,
         }
     }
 
@@ -201,8 +195,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             inverse_square: inverse * inverse,
         };
         // SAFETY: as above.
-        let (numbers, threshold) =
-            unsafe { (self.far_numbers(neighbours), self.thresholds(neighbours)) };
+        let (numbers, limits) = unsafe { (self.far_numbers(neighbours), self.limits(neighbours)) };
         let intact = row.groups.intact[group];
         Group {
             bond: deform::<_, false, D>(simd, &reference, eta, intact, self.limit, K::WANTED),
@@ -215,7 +208,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             },
             own: &here.numbers,
             far: numbers,
-            thresholds: [here.threshold, threshold],
+            limits: [here.limits, limits],
             memory: load_memory::<K::Memory>(&mut row.groups, group),
             whole: if K::WHOLE { row.whole(group) } else { 0 },
             intact,

@@ -14,6 +14,7 @@ mod force;
 mod grid_points;
 mod interaction;
 mod kernel;
+mod limit_columns;
 mod list_points;
 mod measures;
 mod point_numbers;
@@ -33,6 +34,7 @@ use crate::material::{Law, with_pair};
 
 use super::model::Model;
 use grid_points::GridValues;
+use limit_columns::LimitColumns;
 use list_points::Node;
 use point_numbers::PointNumbers;
 use point_sums::WholeSum;
@@ -68,8 +70,8 @@ pub struct Forces<const D: usize> {
     /// The points as lattices read them, by grid.
     grids: Vec<GridValues<D>>,
     numbers: PointNumbers,
-    /// Threshold of each local point; empty if no damage law needs it.
-    thresholds: Vec<f64>,
+    /// What criteria read of the local points.
+    limits: LimitColumns,
     /// The passes of a force evaluation.
     passes: Vec<Pass>,
     halo: Halo,
@@ -105,6 +107,17 @@ impl<const D: usize> Forces<D> {
         let numbers = PointNumbers::new(&blocks, mixed, model);
         let with_thresholds =
             (blocks.iter()).any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
+        let with_overloads = (blocks.iter()).any(|block| {
+            block
+                .damage
+                .is_some_and(|law| law.family_correction() > 0.0)
+        });
+        let limits = LimitColumns::new(
+            numbers.read,
+            model.volume.len(),
+            with_thresholds,
+            with_overloads,
+        );
         let breaks = blocks.iter().any(|block| block.damage.is_some());
         let mut remembers = false;
         for interaction in &mut interactions {
@@ -131,16 +144,9 @@ impl<const D: usize> Forces<D> {
             },
             grids: grids
                 .into_iter()
-                .map(|grid| GridValues::new(grid, numbers.read, with_thresholds))
+                .map(|grid| GridValues::new(grid, numbers.read, &limits))
                 .collect(),
-            thresholds: vec![
-                0.0;
-                if with_thresholds {
-                    model.volume.len()
-                } else {
-                    0
-                }
-            ],
+            limits,
             interactions,
             blocks,
             numbers,
@@ -164,15 +170,23 @@ impl<const D: usize> Forces<D> {
                 whole_sums(laws[0], &mut interaction.bonds, &mut sums, source);
             });
         });
-        self.numbers.set_constants(model, &self.blocks, &sums);
+        let mut overloads = std::mem::take(&mut self.limits.overloads);
+        (self.numbers).set_constants(model, &self.blocks, &sums, &mut overloads);
         let Self { numbers, halo, .. } = self;
         let read = &mut numbers.columns[..numbers.read];
-        halo.pack(read.iter().map(Vec::as_slice));
+        halo.pack(read.iter().map(|column| &column[..]));
         halo.exchange(comm, &mut |_| {});
-        halo.unpack(read.iter_mut().map(Vec::as_mut_slice));
+        halo.unpack(read.iter_mut().map(|column| &mut column[..]));
         for grid in &mut self.grids {
             grid.update_numbers(Which::All, 0, &self.numbers.columns);
         }
+        if !overloads.is_empty() {
+            self.bring(comm, &mut overloads);
+            for grid in &mut self.grids {
+                grid.update_overloads(&overloads);
+            }
+        }
+        self.limits.overloads = overloads;
     }
 
     /// Calls `work` for all bonds between two blocks after one another.
@@ -180,7 +194,7 @@ impl<const D: usize> Forces<D> {
         let source = Source {
             nodes: &self.nodes,
             numbers: &self.numbers.columns,
-            thresholds: &self.thresholds,
+            limits: &self.limits,
             grids: &self.grids,
             instructions: self.instructions,
         };

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::lanes::Column;
 use crate::material::{Counts, Law, MOST, PlasticState};
 use crate::solver::model::Model;
 
@@ -26,7 +27,7 @@ pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 /// law alone (of owned points).
 pub struct PointNumbers {
     /// By column; a law with fewer leaves the others at 0.
-    pub columns: Vec<Vec<f64>>,
+    pub columns: Vec<Column>,
     /// How many columns bonds read.
     pub read: usize,
     /// The first column that is found anew before each sum of forces.
@@ -36,7 +37,7 @@ pub struct PointNumbers {
     /// Whether any law has constants.
     pub with_constants: bool,
     /// Sums of a pass over the bonds, by column.
-    pub sums: Vec<Vec<f64>>,
+    pub sums: Vec<Column>,
 }
 
 impl PointNumbers {
@@ -49,23 +50,28 @@ impl PointNumbers {
         let all = read.max(most(|c| c.point + c.own));
         let (owned, local) = (model.owned(), model.volume.len());
         let length = |column: usize| if column < read { local } else { owned };
+        let sums = if mixed { MOST.sum } else { most(|c| c.sum) };
         let changing = counts.iter().filter(|c| c.passes > 0);
         Self {
-            columns: (0..all).map(|k| vec![0.0; length(k)]).collect(),
+            columns: (0..all).map(|k| Column::new(k, length(k), 0.0)).collect(),
             read,
             first_changing: changing.map(|c| c.constants).min().unwrap_or(read),
             passes: most(|c| c.passes),
             with_constants: most(|c| c.constants) > 0,
-            sums: vec![vec![0.0; owned]; if mixed { MOST.sum } else { most(|c| c.sum) }],
+            sums: (all..all + sums)
+                .map(|k| Column::new(k, owned, 0.0))
+                .collect(),
         }
     }
 
-    /// Finds the constants of the owned points from sums over their whole families, by column.
+    /// Finds the constants of the owned points from sums over their whole families, by column, and how many times
+    /// as much their bonds hold as those inside; nothing of this if there is no room for it.
     pub fn set_constants<const D: usize>(
         &mut self,
         model: &Model<D>,
         blocks: &[BlockLaws],
         sums: &[Vec<f64>],
+        overloads: &mut [f64],
     ) {
         for point in 0..model.owned() {
             let law = blocks[usize::from(model.block[point])].law;
@@ -73,6 +79,9 @@ impl PointNumbers {
             let mut own = [0.0; MOST.whole_sum];
             for (own, column) in own.iter_mut().zip(sums) {
                 *own = column[point];
+            }
+            if let Some(overload) = overloads.get_mut(point) {
+                *overload = Law::<D>::overload(&law, &own[..count.whole_sum]);
             }
             let mut numbers = [0.0; NUMBERS];
             Law::<D>::constants(&law, &own[..count.whole_sum], &mut numbers);

@@ -11,10 +11,11 @@ use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
 use crate::lanes::simd::{FUSED, Portable};
-use crate::lanes::{Instructions, Lanes, Numbers, Simd, Versions, WIDTH};
+use crate::lanes::{Column, Instructions, Lanes, Numbers, Simd, Versions, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
 use super::kernel::{Combine, Kernel};
+use super::limit_columns::LimitColumns;
 use super::list_points::{ListPoints, Node, store_memory};
 
 /// Bonds by groups of eight below which a task is not split further.
@@ -32,9 +33,9 @@ pub struct Source<'a, const D: usize> {
     /// Geometry for lists; empty where there is no list.
     pub nodes: &'a [Node],
     /// Numbers of the points by column, for lists.
-    pub numbers: &'a [Vec<f64>],
-    /// Thresholds of the points, for lists; empty if no criterion reads them.
-    pub thresholds: &'a [f64],
+    pub numbers: &'a [Column],
+    /// What criteria read of the points, for lists.
+    pub limits: &'a LimitColumns,
     /// For lattices, by grid.
     pub grids: &'a [GridValues<D>],
     /// What to run on.
@@ -138,12 +139,12 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
             let Source {
                 nodes,
                 numbers,
-                thresholds,
+                limits,
                 ..
             } = source;
             let rows = list.rows_below(points.start)..list.rows_below(points.end);
             let leaf = leaf(LEAF, list.groups_a_row());
-            let points = ListPoints::new(kernel, list.reach(), nodes, numbers, thresholds);
+            let points = ListPoints::new(kernel, list.reach(), nodes, numbers, limits);
             let runner = OverRows { kernel, points };
             split(list.rows(rows), base, results, &runner, leaf, instructions)
         }
