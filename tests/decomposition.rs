@@ -317,6 +317,18 @@ fn a_plate_that_is_refined_while_it_is_torn_and_dealt_out_anew() {
     same_everywhere("growing", &growing(), true);
 }
 
+/// Beside a body without damage.
+#[test]
+fn a_plate_of_bonds_that_break_by_work_that_is_refined_while_it_is_torn() {
+    let deck = growing()
+        .replace("glass.pmb = {", "glass.ordinary = { poisson_ratio = 0.3,")
+        .replace(
+            "brittle.critical_stretch]",
+            "brittle.energy]\nfamily_correction = 1",
+        );
+    same_everywhere("growing-by-work", &deck, true);
+}
+
 /// One rank is always slower than the mean.
 const RESTLESS: &str = "[balance]\nevery_steps = 5\nimbalance = 1\n";
 

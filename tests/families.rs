@@ -178,6 +178,48 @@ fn bonds_of_bond_associated_correspondence() {
 }
 
 #[test]
+fn bonds_that_hold_more_beside_surfaces() {
+    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
+    for (law, alpha) in [("ordinary", "0.25"), ("correspondence", "0")] {
+        let deck = deck(PLANE, law, ", poisson_ratio = 0.3", grid, alpha).replace(
+            "brittle.critical_stretch]",
+            "brittle.energy]\nfamily_correction = 1",
+        );
+        compare::<2>(&deck);
+    }
+}
+
+/// All ranks take part in all messages.
+#[test]
+fn ranks_without_points() {
+    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
+    let two = "
+        dimension = 'plane-strain'
+        [grid]
+        spacing = 1
+        GRID
+        [material]
+        one.LAW = { density = 2, youngs_modulus = 5 RATIO }
+        [damage.brittle.energy]
+        fracture_energy = 0.01
+        alpha = ALPHA
+        family_correction = 1
+        [body.pair]
+        material = 'one'
+        damage = 'brittle'
+        shape.box = { lower = [0, 0], upper = [2, 1] }
+        [initial.pull]
+        velocity = ['0.02*x', 0]
+        [time]
+        end = 6
+    ";
+    for alpha in ["0", "0.25"] {
+        let deck = deck(two, "ordinary", ", poisson_ratio = 0.3", grid, alpha);
+        assert_eq!(measure::<2>(1, &deck), measure::<2>(4, &deck));
+    }
+}
+
+#[test]
 fn bonds_that_remember() {
     let keys = ", yield_stretch = 0.01";
     let grid = "horizon = 2.3\nvolume_correction = 'linear'";

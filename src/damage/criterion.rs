@@ -82,7 +82,7 @@ impl Criterion {
     #[inline(always)]
     pub fn reads_overloads(self) -> bool {
         match self {
-            Self::Work(_, rule) | Self::WorkThresholds(rule) => rule.family_correction > 0.0,
+            Self::Work(_, rule) | Self::WorkThresholds(rule) => rule.corrects(),
             Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
         }
     }
@@ -207,13 +207,18 @@ impl WorkRule {
         }
     }
 
+    #[inline(always)]
+    fn corrects(self) -> bool {
+        self.family_correction > 0.0
+    }
+
     /// The threshold of bonds by that of whole families: half of the work is each end's.
     #[inline(always)]
     fn corrected(self, threshold: Lanes, [here, there]: &[Limits; 2]) -> Lanes {
-        let share = self.family_correction;
-        if share == 0.0 {
+        if !self.corrects() {
             return threshold;
         }
+        let share = self.family_correction;
         let mean = (here.overloads + there.overloads) * 0.5;
         threshold * (mean * share + Lanes::splat(1.0 - share))
     }

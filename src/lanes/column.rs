@@ -5,16 +5,17 @@ use std::ops::{Deref, DerefMut};
 /// Lines of 64 bytes that lie in as many different sets of a first-level cache.
 const SETS: usize = 64;
 
-/// Each column starts so many lines after the one before it: those of any few are far apart.
-const STEP: usize = 13;
+/// Each column starts so many lines after the one before it: of eighteen none is within two lines of another.
+const STEP: usize = 27;
 
 /// Numbers in a line.
 const LINE: usize = 8;
 
 /// One of several columns of numbers that are read at the same index.
 ///
-/// Large arrays begin at the beginning of a page, so that one index of many such columns falls into the same set of
-/// the cache, which keeps eight or twelve lines of them. Here each begins some lines later than the one before.
+/// Arrays that the allocator takes from the system one by one (from 1 MB on in the `fissure` command) all lie alike in
+/// their first page, so that one index of many such columns falls into the same set of the cache, which keeps eight
+/// or twelve lines. Here each begins some lines later than the one before.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,

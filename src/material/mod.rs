@@ -61,7 +61,8 @@ pub trait Described {
 /// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
 /// run over bonds in these steps:
 ///
-/// 1. once, over the whole family: [`Self::whole_share`] → sums → [`Self::constants`];
+/// 1. once, over the whole family: [`Self::whole_share`] → sums → [`Self::constants`], and [`Self::overload`] where a
+///    criterion reads it;
 /// 2. before each sum of forces, over the intact bonds, [`Self::PASSES`] times:
 ///    [`Self::share`] → sums → [`Self::point`]; then the numbers are sent to the ghosts;
 /// 3. [`Self::memory`] and [`Self::force`] of both ends.

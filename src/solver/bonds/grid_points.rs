@@ -10,7 +10,7 @@ use crate::lanes::{Column, Lanes, Numbers, Simd};
 use crate::material::bond::{Reference, Weights, deform};
 
 use super::kernel::{Group, Kernel};
-use super::limit_columns::{LimitColumns, ReadLimits};
+use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits};
 use super::list_points::load_memory;
 
 /// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
@@ -24,15 +24,15 @@ pub struct GridValues<const D: usize> {
 }
 
 impl<const D: usize> GridValues<D> {
-    /// For a grid at rest, whose bonds read so many numbers of each point and limits as these.
-    pub fn new(grid: Arc<Grid>, numbers: usize, limits: &LimitColumns) -> Self {
+    /// For a grid at rest, whose bonds read so many numbers of each point and these limits.
+    pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead) -> Self {
         let count = grid.places();
         Self {
             displacement: std::array::from_fn(|d| Column::new(d, count, 0.0)),
             numbers: (0..numbers)
                 .map(|k| Column::new(D + k, count, 0.0))
                 .collect(),
-            limits: limits.alike(D + numbers, count),
+            limits: LimitColumns::new(limits, D + numbers, count),
             grid,
         }
     }
@@ -145,7 +145,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         if ONLY_NEAR {
             return Limits::unread();
         }
-        // SAFETY: `new` has checked the lengths.
+        // SAFETY: `ReadLimits::new` has checked the lengths.
         (self.limits).eight(|column| unsafe { eight(column, place) })
     }
 

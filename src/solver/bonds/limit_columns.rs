@@ -1,7 +1,32 @@
 //! What criteria alone read of the points, by column.
 
-use crate::damage::{Criterion, Limits};
+use crate::damage::{Criterion, DamageLaw, Limits};
 use crate::lanes::{Column, Lanes};
+
+use super::interaction::BlockLaws;
+
+/// Which of the [`Limits`] the criteria of a run read; the same on all ranks.
+#[derive(Debug, Clone, Copy)]
+pub struct LimitsRead {
+    /// Thresholds.
+    pub thresholds: bool,
+    /// Overloads.
+    pub overloads: bool,
+}
+
+impl LimitsRead {
+    /// By the damage laws of the blocks.
+    pub fn by(blocks: &[BlockLaws]) -> Self {
+        let any = |reads: fn(&DamageLaw) -> bool| {
+            let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());
+            laws.any(reads)
+        };
+        Self {
+            thresholds: any(|law| law.alpha() > 0.0),
+            overloads: any(|law| law.family_correction() > 0.0),
+        }
+    }
+}
 
 /// [`Limits`] by column; one that no criterion reads is empty.
 pub struct LimitColumns {
@@ -12,19 +37,13 @@ pub struct LimitColumns {
 }
 
 impl LimitColumns {
-    /// For so many points, with the columns that are read; `number` others are read with them.
-    pub fn new(number: usize, count: usize, thresholds: bool, overloads: bool) -> Self {
+    /// The columns that are read, for so many points; `number` others are read with them.
+    pub fn new(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
-            thresholds: of(number, thresholds, 0.0),
-            overloads: of(number + 1, overloads, 1.0),
+            thresholds: of(number, read.thresholds, 0.0),
+            overloads: of(number + 1, read.overloads, 1.0),
         }
-    }
-
-    /// The same columns for another number of points, with so many others.
-    pub fn alike(&self, number: usize, count: usize) -> Self {
-        let [thresholds, overloads] = [&self.thresholds, &self.overloads].map(|c| !c.is_empty());
-        Self::new(number, count, thresholds, overloads)
     }
 
     /// Memory, bytes.
@@ -64,7 +83,7 @@ impl<'a> ReadLimits<'a> {
         }
     }
 
-    /// Eight points, by how they are taken from a column.
+    /// Eight points, by how they are taken from a column; `take` only gets columns that reach as far as was asked for.
     #[inline(always)]
     pub fn eight(&self, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();

@@ -134,7 +134,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// The indices must be below the reach.
     #[inline(always)]
     unsafe fn limits(&self, indices: &[u32; 8]) -> Limits {
-        // SAFETY: `new` has checked the lengths.
+        // SAFETY: `ReadLimits::new` has checked the lengths.
         (self.limits).eight(|column| unsafe { gather(column, indices) })
     }
 

@@ -29,12 +29,12 @@ use std::sync::Arc;
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Grid, Which};
-use crate::lanes::{Instructions, Numbers};
+use crate::lanes::{Column, Instructions, Numbers};
 use crate::material::{Law, with_pair};
 
 use super::model::Model;
 use grid_points::GridValues;
-use limit_columns::LimitColumns;
+use limit_columns::{LimitColumns, LimitsRead};
 use list_points::Node;
 use point_numbers::PointNumbers;
 use point_sums::WholeSum;
@@ -76,7 +76,7 @@ pub struct Forces<const D: usize> {
     passes: Vec<Pass>,
     halo: Halo,
     instructions: Instructions,
-    /// Whether any law dissipates energy in intact bonds.
+    /// Whether bonds of any law keep numbers; the same on all ranks.
     remembers: bool,
     /// Whether any bonds can break; the same on all ranks.
     breaks: bool,
@@ -105,31 +105,19 @@ impl<const D: usize> Forces<D> {
             .windows(2)
             .any(|pair| kind(&pair[0]) != kind(&pair[1]));
         let numbers = PointNumbers::new(&blocks, mixed, model);
-        let with_thresholds =
-            (blocks.iter()).any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
-        let with_overloads = (blocks.iter()).any(|block| {
-            block
-                .damage
-                .is_some_and(|law| law.family_correction() > 0.0)
-        });
-        let limits = LimitColumns::new(
-            numbers.read,
-            model.volume.len(),
-            with_thresholds,
-            with_overloads,
-        );
+        let read = LimitsRead::by(&blocks);
+        let limits = LimitColumns::new(read, numbers.read, model.volume.len());
         let breaks = blocks.iter().any(|block| block.damage.is_some());
-        let mut remembers = false;
+        let remembers = (blocks.iter()).any(|block| block.law.counts::<D>().memory > 0);
         for interaction in &mut interactions {
             fn width<L: Law<D>, const D: usize>(_: &[L; 2]) -> usize {
                 2 * L::Memory::COUNT
             }
             let width = with_pair!(&interaction.laws, laws => width::<_, D>(laws));
-            remembers |= width > 0;
             interaction.bonds.remember(width);
         }
         let passes = [
-            with_thresholds.then_some(Pass::SmallestStretch),
+            read.thresholds.then_some(Pass::SmallestStretch),
             Some(Pass::Force),
         ];
         let mut passes: Vec<Pass> = passes.into_iter().flatten().collect();
@@ -144,7 +132,7 @@ impl<const D: usize> Forces<D> {
             },
             grids: grids
                 .into_iter()
-                .map(|grid| GridValues::new(grid, numbers.read, &limits))
+                .map(|grid| GridValues::new(grid, numbers.read, read))
                 .collect(),
             limits,
             interactions,
@@ -157,36 +145,41 @@ impl<const D: usize> Forces<D> {
             breaks,
             broken: Vec::new(),
         };
-        if forces.numbers.with_constants {
-            forces.find_constants(comm, model);
+        if forces.numbers.with_constants || read.overloads {
+            forces.find_constants(comm, model, read);
         }
         Ok(forces)
     }
 
-    fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
+    fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>, read: LimitsRead) {
         let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.whole_sum];
         self.for_each_interaction(|interaction, source| {
             with_pair!(interaction.laws, laws => {
                 whole_sums(laws[0], &mut interaction.bonds, &mut sums, source);
             });
         });
-        let mut overloads = std::mem::take(&mut self.limits.overloads);
-        (self.numbers).set_constants(model, &self.blocks, &sums, &mut overloads);
-        let Self { numbers, halo, .. } = self;
-        let read = &mut numbers.columns[..numbers.read];
-        halo.pack(read.iter().map(|column| &column[..]));
+        let Self {
+            numbers,
+            limits,
+            halo,
+            ..
+        } = self;
+        numbers.set_constants(model, &self.blocks, &sums, &mut limits.overloads);
+        let columns = numbers.columns[..numbers.read].iter();
+        let overloads = read.overloads.then_some(&limits.overloads);
+        let columns: Vec<&Column> = columns.chain(overloads).collect();
+        halo.pack(columns.into_iter().map(|column| &column[..]));
         halo.exchange(comm, &mut |_| {});
-        halo.unpack(read.iter_mut().map(|column| &mut column[..]));
+        let columns = numbers.columns[..numbers.read].iter_mut();
+        let overloads = read.overloads.then_some(&mut limits.overloads);
+        let columns: Vec<&mut Column> = columns.chain(overloads).collect();
+        halo.unpack(columns.into_iter().map(|column| &mut column[..]));
         for grid in &mut self.grids {
             grid.update_numbers(Which::All, 0, &self.numbers.columns);
-        }
-        if !overloads.is_empty() {
-            self.bring(comm, &mut overloads);
-            for grid in &mut self.grids {
-                grid.update_overloads(&overloads);
+            if read.overloads {
+                grid.update_overloads(&self.limits.overloads);
             }
         }
-        self.limits.overloads = overloads;
     }
 
     /// Calls `work` for all bonds between two blocks after one another.
@@ -273,10 +266,9 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Whether bonds keep numbers from step to step; the same on all ranks if they have such bonds.
+    /// Whether bonds of any law keep numbers from step to step; the same on all ranks.
     pub fn remember(&self) -> bool {
-        let mut stores = self.interactions.iter().map(|it| it.bonds.store());
-        stores.any(|store| store.number_bytes() > 0)
+        self.remembers
     }
 
     /// Calls `found` with the local indices of both ends of every broken bond of the owned points.

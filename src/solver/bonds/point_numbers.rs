@@ -64,8 +64,8 @@ impl PointNumbers {
         }
     }
 
-    /// Finds the constants of the owned points from sums over their whole families, by column, and how many times
-    /// as much their bonds hold as those inside; nothing of this if there is no room for it.
+    /// Finds the constants of the owned points from sums over their whole families, by column, and their
+    /// [overloads](Law::overload), unless that column is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         model: &Model<D>,

@@ -10,7 +10,7 @@ use std::cell::OnceCell;
 use std::time::Instant;
 
 use crate::comm::sum::reduce;
-use crate::comm::{self, IdOrder, agree};
+use crate::comm::{self, IdOrder};
 use crate::deck::plan::StepRule;
 use crate::error::Result;
 use crate::points::{Point, distance_squared};
@@ -63,16 +63,17 @@ impl Refined {
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Whether bonds can be given to new points. Collective.
+    /// Whether bonds can be given to new points.
     ///
     /// # Errors
-    /// When bonds remember what they went through.
+    /// When bonds remember what they went through; the same on all ranks.
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
         let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
                        have not; refine `[refinement.region]` from the start";
         let trigger = self.trigger().filter(|_| self.forces.remember());
-        let error = trigger.map(|trigger| self.plan.source.error(trigger.span.clone(), message));
-        agree(self.comm, error.map_or(Ok(()), Err))
+        trigger.map_or(Ok(()), |trigger| {
+            Err(self.plan.source.error(trigger.span.clone(), message))
+        })
     }
 
     /// Whether it is time to look for points to be refined.
