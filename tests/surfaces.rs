@@ -156,3 +156,47 @@ fn a_strip_of_four_rows_is_as_strong_as_a_block() {
         assert!((0.95..1.1).contains(&share), "{law}: {share}");
     }
 }
+
+/// Families that go on in the other body are whole, whatever its moduli.
+#[test]
+fn an_interface_of_a_soft_and_a_stiff_body_is_no_surface() {
+    let strength = |correction: f64| {
+        let soft = Block::new::<2>("ordinary", correction, Part::All).text::<2>();
+        let text = soft.replace("lower = [-10, -10]", "lower = [0, -10]")
+            + "
+            no_failure = ['ends']
+            [set.ends]
+            where = 'abs(y) > 4'
+            [material.steel.ordinary]
+            density = 1
+            youngs_modulus = 4
+            poisson_ratio = 0.3
+            [body.stiff]
+            material = 'steel'
+            damage = 'tough'
+            shape.box = { lower = [-10, -10], upper = [0, 10] }
+            [damage.tough.energy]
+            fracture_energy = 1
+            ";
+        simulate::<2, _>(&text, |mut simulation| {
+            let mut strain = 7e-3;
+            loop {
+                displace(&mut simulation, |x| {
+                    [x[0] * (1.0 + strain), x[1] * (1.0 - 0.3 * strain), 0.0]
+                });
+                let side = |point| simulation.model.position(point)[0] > 0.0;
+                let mut across = 0;
+                simulation
+                    .forces
+                    .for_each_broken(|a, b| across += u32::from(side(a) != side(b)));
+                if across > 0 {
+                    return strain;
+                }
+                strain *= 1.01;
+                assert!(strain < 0.5, "nothing breaks");
+            }
+        })
+    };
+    let [with, without] = [1.0, 0.0].map(strength);
+    assert!((0.93..1.03).contains(&(with / without)), "{with} {without}");
+}
