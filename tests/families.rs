@@ -192,29 +192,17 @@ fn bonds_that_hold_more_beside_surfaces() {
 /// All ranks take part in all messages.
 #[test]
 fn ranks_without_points() {
-    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
     let two = "
-        dimension = 'plane-strain'
-        [grid]
-        spacing = 1
-        GRID
-        [material]
-        one.LAW = { density = 2, youngs_modulus = 5 RATIO }
-        [damage.brittle.energy]
-        fracture_energy = 0.01
-        alpha = ALPHA
-        family_correction = 1
-        [body.pair]
-        material = 'one'
-        damage = 'brittle'
-        shape.box = { lower = [0, 0], upper = [2, 1] }
-        [initial.pull]
-        velocity = ['0.02*x', 0]
-        [time]
-        end = 6
-    ";
+dimension = 'plane-strain'
+grid = { spacing = 1, horizon = 2.3 }
+material.one.ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
+damage.brittle.energy = { fracture_energy = 0.01, alpha = ALPHA, family_correction = 1 }
+body.pair = { material = 'one', damage = 'brittle', shape.box = { lower = [0, 0], upper = [2, 1] } }
+initial.pull.velocity = ['0.02*x', 0]
+time.end = 6
+";
     for alpha in ["0", "0.25"] {
-        let deck = deck(two, "ordinary", ", poisson_ratio = 0.3", grid, alpha);
+        let deck = two.replace("ALPHA", alpha);
         assert_eq!(measure::<2>(1, &deck), measure::<2>(4, &deck));
     }
 }

@@ -2,6 +2,7 @@
 //! there; with `family_correction = 1` hardly sooner than inside.
 
 use crate::support::{displace, simulate};
+use fissure::solver::Simulation;
 
 const LAWS: [&str; 3] = [
     "ordinary",
@@ -97,22 +98,34 @@ impl Block {
 
     /// The strain along x at which the first bond breaks; that across is `across` of it.
     fn strength<const D: usize>(&self, across: f64) -> f64 {
-        simulate::<D, _>(&self.text::<D>(), |mut simulation| {
-            let mut strain = 7e-3;
-            loop {
-                displace(&mut simulation, |x| {
-                    [0, 1, 2].map(|k| x[k] * (1.0 + strain * if k == 0 { 1.0 } else { across }))
-                });
-                let mut broken = 0;
-                simulation.forces.for_each_broken(|_, _| broken += 1);
-                if broken > 0 {
-                    return strain;
-                }
-                strain *= 1.01;
-                assert!(strain < 0.5, "nothing breaks");
-            }
-        })
+        strength::<D>(&self.text::<D>(), across, |_| true)
     }
+}
+
+/// As [`Block::strength`], of the bonds of a body between whose ends `counts` holds; strains grow by 1 % a step.
+fn strength<const D: usize>(
+    text: &str,
+    across: f64,
+    counts: impl Fn([[f64; 3]; 2]) -> bool,
+) -> f64 {
+    simulate::<D, _>(text, |mut simulation| {
+        let mut strain = 7e-3;
+        loop {
+            displace(&mut simulation, |x| {
+                [0, 1, 2].map(|k| x[k] * (1.0 + strain * if k == 0 { 1.0 } else { across }))
+            });
+            let Simulation { model, forces, .. } = &simulation;
+            let mut broken = 0;
+            forces.for_each_broken(|a, b| {
+                broken += u32::from(counts([a, b].map(|point| model.position(point))));
+            });
+            if broken > 0 {
+                return strain;
+            }
+            strain *= 1.01;
+            assert!(strain < 0.5, "nothing breaks");
+        }
+    })
 }
 
 /// The strains at which the sides and all of a block break, over that at which it breaks inside without the correction; and that
@@ -160,7 +173,8 @@ fn a_strip_of_four_rows_is_as_strong_as_a_block() {
 /// Families that go on in the other body are whole, whatever its moduli.
 #[test]
 fn an_interface_of_a_soft_and_a_stiff_body_is_no_surface() {
-    let strength = |correction: f64| {
+    let across = |[a, b]: [[f64; 3]; 2]| (a[0] > 0.0) != (b[0] > 0.0);
+    let [with, without] = [1.0, 0.0].map(|correction| {
         let soft = Block::new::<2>("ordinary", correction, Part::All).text::<2>();
         let text = soft.replace("lower = [-10, -10]", "lower = [0, -10]")
             + "
@@ -177,26 +191,11 @@ fn an_interface_of_a_soft_and_a_stiff_body_is_no_surface() {
             shape.box = { lower = [-10, -10], upper = [0, 10] }
             [damage.tough.energy]
             fracture_energy = 1
+            family_correction = 1
             ";
-        simulate::<2, _>(&text, |mut simulation| {
-            let mut strain = 7e-3;
-            loop {
-                displace(&mut simulation, |x| {
-                    [x[0] * (1.0 + strain), x[1] * (1.0 - 0.3 * strain), 0.0]
-                });
-                let side = |point| simulation.model.position(point)[0] > 0.0;
-                let mut across = 0;
-                simulation
-                    .forces
-                    .for_each_broken(|a, b| across += u32::from(side(a) != side(b)));
-                if across > 0 {
-                    return strain;
-                }
-                strain *= 1.01;
-                assert!(strain < 0.5, "nothing breaks");
-            }
-        })
-    };
-    let [with, without] = [1.0, 0.0].map(strength);
-    assert!((0.93..1.03).contains(&(with / without)), "{with} {without}");
+        strength::<2>(&text, -0.3, across)
+    });
+    // As inside, where families of a lattice are not quite those of the continuum; a side is weaker by a fifth.
+    let share = with / without;
+    assert!((0.93..1.01).contains(&share), "{with} {without}");
 }
