@@ -72,6 +72,13 @@ impl Halo {
         }
     }
 
+    /// Brings the entries of ghosts from their owners: `components` are arrays over the local points. Collective.
+    pub fn bring(&mut self, comm: &dyn Communicator, components: &mut [&mut [f64]]) {
+        self.pack(components.iter().map(|component| &**component));
+        self.exchange(comm, &mut |_| {});
+        self.unpack(components.iter_mut().map(|component| &mut **component));
+    }
+
     /// Copies the values that other ranks need into the messages: `components` are arrays over the
     /// local points, each sent for every point.
     pub fn pack<'a>(&mut self, components: impl ExactSizeIterator<Item = &'a [f64]> + Clone) {

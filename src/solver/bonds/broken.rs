@@ -179,15 +179,10 @@ impl<const D: usize> Forces<D> {
         }
         let Self { numbers, halo, .. } = self;
         let changing = numbers.first_changing..numbers.read;
-        let columns = numbers.columns[changing.clone()].iter();
-        let columns = columns.map(|column| &column[..]);
-        let columns: Vec<&[f64]> = columns.chain([&flags[..]]).collect();
-        halo.pack(columns.into_iter());
-        halo.exchange(comm, &mut |_| {});
         let columns = numbers.columns[changing].iter_mut();
         let columns = columns.map(|column| &mut column[..]);
-        let columns: Vec<&mut [f64]> = columns.chain([&mut flags[..]]).collect();
-        halo.unpack(columns.into_iter());
+        let columns = columns.chain([&mut flags[..]]);
+        halo.bring(comm, &mut columns.collect::<Vec<_>>());
         times.halo += start.elapsed();
         self.update(News::Numbers, Which::All, model, displacement);
         let mut changed = own.clone();

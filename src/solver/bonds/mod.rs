@@ -29,7 +29,7 @@ use std::sync::Arc;
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Grid, Which};
-use crate::lanes::{Column, Instructions, Numbers};
+use crate::lanes::{Instructions, Numbers};
 use crate::material::{Law, with_pair};
 
 use super::model::Model;
@@ -165,15 +165,10 @@ impl<const D: usize> Forces<D> {
             ..
         } = self;
         numbers.set_constants(model, &self.blocks, &sums, &mut limits.overloads);
-        let columns = numbers.columns[..numbers.read].iter();
-        let overloads = read.overloads.then_some(&limits.overloads);
-        let columns: Vec<&Column> = columns.chain(overloads).collect();
-        halo.pack(columns.into_iter().map(|column| &column[..]));
-        halo.exchange(comm, &mut |_| {});
         let columns = numbers.columns[..numbers.read].iter_mut();
         let overloads = read.overloads.then_some(&mut limits.overloads);
-        let columns: Vec<&mut Column> = columns.chain(overloads).collect();
-        halo.unpack(columns.into_iter().map(|column| &mut column[..]));
+        let columns = columns.chain(overloads).map(|column| &mut column[..]);
+        halo.bring(comm, &mut columns.collect::<Vec<_>>());
         for grid in &mut self.grids {
             grid.update_numbers(Which::All, 0, &self.numbers.columns);
             if read.overloads {
@@ -280,17 +275,13 @@ impl<const D: usize> Forces<D> {
 
     /// Brings the entries of ghosts from their owners.
     pub fn bring(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
-        self.halo.pack([&*values].into_iter());
-        self.halo.exchange(comm, &mut |_| {});
-        self.halo.unpack([&mut *values].into_iter());
+        self.halo.bring(comm, &mut [values]);
     }
 
     /// Brings the ghosts' displacements up to date.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
-        self.halo.pack(displacement.iter().map(Vec::as_slice));
-        self.halo.exchange(comm, &mut |_| {});
-        self.halo
-            .unpack(displacement.iter_mut().map(Vec::as_mut_slice));
+        let mut components = displacement.each_mut().map(Vec::as_mut_slice);
+        self.halo.bring(comm, &mut components);
     }
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
