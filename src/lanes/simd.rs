@@ -378,43 +378,28 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn transpose_avx512(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-        // SAFETY: each row has eight numbers.
-        let r = rows.map(|row| unsafe { _mm512_loadu_pd(row.as_ptr()) });
-        // Pairs of rows, then of pairs, then of fours.
-        let low = |a, b| _mm512_unpacklo_pd(a, b);
-        let high = |a, b| _mm512_unpackhi_pd(a, b);
-        let p = [
-            low(r[0], r[1]),
-            high(r[0], r[1]),
-            low(r[2], r[3]),
-            high(r[2], r[3]),
-            low(r[4], r[5]),
-            high(r[4], r[5]),
-            low(r[6], r[7]),
-            high(r[6], r[7]),
-        ];
-        // Columns 0, 4 | 2, 6 of rows 0–3 lie in 128-bit parts 0, 2 | 1, 3.
-        let even = |a, b| _mm512_shuffle_f64x2::<0b10_00_10_00>(a, b);
-        let odd = |a, b| _mm512_shuffle_f64x2::<0b11_01_11_01>(a, b);
-        let a = even(p[0], p[2]);
-        let b = even(p[4], p[6]);
-        let c = odd(p[0], p[2]);
-        let d = odd(p[4], p[6]);
-        let e = even(p[1], p[3]);
-        let f = even(p[5], p[7]);
-        let g = odd(p[1], p[3]);
-        let h = odd(p[5], p[7]);
-        let columns = [
-            even(a, b),
-            even(e, f),
-            even(c, d),
-            even(g, h),
-            odd(a, b),
-            odd(e, f),
-            odd(c, d),
-            odd(g, h),
-        ];
-        columns.map(|column| lanes(opaque(column)))
+        // Four numbers from `first` on of two rows; the second half comes from memory, which is no shuffle.
+        let halves = |a: usize, b: usize, first: usize| {
+            // SAFETY: each row has eight numbers, and `first` is 0 or 4.
+            let [a, b] =
+                [a, b].map(|row| unsafe { _mm256_loadu_pd(rows[row].as_ptr().add(first)) });
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(a), b)
+        };
+        let columns = |first: usize| {
+            let [a, b] = [halves(0, 2, first), halves(1, 3, first)];
+            let [c, d] = [halves(4, 6, first), halves(5, 7, first)];
+            // Rows 0, 1 | 2, 3 of two columns, and those of 4, 5 | 6, 7.
+            let [ab, cd] = [_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d)];
+            let [ab_next, cd_next] = [_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d)];
+            [
+                _mm512_shuffle_f64x2::<0b10_00_10_00>(ab, cd),
+                _mm512_shuffle_f64x2::<0b10_00_10_00>(ab_next, cd_next),
+                _mm512_shuffle_f64x2::<0b11_01_11_01>(ab, cd),
+                _mm512_shuffle_f64x2::<0b11_01_11_01>(ab_next, cd_next),
+            ]
+        };
+        let ([a, b, c, d], [e, f, g, h]) = (columns(0), columns(4));
+        [a, b, c, d, e, f, g, h].map(|column| lanes(opaque(column)))
     }
 
     /// Keeps the compiler from merging what comes before with what follows, which it then does not carry
