@@ -275,6 +275,36 @@ fn a_plate_of_two_materials_with_listed_bonds() {
 }
 
 #[test]
+fn a_bar_whose_ghosts_lie_far_from_their_neighbours_in_memory() {
+    // More than 2^16 points on a rank, so that distances between local indices take more than 16 bits.
+    let deck = "
+        dimension = '1d'
+        [grid]
+        spacing = 1e-5
+        horizon = 3.015e-5
+        family = 'list'
+        [material]
+        bar.pmb = { density = 1, youngs_modulus = 1 }
+        [damage.brittle.critical_stretch]
+        critical_stretch = 0.01
+        [body.bar]
+        material = 'bar'
+        damage = 'brittle'
+        shape.box = { lower = [0], upper = [2.2] }
+        [initial.waves]
+        velocity = ['0.012*sin(40*x)*sin(3e4*x)']
+        [time]
+        end = 4e-5
+        [output]
+        every_steps = 10
+        fields = ['displacement', 'damage']
+        [history]
+        every_steps = 10
+        ";
+    same_everywhere("bar", deck, true);
+}
+
+#[test]
 fn bonds_as_long_as_the_volume_correction_reaches() {
     let horizon = "horizon = '2.5*dx'\nvolume_correction = 'linear'";
     let plain = "volume_correction = 'none'\n";

@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::neighbours::{NeighbourGroups, Neighbours};
 use super::store::{Groups, Store};
 use crate::lanes::{Lanes, WIDTH};
 
@@ -22,7 +23,7 @@ pub struct BondList {
     pub(super) starts: Vec<usize>,
     /// Local indices of the neighbours, row by row sorted by global id; the last group of a row is
     /// filled up with the row's own point.
-    pub(super) neighbours: Vec<[u32; WIDTH]>,
+    pub(super) neighbours: Neighbours,
     /// What is kept of the bonds; bits are clear where a bond only fills up a group.
     pub(super) store: Store,
     /// What volumes are multiplied by in the sums of the own and of the far end, 0 where a bond only
@@ -37,7 +38,7 @@ pub struct Row<'a> {
     /// Local index of the point.
     pub point: usize,
     /// Local indices of the neighbours.
-    pub neighbours: &'a [[u32; WIDTH]],
+    pub neighbours: NeighbourGroups<'a>,
     /// What is kept of the bonds.
     pub groups: Groups<'a>,
     /// What volumes are multiplied by in the sums of the own and of the far end; 1 if there are
@@ -49,7 +50,7 @@ pub struct Row<'a> {
 pub struct Rows<'a> {
     points: &'a [u32],
     starts: &'a [usize],
-    neighbours: &'a [[u32; WIDTH]],
+    neighbours: NeighbourGroups<'a>,
     groups: Groups<'a>,
     weights: [Option<&'a [Lanes]>; 2],
 }
@@ -58,12 +59,11 @@ impl BondList {
     /// All bonds, broken ones included.
     pub fn bonds(&self) -> u64 {
         let filled = |row: usize| {
-            let groups = &self.neighbours[self.starts[row]..self.starts[row + 1]];
+            let groups = self.starts[row]..self.starts[row + 1];
             let own = self.points[row];
             groups
-                .iter()
-                .flatten()
-                .filter(|there| **there != own)
+                .flat_map(|group| self.neighbours.indices(group))
+                .filter(|there| *there != own)
                 .count() as u64
         };
         (0..self.points.len()).map(filled).sum()
@@ -101,7 +101,7 @@ impl BondList {
         Rows {
             points: &self.points[range.clone()],
             starts: &self.starts[range.start..=range.end],
-            neighbours: &self.neighbours[groups.clone()],
+            neighbours: self.neighbours.groups(groups.clone()),
             weights: self
                 .weights
                 .each_ref()
@@ -127,9 +127,10 @@ impl BondList {
             let mut weights = weights.iter_mut();
             for row in rows {
                 let own = self.points[row];
-                let groups = &self.neighbours[self.starts[row]..self.starts[row + 1]];
-                for (group, weights) in groups.iter().zip(weights.by_ref()) {
-                    for (there, value) in group.iter().zip(&mut weights.0) {
+                let groups = self.starts[row]..self.starts[row + 1];
+                for (group, weights) in groups.zip(weights.by_ref()) {
+                    for (there, value) in self.neighbours.indices(group).iter().zip(&mut weights.0)
+                    {
                         if *there != own {
                             *value = weight(own as usize, *there as usize);
                         }
@@ -146,7 +147,7 @@ impl BondList {
         for row in 0..self.points.len() {
             let own = protected(self.points[row] as usize);
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours[group].iter().enumerate() {
+                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
                     if own || protected(*there as usize) {
                         breakable[group] &= !(1 << k);
                     }
@@ -164,7 +165,7 @@ impl BondList {
                 continue;
             }
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours[group].iter().enumerate() {
+                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
                     if *there != own && cut(own as usize, *there as usize) {
                         self.store.intact[group] &= !(1 << k);
                     }
@@ -177,7 +178,7 @@ impl BondList {
     pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
         for row in 0..self.points.len() {
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours[group].iter().enumerate() {
+                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
                     if self.store.intact[group] >> k & 1 == 1 {
                         found(self.points[row] as usize, *there as usize);
                     }
@@ -192,7 +193,7 @@ impl BondList {
             return;
         };
         for group in self.starts[row]..self.starts[row + 1] {
-            for (k, there) in self.neighbours[group].iter().enumerate() {
+            for (k, there) in self.neighbours.indices(group).iter().enumerate() {
                 if self.store.intact[group] >> k & 1 == 1 {
                     found(*there as usize);
                 }
@@ -205,7 +206,7 @@ impl BondList {
         for row in 0..self.points.len() {
             let own = self.points[row];
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours[group].iter().enumerate() {
+                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
                     if *there != own && self.store.intact[group] >> k & 1 == 0 {
                         found(own as usize, *there as usize);
                     }
@@ -255,7 +256,7 @@ impl BondList {
         let groups = self.neighbours.len();
         4 * self.points.len()
             + 8 * self.starts.len()
-            + groups * 4 * WIDTH
+            + self.neighbours.bytes()
             + self.store.bytes()
             + groups * 8 * WIDTH * self.weights.iter().flatten().count()
     }
@@ -281,7 +282,7 @@ impl<'a> Rows<'a> {
     pub fn split_at(self, row: usize) -> (Self, Self) {
         let (points_a, points_b) = self.points.split_at(row);
         let group = self.starts[row] - self.starts[0];
-        let (neighbours_a, neighbours_b) = self.neighbours.split_at(group);
+        let [neighbours_a, neighbours_b] = self.neighbours.split_at(group);
         let [groups_a, groups_b] = self.groups.split_at(group);
         let weights_a = self.weights.map(|all| all.map(|weights| &weights[..group]));
         let weights_b = self.weights.map(|all| all.map(|weights| &weights[group..]));
@@ -308,7 +309,7 @@ impl<'a> Rows<'a> {
         let groups = self.starts[row] - self.starts[0]..self.starts[row + 1] - self.starts[0];
         Row {
             point: self.points[row] as usize,
-            neighbours: &self.neighbours[groups.clone()],
+            neighbours: self.neighbours.range(groups.clone()),
             weights: self
                 .weights
                 .map(|all| all.map(|weights| &weights[groups.clone()])),
@@ -322,7 +323,7 @@ impl Row<'_> {
     #[inline(always)]
     pub fn whole(&self, group: usize) -> u8 {
         let mut bits = 0;
-        for (k, there) in self.neighbours[group].iter().enumerate() {
+        for (k, there) in self.neighbours.group(group).indices().iter().enumerate() {
             bits |= u8::from(*there as usize != self.point) << k;
         }
         bits

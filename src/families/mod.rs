@@ -10,6 +10,7 @@ mod find;
 mod grid;
 mod lattice;
 mod list;
+mod neighbours;
 mod offset;
 mod search;
 mod store;

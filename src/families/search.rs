@@ -11,6 +11,7 @@ use crate::points::bins::Bins;
 
 use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
+use super::neighbours::Neighbours;
 
 /// A bond as long as the horizon must not depend on rounding: lengths up to δ (1 + 10⁻⁹) count.
 const HORIZON_TOLERANCE: f64 = 1e-9;
@@ -68,7 +69,7 @@ impl Order {
 struct Chunk {
     /// Local index of the point, block of the neighbours and number of groups.
     rows: Vec<(u32, u32, u32)>,
-    neighbours: Vec<[u32; WIDTH]>,
+    neighbours: Neighbours,
     intact: Vec<u8>,
     /// Places of one point's neighbours.
     places: Vec<u32>,
@@ -109,9 +110,7 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
         list.starts.shrink_to_fit();
         list.neighbours.shrink_to_fit();
         list.store.intact.shrink_to_fit();
-        let groups = list.neighbours.par_iter();
-        let largest = groups.map(|group| group.iter().copied().fold(0, u32::max));
-        let largest = largest.max().max(list.points.last().copied());
+        let largest = list.neighbours.largest().max(list.points.last().copied());
         list.reach = largest.map_or(0, |index| index as usize + 1);
     }
     Ok(lists)
@@ -191,7 +190,7 @@ fn append(lists: &mut [BondList], domain: &Domain, blocks: usize, chunk: &Chunk)
         let groups = group..group + *groups as usize;
         group = groups.end;
         list.points.push(*point);
-        list.neighbours.extend(&chunk.neighbours[groups.clone()]);
+        (list.neighbours).extend(chunk.neighbours.groups(groups.clone()));
         list.store.intact.extend(&chunk.intact[groups]);
         list.starts.push(list.neighbours.len());
     }
@@ -228,11 +227,13 @@ mod tests {
                     for k in 0..length {
                         let row = all_rows.row(k);
                         let ids: Vec<u64> = row
-                            .neighbours
+                            .groups
+                            .intact
                             .iter()
-                            .zip(row.groups.intact.iter())
+                            .enumerate()
                             .flat_map(|(group, bits)| {
-                                (0..WIDTH).filter(move |k| bits >> k & 1 == 1).map(|k| group[k])
+                                let indices = row.neighbours.group(group).indices();
+                                (0..WIDTH).filter(move |k| bits >> k & 1 == 1).map(move |k| indices[k])
                             })
                             .map(|index| domain.points[index as usize].id)
                             .collect();

@@ -175,27 +175,29 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         row: &mut Row<'_>,
         group: usize,
     ) -> Group<'h, K, D> {
-        let neighbours = &row.neighbours[group];
-        debug_assert!(neighbours.iter().all(|n| (*n as usize) < self.nodes.len()));
+        let neighbours = row.neighbours.group(group);
+        let indices = neighbours.indices();
+        debug_assert!(indices.iter().all(|n| (*n as usize) < self.nodes.len()));
         // SAFETY: `new` has checked the length.
-        let node = |k: usize| unsafe { &self.nodes.get_unchecked(neighbours[k] as usize).0 };
-        let columns = simd.transpose(std::array::from_fn(node));
+        let node = |index: usize| unsafe { &self.nodes.get_unchecked(index).0 };
+        let columns = simd.transpose(neighbours.one_by_one().map(node));
         let along: [Lanes; D] = Numbers::each(|d| columns[d] - here.reference[d]);
         let eta = Numbers::each(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
         let mut square = along[0] * along[0];
         for xi in &along[1..] {
             square = simd.multiply_add(*xi, *xi, square);
         }
-        let length = square.sqrt();
-        let inverse = Lanes::splat(1.0) / length;
+        // In this order the root waits for nothing but the quotient, and the stretch not for the root.
+        let inverse_square = Lanes::splat(1.0) / square;
+        let inverse = inverse_square.sqrt();
         let reference = Reference {
             along,
-            length,
+            length: square * inverse,
             inverse,
-            inverse_square: inverse * inverse,
+            inverse_square,
         };
         // SAFETY: as above.
-        let (numbers, limits) = unsafe { (self.far_numbers(neighbours), self.limits(neighbours)) };
+        let (numbers, limits) = unsafe { (self.far_numbers(&indices), self.limits(&indices)) };
         let intact = row.groups.intact[group];
         Group {
             bond: deform::<_, false, D>(simd, &reference, eta, intact, self.limit, K::WANTED),
