@@ -144,22 +144,31 @@ fn transfer<T: Pod>(
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),
     (to_rows, size, to): (&[Vec<u32>], usize, impl Fn(usize) -> Range<usize>),
 ) -> Vec<T> {
-    let pack = |rows: &Vec<u32>| {
-        let mut bytes = Vec::new();
+    let here = comm.rank();
+    let pack = |(rank, rows): (usize, &Vec<u32>)| {
+        // What stays needs no message.
+        let rows = if rank == here { &[] } else { &rows[..] };
+        let lengths = rows.iter().map(|row| from(*row as usize).len());
+        let mut bytes = Vec::with_capacity(size_of::<T>() * lengths.sum::<usize>());
         for row in rows {
             bytes.extend_from_slice(bytemuck::cast_slice(&values[from(*row as usize)]));
         }
         bytes
     };
-    let incoming = comm.all_to_all(from_rows.iter().map(pack).collect());
+    let incoming = comm.all_to_all(from_rows.iter().enumerate().map(pack).collect());
     let mut result = vec![T::zeroed(); size];
-    for (rows, bytes) in to_rows.iter().zip(incoming) {
-        let values: Vec<T> = bytemuck::pod_collect_to_vec(&bytes);
-        let mut rest = &values[..];
+    for (own, place) in from_rows[here].iter().zip(&to_rows[here]) {
+        result[to(*place as usize)].copy_from_slice(&values[from(*own as usize)]);
+    }
+    for (rank, (rows, bytes)) in to_rows.iter().zip(incoming).enumerate() {
+        if rank == here {
+            continue;
+        }
+        let mut rest = &bytes[..];
         for row in rows {
-            let place = to(*row as usize);
+            let place: &mut [u8] = bytemuck::cast_slice_mut(&mut result[to(*row as usize)]);
             let (own, more) = rest.split_at(place.len());
-            result[place].copy_from_slice(own);
+            place.copy_from_slice(own);
             rest = more;
         }
     }

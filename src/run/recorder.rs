@@ -186,7 +186,12 @@ impl<'a> Recorder<'a> {
             return Ok(());
         }
         let start = Instant::now();
-        let snapshot = Snapshot::new(simulation);
+        let energies = row || self.fields.contains(&Field::StrainEnergyDensity);
+        let snapshot = if energies {
+            Snapshot::new(simulation)
+        } else {
+            Snapshot::without_energies(simulation)
+        };
         // What both need is the output's, if there is one.
         let found = if output { Instant::now() } else { start };
         if row {

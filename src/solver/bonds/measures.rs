@@ -42,7 +42,8 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
         let (family, own) = (group.family(), group.own);
         let energy = self.law.bond_energy(&group.bond, own, &group.memory[0]);
-        sums[0] += simd.keep(group.own_share(energy), family);
+        let energy = simd.whole(group.own_share(energy));
+        sums[0] += simd.keep(energy, family);
         sums[1] += simd.keep(group.volume, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
         if L::Memory::COUNT > 0 {
@@ -52,23 +53,25 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     }
 }
 
-/// Sums the volume of the neighbours in each point's own family, m³.
+/// Sums the volume of the intact neighbours in each point's own family (m³), and their number as
+/// [`Stored`] does.
 #[derive(Clone, Copy)]
-pub struct FamilyVolume;
+pub struct Left;
 
-impl<const D: usize> Kernel<D> for FamilyVolume {
-    type Sums = [Lanes; 1];
+impl<const D: usize> Kernel<D> for Left {
+    type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
-    // At every set-up and after every refinement.
+    // At every set-up, after every refinement, and for outputs.
     const VERSIONS: Versions = Versions::Avx2;
     const UNDEFORMED: bool = true;
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, [sum]: &mut [Lanes; 1]) {
-        *sum += simd.keep(group.volume, group.family());
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 2]) {
+        sums[0] += simd.keep(group.volume, group.family());
+        sums[1] += simd.keep(Lanes::splat(1.0), group.intact);
     }
 }
 

@@ -18,13 +18,14 @@ use super::sweep::{Source, sweep, sweep_from};
 /// What the bonds of the owned points hold, by column over the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stored {
-    /// Strain energy density W, J/m³.
+    /// Strain energy density W, J/m³; empty where energies were not asked for.
     pub energy: Vec<f64>,
     /// Volume of the intact neighbours in the point's own family, m³.
     pub volume: Vec<f64>,
     /// Number of intact neighbours, those included that have the point in their family only.
     pub neighbours: Vec<f64>,
-    /// Energy density that bonds have dissipated without breaking, J/m³; empty where no law can.
+    /// Energy density that bonds have dissipated without breaking, J/m³; empty where no law can or energies
+    /// were not asked for.
     pub dissipated: Vec<f64>,
 }
 
@@ -77,17 +78,18 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Volume of the intact neighbours of each owned point, m³.
-    pub fn family_volume(&mut self, model: &Model<D>) -> Vec<f64> {
-        let mut columns = self.measure(model.owned(), 1, |interaction, sums, source| {
-            sweep_all(
-                &mut interaction.bonds,
-                sums,
-                &measures::FamilyVolume,
-                source,
-            );
+    /// As [`Self::stored`] without the energies, which are most of the work.
+    pub fn left(&mut self, model: &Model<D>) -> Stored {
+        let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
+            sweep_all(&mut interaction.bonds, sums, &measures::Left, source);
         });
-        columns.remove(0)
+        let [volume, neighbours] = columns.try_into().expect("two columns");
+        Stored {
+            energy: Vec::new(),
+            volume,
+            neighbours,
+            dissipated: Vec::new(),
+        }
     }
 
     /// D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.

@@ -29,6 +29,12 @@ impl Snapshot {
         Self { stored }
     }
 
+    /// As [`Self::new`], but for energies.
+    pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
+        let stored = simulation.forces.left(&simulation.model);
+        Self { stored }
+    }
+
     /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
     /// al. 2014, eq. 7). A point without family has 0.
     pub fn damage(&self, family_volume: &[f64], point: usize) -> f64 {
