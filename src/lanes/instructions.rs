@@ -28,7 +28,13 @@ pub enum Instructions {
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
 /// Names of the sets in the order of what they can.
-pub const NAMES: [&str; 3] = ["baseline", "AVX2", "AVX-512"];
+pub const NAMES: &[&str] = if cfg!(target_arch = "x86_64") {
+    &["baseline", "AVX2", "AVX-512"]
+} else if cfg!(target_arch = "aarch64") {
+    &["NEON"]
+} else {
+    &["baseline"]
+};
 
 impl Instructions {
     /// The best that all ranks have, or the most that [`VARIABLE`] allows; collective.
@@ -100,7 +106,8 @@ fn named(name: &str) -> Result<usize> {
     let short = |name: &str| name.replace('-', "").to_lowercase();
     let found = NAMES.iter().position(|known| short(known) == short(name));
     found.ok_or_else(|| {
-        let known = NAMES.map(short).join(", ");
+        let known: Vec<String> = NAMES.iter().map(|name| short(name)).collect();
+        let known = known.join(", ");
         Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
     })
 }
@@ -109,6 +116,7 @@ fn named(name: &str) -> Result<usize> {
 mod tests {
     use super::*;
 
+    #[cfg(target_arch = "x86_64")]
     #[test]
     fn names_of_the_variable() {
         assert_eq!(named("avx512").unwrap(), 2);
