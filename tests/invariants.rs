@@ -8,7 +8,7 @@ use fissure::dimension::Dimension;
 use fissure::material::{Declaration, Invariants, declarations};
 use fissure::solver::Simulation;
 use fissure::solver::bonds::Evolution;
-use fissure::solver::motion::{Kept, Saved};
+use fissure::solver::motion::{Kept, Saved, SavedBonds};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// A law, and what stands in its table beside density and Young's modulus.
@@ -555,22 +555,27 @@ fn joined(parts: Vec<Saved>) -> Saved {
     let mut parts = parts.into_iter();
     let first = parts.next().unwrap();
     parts.fold(first, |mut all, part| {
-        all.values.extend(part.values);
-        all.lengths.extend(part.lengths);
-        all.bonds.extend(part.bonds);
+        for (column, more) in all.columns.iter_mut().zip(part.columns) {
+            column.extend(more);
+        }
+        all.bonds.lengths.extend(part.bonds.lengths);
+        all.bonds.bytes.extend(part.bonds.bytes);
         all
     })
 }
 
 /// The part of some points of what one rank has saved.
 fn part(all: &Saved, first: usize, count: usize) -> Saved {
-    let bytes = |points: usize| all.lengths[..points].iter().sum::<u32>() as usize;
-    let (points, width) = (first..first + count, all.width);
+    let SavedBonds { lengths, bytes } = &all.bonds;
+    let end = |points: usize| lengths[..points].iter().sum::<u32>() as usize;
+    let points = first..first + count;
+    let column = |column: &Vec<f64>| column[points.clone()].to_vec();
     Saved {
-        width,
-        values: all.values[width * points.start..width * points.end].to_vec(),
-        bonds: all.bonds[bytes(points.start)..bytes(points.end)].to_vec(),
-        lengths: all.lengths[points].to_vec(),
+        columns: all.columns.iter().map(column).collect(),
+        bonds: SavedBonds {
+            bytes: bytes[end(points.start)..end(points.end)].to_vec(),
+            lengths: lengths[points.clone()].to_vec(),
+        },
         progress: all.progress.clone(),
     }
 }

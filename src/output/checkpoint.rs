@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use crate::comm::{Communicator, IdOrder, agree};
 use crate::error::{Error, Result};
 use crate::refine::Pick;
-use crate::solver::motion::Saved;
+use crate::solver::Simulation;
+use crate::solver::motion::{Saved, SavedBonds};
 
 use super::access::Creation;
 use super::attribute::Attribute;
@@ -23,7 +24,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 6;
+const VERSION: i64 = 7;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,15 +98,15 @@ impl Checkpoints {
     ///
     /// # Errors
     /// When the disc is full; the checkpoints that were there stay.
-    pub fn write(
+    pub fn write<const D: usize>(
         &mut self,
-        comm: &dyn Communicator,
+        simulation: &Simulation<'_, D>,
         order: &IdOrder,
         header: &Header,
-        saved: &Saved,
     ) -> Result<()> {
+        let comm = simulation.comm;
         let part = self.folder.join(PART);
-        let written = write_file(comm, &part, order, header, saved)
+        let written = write_file(simulation, &part, order, header)
             .and_then(|()| seal::seal(comm, &part, header.number));
         if written.is_err() && comm.rank() == 0 {
             // It only takes up space; that it cannot be removed either changes nothing.
@@ -226,34 +227,40 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
 /// When the file cannot be read.
 pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Result<Saved> {
     let mut file = CollectiveFile::open(path, comm)?;
-    let values = file.open_dataset("/values")?;
     let lengths = file.open_dataset("/bond_bytes")?;
     let bonds = file.open_dataset("/bonds")?;
     let progress = file.integers_attribute("/", "progress")?;
+    let width = file.integers_attribute("/", "columns")?;
     let (first, count) = (order.first(), order.count());
-    let width = values.columns();
-    let values = file.read_rows(&values, first, count)?;
+    let mut columns = Vec::new();
+    for k in 0..width.first().copied().unwrap_or(0) {
+        let dataset = file.open_dataset(&column(k as usize))?;
+        columns.push(file.read_rows(&dataset, first, count)?);
+    }
     let lengths: Vec<u32> = file.read_rows(&lengths, first, count)?;
     let own = lengths.iter().map(|length| u64::from(*length)).sum();
     let (start, _) = crate::comm::scan(comm, own);
-    let bonds = file.read_rows(&bonds, start, own as usize)?;
+    let bytes = file.read_rows(&bonds, start, own as usize)?;
     file.close()?;
     Ok(Saved {
-        width,
-        values,
-        lengths,
-        bonds,
+        columns,
+        bonds: SavedBonds { lengths, bytes },
         progress: progress.into_iter().map(|word| word as u64).collect(),
     })
 }
 
-fn write_file(
-    comm: &dyn Communicator,
+/// The dataset of a column of the state.
+fn column(k: usize) -> String {
+    format!("/column_{k}")
+}
+
+fn write_file<const D: usize>(
+    simulation: &Simulation<'_, D>,
     path: &Path,
     order: &IdOrder,
     header: &Header,
-    saved: &Saved,
 ) -> Result<()> {
+    let comm = simulation.comm;
     let mut file = CollectiveFile::create(path, comm, Creation::Truncate)?;
     let numbers = [
         VERSION,
@@ -269,8 +276,14 @@ fn write_file(
         header.grids[1].len() as i64,
     ];
     file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
-    let progress: Vec<i64> = saved.progress.iter().map(|word| *word as i64).collect();
+    let progress: Vec<i64> = simulation
+        .progress()
+        .iter()
+        .map(|word| *word as i64)
+        .collect();
     file.set_attribute("/", "progress", Attribute::Integers(&progress))?;
+    let width = [simulation.saved_width() as i64];
+    file.set_attribute("/", "columns", Attribute::Integers(&width))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
     file.set_attribute("/", "rounding", Attribute::Text(&header.rounding))?;
     for (picks, name) in header.grids.iter().zip(GRIDS) {
@@ -286,12 +299,16 @@ fn write_file(
         }
     }
     let points = Rows::Fixed(header.points);
-    let (start, total) = crate::comm::scan(comm, saved.bonds.len() as u64);
-    let values = file.create_dataset::<f64>("/values", points, Some(saved.width))?;
-    file.write_rows(&values, order.first(), &saved.values)?;
+    // One after the other, so that a checkpoint takes little memory beside the run.
+    for (k, values) in simulation.saved_columns(order).enumerate() {
+        let dataset = file.create_dataset::<f64>(&column(k), points, None)?;
+        file.write_rows(&dataset, order.first(), &values)?;
+    }
+    let saved = simulation.saved_bonds(order);
+    let (start, total) = crate::comm::scan(comm, saved.bytes.len() as u64);
     let lengths = file.create_dataset::<u32>("/bond_bytes", points, None)?;
     file.write_rows(&lengths, order.first(), &saved.lengths)?;
     let bonds = file.create_dataset::<u8>("/bonds", Rows::Fixed(total), None)?;
-    file.write_rows(&bonds, start, &saved.bonds)?;
+    file.write_rows(&bonds, start, &saved.bytes)?;
     file.close()
 }

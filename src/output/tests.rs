@@ -51,10 +51,10 @@ fn what_is_written_reads_back() -> Result<()> {
         file.append_history(&[vec![step as f64, 4.5]])?;
         let velocity = [1.0, 2.0, 3.0, 4.0].map(|value| value + 10.0 * step as f64);
         let damage = [step as f64, 9.0];
-        let fields = [&velocity[..], &damage[..]];
-        file.write_step(0.5 * step as f64, 100 * step, &fields)?;
+        let fields = [velocity.to_vec(), damage.to_vec()];
+        file.write_step(0.5 * step as f64, 100 * step, |k| fields[k].clone())?;
     }
-    let error = file.write_step(1.0, 2, &[&[0.0], &[0.0, 0.0]]);
+    let error = file.write_step(1.0, 2, |_| vec![0.0]);
     assert!(error.unwrap_err().message.contains("velocity has 1 values"));
     file.close(false)?;
 
@@ -142,7 +142,7 @@ fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     };
     let write = |file: &mut ResultFile<'_>, step: u64| {
         file.append_history(&[vec![step as f64]])?;
-        file.write_step(step as f64, step, &[&[step as f64, 10.0 + step as f64]])
+        file.write_step(step as f64, step, |_| vec![step as f64, 10.0 + step as f64])
     };
     let first = metadata("one", "4");
     let mut file = ResultFile::create(&path, &comm, Creation::Exclusive, &contents(&first))?;

@@ -80,9 +80,8 @@ impl CheckpointWriter {
             deck: self.physics.clone(),
             rounding: simulation.forces.instructions().rounding().to_owned(),
         };
-        let saved = simulation.save(&recorder.order);
         self.checkpoints
-            .write(simulation.comm, &recorder.order, &header, &saved)?;
+            .write(simulation, &recorder.order, &header)?;
         self.written += 1;
         let cost = begin.elapsed();
         self.spent += cost;

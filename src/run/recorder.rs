@@ -205,24 +205,18 @@ impl<'a> Recorder<'a> {
         let for_rows = found.elapsed();
         self.spent_on_rows += for_rows;
         if output {
-            let values: Vec<Vec<f64>> = self
-                .fields
-                .iter()
-                .map(|field| {
-                    let values = snapshot.field(simulation, *field);
-                    let width = field.components();
-                    let values = self.order.collect(simulation.comm, &values, width);
-                    pick(&self.kept, values, width)
-                })
-                .collect();
-            let data: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
             if simulation.may_refine() {
                 let layout = Layout::new(simulation, (&self.order, &self.kept), 0, &[]);
                 let fixed = layout.fixed();
                 self.file.set_points(&layout.contents(&fixed))?;
             }
-            self.file
-                .write_step(simulation.clock.time(), simulation.clock.number(), &data)?;
+            let (time, number) = (simulation.clock.time(), simulation.clock.number());
+            let (fields, order, kept) = (&self.fields, &self.order, &self.kept);
+            self.file.write_step(time, number, |k| {
+                let (field, width) = (fields[k], fields[k].components());
+                let values = snapshot.field(simulation, field);
+                pick(kept, order.collect(simulation.comm, &values, width), width)
+            })?;
             let cracks = self.observer.crack_paths(simulation, &snapshot);
             crack_files::write(simulation.comm, &self.folder, &cracks)?;
             let told = match &mut self.side_car {

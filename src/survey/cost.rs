@@ -15,8 +15,8 @@ const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 /// Bytes of a result or checkpoint that do not depend on the number of points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list: the neighbour's index and a bit.
-const LISTED: f64 = 4.0 + 1.0 / 8.0;
+/// Bytes of a bond in a list: an eighth of the lowest index and eight distances, and a bit.
+const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
 /// Bytes of a bond of a lattice: a bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
@@ -26,10 +26,10 @@ const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
 /// Bytes a point, and a bond of a list, at the fullest moment of the set-up, where it is not measured.
-const SET_UP: [f64; 2] = [400.0, 12.0];
+const SET_UP: [f64; 2] = [400.0, 10.5];
 
-/// Copies of a column on its way to the files: packed, received and put in order.
-const COPIES: f64 = 3.0;
+/// Copies of a column on its way to the files: by point, by id, and half of it in messages.
+const COPIES: f64 = 2.5;
 
 /// Memory of a process with points beside what it had without, bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -202,14 +202,13 @@ fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
     let number = if plan.output.single { 4.0 } else { 8.0 };
     let written = counts.share * (FIXED + number * outputs as f64 * components as f64);
     let saved = 8.0 * counts.saved as f64 + 4.0;
-    // While a column is on its way: what is known of the bonds, all columns of the output, and its copies.
+    // While a field is on its way: what is known of the bonds, and its copies.
     let widest = plan.output.fields.iter().map(|field| field.components());
     let widest = widest.max().unwrap_or(0).max(3) as f64;
-    let output = counts.points * 8.0 * (5.0 + components as f64 + COPIES * widest);
+    let output = counts.points * 8.0 * (5.0 + COPIES * widest);
     let bonds = counts.bonds;
-    let values = counts.points * 8.0 * counts.saved as f64;
     let offsets = counts.points * 24.0;
-    let checkpoint = ((1.0 + COPIES) * values + bonds).max(2.0 * values + (1.0 + COPIES) * bonds);
+    let checkpoint = COPIES * bonds.max(counts.points * 8.0);
     Cost {
         set_up: counts.memory.peak,
         time_loop: counts.memory.kept + output.max(checkpoint + offsets),

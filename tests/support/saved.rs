@@ -15,8 +15,11 @@ pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
 
 /// Parts of the ranks put together.
 pub fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
-    let values = parts.iter().flat_map(|part| &part.values);
+    let values = parts.iter().flat_map(|part| part.columns.concat());
     let values = values.map(|value| value.to_bits()).collect();
-    let bonds = parts.iter().flat_map(|part| part.bonds.clone()).collect();
+    let bonds = parts
+        .iter()
+        .flat_map(|part| part.bonds.bytes.clone())
+        .collect();
     (values, bonds, parts[0].progress.clone())
 }

@@ -267,33 +267,31 @@ impl<'a> ResultFile<'a> {
         Ok(())
     }
 
-    /// Adds one step: its time in s, its number and this rank's values of the moving fields, in the
-    /// order they were described. When this returns, the step survives the end of the process.
+    /// Adds one step: its time in s, its number and this rank's values of the moving fields, which `values` gives
+    /// one after the other, by their place in the order they were described. When this returns, the step survives the end of the process.
     ///
     /// # Errors
     /// A field's length is wrong, or the disc is full.
-    pub fn write_step(&mut self, time: f64, step: u64, fields: &[&[f64]]) -> Result<()> {
-        let checked = if fields.len() == self.fields.len() {
-            let mut pairs = self.fields.iter().zip(fields);
-            pairs
-                .try_for_each(|((field, _), data)| check(field, &FieldData::F64(data), self.points))
-        } else {
-            let (given, described) = (fields.len(), self.fields.len());
-            let text = format!("a step has {given} fields, but {described} were described");
-            Err(Error::run(text))
-        };
-        agree(self.file.communicator(), checked)?;
+    pub fn write_step(
+        &mut self,
+        time: f64,
+        step: u64,
+        mut values: impl FnMut(usize) -> Vec<f64>,
+    ) -> Result<()> {
         if self.changing.is_none() && self.steps == self.capacity {
             self.make_room(self.capacity + 1)?;
         }
         let first = self.rows + self.piece.first;
-        for ((description, dataset), data) in self.fields.iter().zip(fields) {
+        for (k, (description, dataset)) in self.fields.iter().enumerate() {
+            let data = values(k);
+            let checked = check(description, &FieldData::F64(&data), self.points);
+            agree(self.file.communicator(), checked)?;
             let halves: Vec<f32>;
             let data = if self.single {
                 halves = data.iter().map(|value| *value as f32).collect();
                 FieldData::F32(&halves)
             } else {
-                FieldData::F64(data)
+                FieldData::F64(&data)
             };
             write_field(&mut self.file, dataset, first, description, &data)?;
         }

@@ -11,5 +11,5 @@ pub mod verlet;
 
 pub use clock::Clock;
 pub use fields::Fields;
-pub use saved::Saved;
+pub use saved::{Saved, SavedBonds};
 pub use undo::Kept;

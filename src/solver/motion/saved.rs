@@ -14,16 +14,21 @@ use super::relaxation::LoadStep;
 /// The state of the points of this rank's block of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Saved {
-    /// Numbers a point: the components of all fields that are state.
-    pub width: usize,
-    /// Row-major, `width` a point.
-    pub values: Vec<f64>,
-    /// Bytes a point of what is kept of its bonds.
-    pub lengths: Vec<u32>,
-    /// What is kept of the bonds of the points, one after the other.
-    pub bonds: Vec<u8>,
+    /// The components of all fields that are state.
+    pub columns: Vec<Vec<f64>>,
+    /// Their bonds.
+    pub bonds: SavedBonds,
     /// What the run has come to, but for its points: the same on all ranks.
     pub progress: Vec<u64>,
+}
+
+/// What is kept of the bonds of the points of this rank's block of ids.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavedBonds {
+    /// Bytes of each point.
+    pub lengths: Vec<u32>,
+    /// Those of the points, one after the other.
+    pub bytes: Vec<u8>,
 }
 
 /// Words of the clock among those of the progress.
@@ -37,7 +42,7 @@ const REFINED: usize = 2;
 
 impl<const D: usize> Simulation<'_, D> {
     /// What the run has come to, but for its points.
-    pub(in crate::solver) fn progress(&self) -> Vec<u64> {
+    pub fn progress(&self) -> Vec<u64> {
         let clock = self.clock.words().into_iter();
         let stage = [self.stage as u64].into_iter();
         let steps = self.step_control.words().into_iter();
@@ -73,26 +78,27 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// The present state, dealt out by id. Collective.
     pub fn save(&self, order: &IdOrder) -> Saved {
-        let owned = self.model.owned();
-        let columns: Vec<&Vec<f64>> = self.state().collect();
-        let width = columns.len();
-        let mut values = vec![0.0; owned * width];
-        for (k, column) in columns.into_iter().enumerate() {
-            let places = values.iter_mut().skip(k).step_by(width);
-            for (value, number) in places.zip(column) {
-                *value = *number;
-            }
-        }
-        let lengths = self.forces.saved_lengths(owned);
-        let bonds = self.forces.saved(&lengths);
-        let block_lengths = order.collect(self.comm, &lengths, 1);
         Saved {
-            width,
-            values: order.collect(self.comm, &values, width),
-            bonds: order.collect_ragged(self.comm, &bonds, &lengths, &block_lengths),
-            lengths: block_lengths,
+            columns: self.saved_columns(order).collect(),
+            bonds: self.saved_bonds(order),
             progress: self.progress(),
         }
+    }
+
+    /// The columns of the state one by one, each dealt out by id when it is asked for. Collective.
+    pub fn saved_columns(&self, order: &IdOrder) -> impl Iterator<Item = Vec<f64>> {
+        let owned = self.model.owned();
+        self.state()
+            .map(move |column| order.collect(self.comm, &column[..owned], 1))
+    }
+
+    /// What is kept of the bonds, dealt out by id. Collective.
+    pub fn saved_bonds(&self, order: &IdOrder) -> SavedBonds {
+        let own = self.forces.saved_lengths(self.model.owned());
+        let bytes = self.forces.saved(&own);
+        let lengths = order.collect(self.comm, &own, 1);
+        let bytes = order.collect_ragged(self.comm, &bytes, &own, &lengths);
+        SavedBonds { lengths, bytes }
     }
 
     /// Goes back to a saved state. Collective.
@@ -100,27 +106,28 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// When the state is that of other points or bonds; the same on all ranks.
     pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
-        let (owned, width) = (self.model.owned(), self.saved_width());
-        let lengths = self.forces.saved_lengths(owned);
+        let lengths = self.forces.saved_lengths(self.model.owned());
         let expected = order.collect(self.comm, &lengths, 1);
         let progress = saved.progress.len() == self.progress().len();
-        let fits = saved.width == width && saved.lengths == expected && progress;
+        let columns = saved.columns.len() == self.saved_width();
+        let fits = columns && saved.bonds.lengths == expected && progress;
         let fits = if fits {
             Ok(())
         } else {
             Err(Error::run("the checkpoint is that of other bonds"))
         };
         agree(self.comm, fits)?;
-        let values = order.spread(self.comm, &saved.values, width);
-        let bonds = order.spread_ragged(self.comm, &saved.bonds, &lengths, &saved.lengths);
+        let SavedBonds {
+            lengths: all,
+            bytes,
+        } = &saved.bonds;
+        let bonds = order.spread_ragged(self.comm, bytes, &lengths, all);
         self.forces.restore(&lengths, &bonds);
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);
         let columns = fields.flat_map(|(_, columns)| columns);
-        for (k, column) in columns.enumerate() {
-            let saved = values.iter().skip(k).step_by(width);
-            for (number, value) in column.iter_mut().zip(saved) {
-                *number = *value;
-            }
+        for (column, saved) in columns.zip(&saved.columns) {
+            let values = order.spread(self.comm, saved, 1);
+            column[..values.len()].copy_from_slice(&values);
         }
         self.continue_from(&saved.progress);
         self.find_anew();
