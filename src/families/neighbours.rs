@@ -175,18 +175,23 @@ impl Group<'_> {
         }
     }
 
-    /// The indices, each read by itself: else the compiler makes a vector of them, which it has to take apart
-    /// again where they are to be addresses.
+    /// An index, and how far the eight lie beyond it, each read by itself: else the compiler makes a vector of
+    /// them, which it has to take apart again where they are to be addresses.
     #[inline(always)]
-    pub fn one_by_one(self) -> [usize; WIDTH] {
+    pub fn apart(self) -> (usize, [usize; WIDTH]) {
         match self {
-            // SAFETY: all of them are there.
-            Self::Near(first, distances) => std::array::from_fn(|k| unsafe {
-                first as usize + std::ptr::read_volatile(&distances[k]) as usize
-            }),
-            // SAFETY: as above.
+            Self::Near(first, distances) => {
+                // SAFETY: all of them are there.
+                let distance = |k| unsafe { std::ptr::read_volatile(&distances[k]) };
+                (
+                    first as usize,
+                    std::array::from_fn(|k| distance(k) as usize),
+                )
+            }
             Self::Full(indices) => {
-                std::array::from_fn(|k| unsafe { std::ptr::read_volatile(&indices[k]) } as usize)
+                // SAFETY: as above.
+                let index = |k| unsafe { std::ptr::read_volatile(&indices[k]) };
+                (0, std::array::from_fn(|k| index(k) as usize))
             }
         }
     }
@@ -214,6 +219,8 @@ mod tests {
         copied.extend(pushed.groups(1..groups.len()));
         for (k, group) in groups.into_iter().enumerate() {
             assert_eq!(pushed.indices(k), group);
+            let (first, distances) = pushed.all().group(k).apart();
+            assert_eq!(distances.map(|distance| (first + distance) as u32), group);
             if k > 0 {
                 assert_eq!(copied.indices(k), group);
             }

@@ -178,9 +178,11 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         let neighbours = row.neighbours.group(group);
         let indices = neighbours.indices();
         debug_assert!(indices.iter().all(|n| (*n as usize) < self.nodes.len()));
+        let (first, distances) = neighbours.apart();
         // SAFETY: `new` has checked the length.
-        let node = |index: usize| unsafe { &self.nodes.get_unchecked(index).0 };
-        let columns = simd.transpose(neighbours.one_by_one().map(node));
+        let nodes = unsafe { self.nodes.get_unchecked(first..) };
+        // SAFETY: as above.
+        let columns = simd.transpose(distances.map(|k| unsafe { &nodes.get_unchecked(k).0 }));
         let along: [Lanes; D] = Numbers::each(|d| columns[d] - here.reference[d]);
         let eta = Numbers::each(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
         let mut square = along[0] * along[0];
