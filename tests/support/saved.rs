@@ -15,7 +15,8 @@ pub fn state<const D: usize>(simulation: &Simulation<D>) -> (IdOrder, Saved) {
 
 /// Parts of the ranks put together.
 pub fn whole(parts: Vec<Saved>) -> (Vec<u64>, Vec<u8>, Vec<u64>) {
-    let values = parts.iter().flat_map(|part| part.columns.concat());
+    let column = |k: usize| parts.iter().flat_map(move |part| &part.columns[k]);
+    let values = (0..parts[0].columns.len()).flat_map(column);
     let values = values.map(|value| value.to_bits()).collect();
     let bonds = parts
         .iter()
