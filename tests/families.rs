@@ -95,6 +95,9 @@ fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
         }
         simulation.check().unwrap();
         let snapshot = Snapshot::new(&mut simulation);
+        let families = Snapshot::without_energies(&mut simulation).stored;
+        assert_eq!(families.volume, snapshot.stored.volume);
+        assert_eq!(families.neighbours, snapshot.stored.neighbours);
         let values = fields.map(|field| snapshot.field(&mut simulation, field));
         (
             simulation.model.ids[..simulation.model.owned()].to_vec(),

@@ -149,7 +149,7 @@ fn survives_kills(name: &str, text: &str) {
     let whole = folder.join("whole");
     let begin = Instant::now();
     succeed(&mut run(2, &deck, &whole, &[]));
-    let duration = begin.elapsed();
+    let mut duration = begin.elapsed();
     let expected = datasets(&result(&whole));
     if text.contains("coarsen_after") {
         assert!(points_left(&expected), "no point has left");
@@ -181,6 +181,10 @@ fn survives_kills(name: &str, text: &str) {
             if killed < 3 && kill_after(command, ranks, duration.mul_f64(share)) {
                 killed += 1;
                 continue;
+            }
+            if killed == 0 {
+                // It is faster than the first one was, on a machine that had more to do then.
+                duration = duration.mul_f64(0.8);
             }
             if killed == 3 {
                 succeed(&mut run(ranks, &deck, &out, flags));

@@ -2,13 +2,13 @@
 
 use crate::cli::say;
 use fissure::comm::mpi;
-use fissure::lanes::instructions::{Instructions, NAMES};
+use fissure::lanes::instructions::{BUILT, Instructions};
 use fissure::output;
 
 /// Prints version, libraries and vector instructions.
 pub fn print() {
     let best = Instructions::of_this_machine();
-    let all = NAMES.join(", ");
+    let all = BUILT.join(", ");
     say!("fissure {}", fissure::version());
     say!("  MPI           {}", mpi::library());
     say!("  HDF5          {}", output::library());

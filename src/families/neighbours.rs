@@ -50,6 +50,7 @@ impl Neighbours {
     /// Adds a group.
     pub fn push(&mut self, indices: [u32; WIDTH]) {
         let first = indices.into_iter().fold(u32::MAX, u32::min);
+        assert!(first < IN_FULL, "too many points for one rank");
         let mut distances = [0; WIDTH];
         for (distance, index) in distances.iter_mut().zip(indices) {
             let Ok(short) = u16::try_from(index - first) else {

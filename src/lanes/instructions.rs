@@ -27,9 +27,12 @@ pub enum Instructions {
 /// The environment variable that names the most to use, for tests.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
-/// Names of the sets in the order of what they can.
-pub const NAMES: &[&str] = if cfg!(target_arch = "x86_64") {
-    &["baseline", "AVX2", "AVX-512"]
+/// Names of the sets in the order of what they can, as [`VARIABLE`] has them on all processors.
+const NAMES: [&str; 3] = ["baseline", "AVX2", "AVX-512"];
+
+/// Names of the sets that the program was built for, in that order.
+pub const BUILT: &[&str] = if cfg!(target_arch = "x86_64") {
+    &NAMES
 } else if cfg!(target_arch = "aarch64") {
     &["NEON"]
 } else {
@@ -86,7 +89,7 @@ impl Instructions {
 
     /// Its name, as a summary shows it.
     pub fn name(self) -> &'static str {
-        NAMES[self.level()]
+        BUILT[self.level()]
     }
 
     /// How a product and a sum are rounded, in a word: "fused", once, or "unfused", twice.
@@ -106,8 +109,7 @@ fn named(name: &str) -> Result<usize> {
     let short = |name: &str| name.replace('-', "").to_lowercase();
     let found = NAMES.iter().position(|known| short(known) == short(name));
     found.ok_or_else(|| {
-        let known: Vec<String> = NAMES.iter().map(|name| short(name)).collect();
-        let known = known.join(", ");
+        let known = NAMES.map(short).join(", ");
         Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
     })
 }
@@ -116,7 +118,6 @@ fn named(name: &str) -> Result<usize> {
 mod tests {
     use super::*;
 
-    #[cfg(target_arch = "x86_64")]
     #[test]
     fn names_of_the_variable() {
         assert_eq!(named("avx512").unwrap(), 2);

@@ -104,8 +104,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::share`] reads the stretch of bonds.
     const SUM_READS_STRETCH: bool = true;
 
-    /// Whether [`Self::share`] reads the direction of bonds, which those that only fill up a group do
-    /// not have.
+    /// Whether [`Self::share`] reads the direction or the length of bonds, which those that only fill up a group
+    /// do not have.
     const SUM_READS_DIRECTION: bool = false;
 
     /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.

@@ -174,7 +174,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let stages = plan.all_stages();
         let steps = choose_steps(plan, stable)?;
         let clock = Clock::new(steps[0].0, stages[0].time.end);
-        let family_volume = forces.left(&model).volume;
+        let family_volume = forces.intact_families(&model).volume;
         let cut = pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 

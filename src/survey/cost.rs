@@ -28,8 +28,8 @@ const MEBI: f64 = 1048576.0;
 /// Bytes a point, and a bond of a list, at the fullest moment of the set-up, where it is not measured.
 const SET_UP: [f64; 2] = [400.0, 10.5];
 
-/// Copies of a column on its way to the files: by point, by id, and half of it in messages.
-const COPIES: f64 = 2.5;
+/// Copies of a column on its way to the files: by point, by id, and what is in messages.
+const COPIES: f64 = 3.0;
 
 /// Memory of a process with points beside what it had without, bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -209,9 +209,11 @@ fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
     let bonds = counts.bonds;
     let offsets = counts.points * 24.0;
     let checkpoint = COPIES * bonds.max(counts.points * 8.0);
+    // Read whole, then dealt out.
+    let restart = counts.points * 8.0 * (counts.saved as f64 + COPIES) + 2.0 * bonds;
     Cost {
         set_up: counts.memory.peak,
-        time_loop: counts.memory.kept + output.max(checkpoint + offsets),
+        time_loop: counts.memory.kept + output.max(checkpoint.max(restart) + offsets),
         outputs,
         result: OVERHEAD + counts.points * written + 8.0 * rows * counts.columns,
         checkpoint: OVERHEAD + counts.points * saved + bonds,

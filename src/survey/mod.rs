@@ -219,8 +219,8 @@ fn probes<const D: usize>(
 
 fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<String>) {
     let few = FEW_NEIGHBOURS[D - 1];
-    let left = simulation.forces.left(&simulation.model);
-    let poor = left.neighbours.iter().filter(|count| **count < few);
+    let families = simulation.forces.intact_families(&simulation.model);
+    let poor = families.neighbours.iter().filter(|count| **count < few);
     let poor = total(simulation.comm, poor.count() as u64);
     if poor > 0 {
         warnings.push(format!(

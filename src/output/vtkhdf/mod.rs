@@ -268,7 +268,8 @@ impl<'a> ResultFile<'a> {
     }
 
     /// Adds one step: its time in s, its number and this rank's values of the moving fields, which `values` gives
-    /// one after the other, by their place in the order they were described. When this returns, the step survives the end of the process.
+    /// one after the other, by their place in the order they were described. When this returns, the step survives
+    /// the end of the process.
     ///
     /// # Errors
     /// A field's length is wrong, or the disc is full.

@@ -56,9 +56,9 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
 /// Sums the volume of the intact neighbours in each point's own family (m³), and their number as
 /// [`Stored`] does.
 #[derive(Clone, Copy)]
-pub struct Left;
+pub struct IntactFamilies;
 
-impl<const D: usize> Kernel<D> for Left {
+impl<const D: usize> Kernel<D> for IntactFamilies {
     type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];

@@ -43,7 +43,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
         let share = (self.law).share::<N>(&group.bond, group.own, &group.memory[0]);
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
-            // The stretch and direction of a bond that only fills up a group are not numbers.
+            // Length, stretch and direction of a bond that only fills up a group are not numbers.
             let share = if L::SUM_READS_STRETCH || L::SUM_READS_DIRECTION {
                 simd.keep(share.get(k), group.intact)
             } else {

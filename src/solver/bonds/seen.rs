@@ -79,9 +79,14 @@ impl<const D: usize> Forces<D> {
     }
 
     /// As [`Self::stored`] without the energies, which are most of the work.
-    pub fn left(&mut self, model: &Model<D>) -> Stored {
+    pub fn intact_families(&mut self, model: &Model<D>) -> Stored {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
-            sweep_all(&mut interaction.bonds, sums, &measures::Left, source);
+            sweep_all(
+                &mut interaction.bonds,
+                sums,
+                &measures::IntactFamilies,
+                source,
+            );
         });
         let [volume, neighbours] = columns.try_into().expect("two columns");
         Stored {

@@ -16,7 +16,7 @@ use super::relaxation::LoadStep;
 pub struct Saved {
     /// The components of all fields that are state.
     pub columns: Vec<Vec<f64>>,
-    /// Their bonds.
+    /// What is kept of the bonds.
     pub bonds: SavedBonds,
     /// What the run has come to, but for its points: the same on all ranks.
     pub progress: Vec<u64>,

@@ -29,9 +29,9 @@ impl Snapshot {
         Self { stored }
     }
 
-    /// As [`Self::new`], but for energies.
+    /// Without energies: neither for a row of the history nor for [`Field::StrainEnergyDensity`].
     pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        let stored = simulation.forces.left(&simulation.model);
+        let stored = simulation.forces.intact_families(&simulation.model);
         Self { stored }
     }
 
