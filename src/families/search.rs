@@ -250,7 +250,7 @@ mod tests {
                     let ids: Vec<u64> = all
                         .iter()
                         .filter(|there| there.id != here.id && there.block == block)
-                        .filter(|there| distance_squared(here.position, there.position) <= 1.0)
+                        .filter(|there| distance_squared(here.position, there.position) <= cutoff(1.0) * cutoff(1.0))
                         .map(|there| there.id)
                         .collect();
                     if !ids.is_empty() {

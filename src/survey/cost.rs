@@ -209,11 +209,11 @@ fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
     let bonds = counts.bonds;
     let offsets = counts.points * 24.0;
     let checkpoint = COPIES * bonds.max(counts.points * 8.0);
-    // Read whole, then dealt out.
-    let restart = counts.points * 8.0 * (counts.saved as f64 + COPIES) + 2.0 * bonds;
+    // Read whole; then the bonds are dealt out, whose lengths and places take two numbers more.
+    let restart = counts.points * 8.0 * (counts.saved as f64 + 2.0) + 2.0 * bonds;
     Cost {
         set_up: counts.memory.peak,
-        time_loop: counts.memory.kept + output.max(checkpoint.max(restart) + offsets),
+        time_loop: counts.memory.kept + output.max(checkpoint + offsets).max(restart),
         outputs,
         result: OVERHEAD + counts.points * written + 8.0 * rows * counts.columns,
         checkpoint: OVERHEAD + counts.points * saved + bonds,
