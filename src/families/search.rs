@@ -244,13 +244,14 @@ mod tests {
             });
             let mut found: Vec<_> = rows.into_iter().flatten().collect();
             found.sort();
+            let square = cutoff(1.0) * cutoff(1.0);
             let mut expected = Vec::new();
             for here in &all {
                 for block in 0..3 {
                     let ids: Vec<u64> = all
                         .iter()
                         .filter(|there| there.id != here.id && there.block == block)
-                        .filter(|there| distance_squared(here.position, there.position) <= cutoff(1.0) * cutoff(1.0))
+                        .filter(|there| distance_squared(here.position, there.position) <= square)
                         .map(|there| there.id)
                         .collect();
                     if !ids.is_empty() {
