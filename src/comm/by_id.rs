@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use bytemuck::Pod;
+use rayon::prelude::*;
 
 use super::Communicator;
 
@@ -42,16 +43,19 @@ impl IdOrder {
             outgoing[home].extend_from_slice(&id.to_ne_bytes());
         }
         let incoming = comm.all_to_all(outgoing);
-        let incoming = incoming.iter();
-        let incoming: Vec<Vec<u64>> = incoming
-            .map(|bytes| bytemuck::pod_collect_to_vec::<u8, u64>(bytes))
-            .collect();
-        let key = |id: u64| (id % coarsest, id / coarsest);
-        let mut sorted: Vec<(u64, u64)> = incoming.iter().flatten().map(|id| key(*id)).collect();
-        sorted.sort_unstable();
-        let row = |id: &u64| sorted.partition_point(|other| *other < key(*id)) as u32;
-        let rows = incoming.iter().map(|ids| ids.iter().map(row).collect());
-        let rows = rows.collect();
+        let mut sorted = Vec::new();
+        let mut rows = Vec::with_capacity(incoming.len());
+        for (bytes, rank) in incoming.iter().zip(0_u32..) {
+            let ids = bytemuck::pod_collect_to_vec::<u8, u64>(bytes);
+            let numbered = ids.iter().zip(0_u32..);
+            sorted.extend(numbered.map(|(id, k)| (id % coarsest, id / coarsest, rank, k)));
+            rows.push(vec![0; ids.len()]);
+        }
+        drop(incoming);
+        sorted.par_sort_unstable();
+        for ((_, _, rank, k), row) in sorted.iter().zip(0..) {
+            rows[*rank as usize][*k as usize] = row;
+        }
         let (first, _) = super::scan(comm, sorted.len() as u64);
         Self {
             first,
