@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::lanes::WIDTH;
 use crate::partition::Domain;
-use crate::points::Point;
 use crate::points::bins::Bins;
+use crate::points::{Point, distance_squared};
 
 use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
@@ -40,7 +40,8 @@ struct Order {
 }
 
 impl Order {
-    fn new(points: &[Point], blocks: usize, longest: f64) -> Self {
+    /// `cutoffs` has the longest bond (m) of each pair of blocks.
+    fn new(points: &[Point], blocks: usize, cutoffs: &[f64]) -> Self {
         let mut keys: Vec<(u32, u64, u32)> = points
             .iter()
             .zip(0..)
@@ -51,16 +52,32 @@ impl Order {
         let first: Vec<u32> = (0..=blocks as u32).map(before).collect();
         let local: Vec<u32> = keys.iter().map(|key| key.2).collect();
         drop(keys);
-        let bins = first.windows(2).map(|ends| {
-            let places = local[ends[0] as usize..ends[1] as usize].iter();
+        let bins = first.windows(2).enumerate().map(|(there, ends)| {
+            let cutoffs = cutoffs.iter().skip(there).step_by(blocks).copied();
+            // The points with the shortest bonds to this block are the most that look for them.
+            let shortest = cutoffs.filter(|cutoff| *cutoff > 0.0).reduce(f64::min);
+            let searched = &local[ends[0] as usize..ends[1] as usize];
+            let places = shortest.map_or(&[][..], |_| searched).iter();
             let positions: Vec<[f64; 3]> = places.map(|k| points[*k as usize].position).collect();
-            Bins::new(&positions, longest)
+            Bins::new(&positions, shortest.unwrap_or(f64::INFINITY))
         });
         Self {
             bins: bins.collect(),
             local,
             first,
         }
+    }
+
+    /// Another point of a block at the very place of one.
+    fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
+        let places = self.first[block] as usize..self.first[block + 1] as usize;
+        let points = self.local[places].iter().map(|k| *k as usize);
+        let position = domain.points[index].position;
+        let mut others = points
+            .filter(|other| *other != index)
+            .map(|k| domain.points[k]);
+        let other = others.find(|other| distance_squared(position, other.position) == 0.0);
+        other.unwrap_or(domain.points[index])
     }
 }
 
@@ -81,8 +98,7 @@ struct Chunk {
 /// # Errors
 /// When two points lie at the same place, or one has too many neighbours.
 pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>, Fault> {
-    let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-    let order = Order::new(&domain.points, blocks, longest);
+    let order = Order::new(&domain.points, blocks, cutoffs);
     let squares: Vec<f64> = cutoffs.iter().map(|cutoff| cutoff * cutoff).collect();
     let mut lists: Vec<BondList> = (0..blocks * blocks)
         .map(|pair| BondList {
@@ -138,21 +154,14 @@ impl Chunk {
                     continue;
                 }
                 let first = order.first[there];
-                let mut coincident = None;
                 self.places.clear();
-                order.bins[there].within(here.position, |place, squared| {
-                    let place = first + place;
-                    if squared == 0.0 {
-                        let other = order.local[place as usize] as usize;
-                        if other != index {
-                            coincident = Some(other);
-                        }
-                    } else if squared <= *square {
-                        self.places.push(place);
-                    }
-                });
-                if let Some(other) = coincident {
-                    return Err(Fault::SamePlace([*here, domain.points[other]]));
+                let bins = &order.bins[there];
+                let at_place = bins.collect(here.position, *square, &mut self.places);
+                if at_place > usize::from(there == here.block as usize) {
+                    return Err(Fault::SamePlace([
+                        *here,
+                        order.other_at(domain, there, index),
+                    ]));
                 }
                 neighbours += self.places.len();
                 if neighbours as f64 > MOST_NEIGHBOURS {
@@ -166,6 +175,7 @@ impl Chunk {
                     continue;
                 }
                 self.places.sort_unstable();
+                self.places.iter_mut().for_each(|place| *place += first);
                 let groups = self.places.len().div_ceil(WIDTH) as u32;
                 self.rows.push((index as u32, there as u32, groups));
                 for group in self.places.chunks(WIDTH) {
@@ -201,7 +211,6 @@ mod tests {
     use super::*;
     use crate::comm::threads;
     use crate::partition::distribute;
-    use crate::points::{Point, distance_squared};
     use proptest::prelude::*;
 
     proptest! {

@@ -15,7 +15,7 @@ pub struct Bins {
 }
 
 impl Bins {
-    /// Sorts positions (m) for searches up to `radius` (m).
+    /// Sorts positions (m) for searches mostly up to `radius` (m).
     pub fn new(positions: &[[f64; 3]], radius: f64) -> Self {
         let mut lower = [f64::INFINITY; 3];
         let mut upper = [f64::NEG_INFINITY; 3];
@@ -64,12 +64,54 @@ impl Bins {
 
     /// Calls `found` with the index and the squared distance (m²) of every point within the radius
     /// of a position, itself included if it is one of them.
-    pub fn within(&self, position: [f64; 3], mut found: impl FnMut(u32, f64)) {
+    pub fn within(&self, position: [f64; 3], found: impl FnMut(u32, f64)) {
+        self.for_each_within(position, self.radius_squared, found);
+    }
+
+    /// Appends the index of every point whose distance from a position is above 0 and has at most this square (m²),
+    /// and returns how many there are at the position itself.
+    pub fn collect(&self, position: [f64; 3], square: f64, found: &mut Vec<u32>) -> usize {
+        let mut here = 0;
+        self.for_each_run(position, square, |entries| {
+            let known = found.len();
+            found.resize(known + entries.len(), 0);
+            let mut end = known;
+            // Without a branch that the processor would have to guess.
+            for (index, other) in entries {
+                let squared = distance_squared(position, *other);
+                found[end] = *index;
+                end += usize::from(squared <= square && squared > 0.0);
+                here += usize::from(squared == 0.0);
+            }
+            found.truncate(end);
+        });
+        here
+    }
+
+    fn for_each_within(&self, position: [f64; 3], square: f64, mut found: impl FnMut(u32, f64)) {
+        self.for_each_run(position, square, |entries| {
+            for (index, other) in entries {
+                let squared = distance_squared(position, *other);
+                if squared <= square {
+                    found(*index, squared);
+                }
+            }
+        });
+    }
+
+    /// Calls `run` with points, one after the other in memory, among which are all whose distance from a position
+    /// has at most this square (m²).
+    fn for_each_run(
+        &self,
+        position: [f64; 3],
+        square: f64,
+        mut run: impl FnMut(&[(u32, [f64; 3])]),
+    ) {
         if self.entries.is_empty() {
             return;
         }
         // In units of a box. Beside a point exactly at the radius rounding must not matter.
-        let radius_squared = self.radius_squared * (self.inverse_edge * self.inverse_edge);
+        let radius_squared = square * (self.inverse_edge * self.inverse_edge);
         let radius_squared = radius_squared * (1.0 + 1e-6);
         let centre: [f64; 3] =
             std::array::from_fn(|k| (position[k] - self.lower[k]) * self.inverse_edge);
@@ -92,15 +134,10 @@ impl Bins {
                 if xs.is_empty() {
                     continue;
                 }
-                // Boxes along x are adjacent in memory: one run.
+                // Boxes along x are adjacent in memory.
                 let first = self.starts[self.index([*xs.start(), y, z])] as usize;
                 let last = self.starts[self.index([*xs.end(), y, z]) + 1] as usize;
-                for (index, other) in &self.entries[first..last] {
-                    let squared = distance_squared(position, *other);
-                    if squared <= self.radius_squared {
-                        found(*index, squared);
-                    }
-                }
+                run(&self.entries[first..last]);
             }
         }
     }
@@ -141,7 +178,18 @@ mod tests {
                 let expected: Vec<usize> = (0..positions.len())
                     .filter(|k| distance_squared(*here, positions[*k]) <= radius * radius)
                     .collect();
-                prop_assert_eq!(found, expected);
+                prop_assert_eq!(&found, &expected);
+                // With another radius, and without what lies at the position.
+                let square = (0.3 * radius).powi(2);
+                let mut found = Vec::new();
+                let at_position = bins.collect(*here, square, &mut found);
+                found.sort_unstable();
+                let near = |k: &u32| distance_squared(*here, positions[*k as usize]);
+                let all = 0..positions.len() as u32;
+                let expected: Vec<u32> =
+                    all.clone().filter(|k| near(k) > 0.0 && near(k) <= square).collect();
+                prop_assert_eq!(&found, &expected);
+                prop_assert_eq!(at_position, all.filter(|k| near(k) == 0.0).count());
             }
         }
     }
