@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::comm::{Communicator, agree, all_gather_many};
-use crate::deck::plan::{Block, Kind, Plan, PreCrack, Refinement};
+use crate::deck::plan::{Kind, Plan, PreCrack, Refinement};
 use crate::error::Result;
 use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
 
+use super::packed::{AtCoarser, PlaceSet};
 use super::pattern::{Node, Pattern};
 use super::place::{Place, born, numbered, parents};
 
@@ -281,54 +284,99 @@ impl<'a> Grids<'a> {
     /// The points in the cells of `coarse`, points of level 0 as they are without refinement: those with
     /// the volume and the block that they have with it, and those of finer levels.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
-        if self.bodies.is_empty() {
+        let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
+            let grid = grid.as_ref()?;
+            let interfaces = self.interfaces(body, &grid.pattern);
+            Some((grid, grid.pattern.changed(), interfaces))
+        });
+        let bodies: Vec<_> = bodies.collect();
+        if bodies.is_empty() {
             return coarse;
         }
-        let mut finer = Vec::new();
-        for point in &mut coarse {
+        let refine = |point: &mut Point| {
             let body = point.block as usize;
-            let Some(grid) = &self.bodies[body] else {
-                continue;
-            };
+            let (grid, changed, interfaces) = bodies[body].as_ref()?;
             let cell = grid.cells.cell_at(point.position);
+            if !changed.contains(cell) {
+                return None;
+            }
             let origin = cell.map(|x| x << self.finest);
             let cell_volume = point.volume;
+            let block = |place, node: &Node| self.block(body, interfaces, grid, place, node);
+            let mut finer = Vec::new();
             if grid.pattern.touches(cell) {
                 for part in 1..1_u64 << (self.finest as usize * self.plan.dimension.count()) {
                     let place = numbered(origin, self.finest, part);
                     if let Some(node) = grid.node(place) {
                         let id = point.id + self.coarsest * part;
-                        let block = self.block(body, grid, place, &node);
+                        let block = block(place, &node);
                         let place = grid.position(self.finest, place);
                         finer.push(Point::new(id, place, cell_volume * node.share, block));
                     }
                 }
             }
-            if grid.pattern.changes(cell)
-                && let Some(node) = grid.node(origin)
-            {
+            if let Some(node) = grid.node(origin) {
                 point.volume = cell_volume * node.share;
-                point.block = self.block(body, grid, origin, &node) as u32;
+                point.block = block(origin, &node) as u32;
             }
-        }
-        coarse.extend(finer);
+            Some(finer)
+        };
+        let finer: Vec<Vec<Point>> = coarse.par_iter_mut().filter_map(refine).collect();
+        coarse.extend(finer.into_iter().flatten());
         coarse
     }
 
-    fn block(&self, body: usize, grid: &BodyGrid, place: Place, node: &Node) -> usize {
-        let number = |kind| self.plan.block_number(body, node.level, kind);
-        let block = self.plan.block(number(Kind::Whole));
-        // Where no horizon is enlarged they can share a lattice with the others.
+    /// Which nodes of each level from 1 on have coarser ones within their horizon; none where horizons are not
+    /// enlarged for it.
+    fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
-        let at_coarser = self.plan.refinement.as_ref().is_some_and(is_enlarged)
-            && grid.is_at_coarser(block, place);
-        number(if at_coarser {
+        if !self.plan.refinement.as_ref().is_some_and(is_enlarged) {
+            // They can share a lattice with the others.
+            return Vec::new();
+        }
+        let of_level = |level| {
+            let number = self.plan.block_number(body, level, Kind::Whole);
+            let block = self.plan.block(number);
+            let edges = block.spacing()?;
+            Some(AtCoarser::new(pattern, level, edges, cutoff(block.horizon)))
+        };
+        (1..=self.finest).filter_map(of_level).collect()
+    }
+
+    fn block(
+        &self,
+        body: usize,
+        interfaces: &[AtCoarser],
+        grid: &BodyGrid,
+        place: Place,
+        node: &Node,
+    ) -> usize {
+        let cells = &grid.cells;
+        let at_coarser = node.level.checked_sub(1).is_some_and(|k| {
+            let place = place.map(|x| x >> (self.finest - node.level));
+            let interface = interfaces.get(k as usize);
+            interface.is_some_and(|nodes| nodes.has(&|cell| cells.has_cell(cell), place))
+        });
+        let kind = if at_coarser {
             Kind::AtCoarser
         } else if node.whole {
             Kind::Whole
         } else {
             Kind::Partial
-        })
+        };
+        self.plan.block_number(body, node.level, kind)
+    }
+
+    /// Which cells of a body hold points that are other than without refinement, or nodes that are next to them;
+    /// none for a body that is not given as a shape.
+    pub fn changed(&self, body: usize) -> Option<PlaceSet> {
+        let grid = self.bodies.get(body)?.as_ref()?;
+        Some(grid.pattern.changed())
+    }
+
+    /// The cell of level 0 that a place of a body, in steps of the finest level, lies in.
+    pub fn cell_of(&self, place: Place) -> Place {
+        place.map(|x| x >> self.finest)
     }
 }
 
@@ -336,18 +384,6 @@ impl BodyGrid<'_> {
     fn node(&self, place: Place) -> Option<Node> {
         let cells = &self.cells;
         self.pattern.node(&|cell| cells.has_cell(cell), place)
-    }
-
-    /// Whether a node, given in steps of the finest level, is within the horizon of coarser ones; `block` is
-    /// that of its level.
-    fn is_at_coarser(&self, block: Block, place: Place) -> bool {
-        let (Some(edges), cells) = (block.spacing(), &self.cells) else {
-            return false;
-        };
-        let body = |cell| cells.has_cell(cell);
-        let reach = cutoff(block.horizon);
-        let node = (block.level, place);
-        self.pattern.is_at_coarser(&body, node, edges, reach)
     }
 
     /// Reference position (m) of a place in steps of a level.

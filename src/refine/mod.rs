@@ -7,11 +7,13 @@
 //! from the cells of the body alone, so they are the same on any number of ranks.
 
 mod grids;
+mod packed;
 mod pattern;
 mod place;
 mod shares;
 
 pub use grids::{Grids, Pick};
+pub use packed::PlaceSet;
 pub use pattern::{Node, Pattern};
 pub use place::Place;
 pub use shares::Shares;

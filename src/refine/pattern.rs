@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
+use super::packed::PlaceSet;
 use super::place::{Place, around, between, born, halves, parents};
 
 /// A node of a refined grid.
@@ -144,15 +145,17 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// Whether a node of level 0 may be other than without refinement.
-    pub fn changes(&self, cell: Place) -> bool {
-        let Some(refined) = self.refined.first() else {
-            return false;
-        };
+    /// The nodes of level 0 that may be other than without refinement, and whose cells, lower sides included, may
+    /// hold finer nodes.
+    pub fn changed(&self) -> PlaceSet {
         let step = |k: usize| i64::from(k < self.dimension);
-        let low = std::array::from_fn(|k| cell[k] - step(k));
-        let high = std::array::from_fn(|k| cell[k] + step(k));
-        !refined.is_empty() && between(low, high).any(|other| refined.contains(&other))
+        let mut changed = PlaceSet::default();
+        for cell in self.refined.iter().take(1).flatten() {
+            let low = std::array::from_fn(|k| cell[k] - step(k));
+            let high = std::array::from_fn(|k| cell[k] + step(k));
+            between(low, high).for_each(|other| changed.insert(other));
+        }
+        changed
     }
 
     /// What the node at a place is, in steps of the finest level; none if there is no node.
@@ -198,41 +201,14 @@ impl Pattern {
         })
     }
 
-    /// Whether a node lies next to coarser ones: whether there is no node, but could be one, at any place of
-    /// its level's grid that is at most `reach` away. The node is given in steps of the finest level, `edges`
-    /// and `reach` in the same unit of length.
-    pub fn is_at_coarser(
-        &self,
-        body: &impl Fn(Place) -> bool,
-        (level, place): (u32, Place),
-        edges: [f64; 3],
-        reach: f64,
-    ) -> bool {
-        if level == 0 {
-            return false;
-        }
-        let here = place.map(|x| x >> (self.finest() - level));
-        let steps = |k: usize| {
-            if k < self.dimension {
-                (reach / edges[k]).floor() as i64
-            } else {
-                0
-            }
-        };
-        let low = std::array::from_fn(|k| -steps(k));
-        let high = std::array::from_fn(steps);
-        between(low, high).any(|offset| {
-            let square: f64 = (0..3).map(|k| (offset[k] as f64 * edges[k]).powi(2)).sum();
-            let other = std::array::from_fn(|k| here[k] + offset[k]);
-            square <= reach * reach
-                && !self.is_taken(level, other)
-                && self.is_possible(body, level, other)
-        })
-    }
-
     /// Whether there could be a node at a place, in steps of a level's spacing: whether the nodes of level 0
     /// around it are the body's, and no crack has parted those between which it would be born, or these.
-    fn is_possible(&self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
+    pub(super) fn is_possible(
+        &self,
+        body: &impl Fn(Place) -> bool,
+        level: u32,
+        place: Place,
+    ) -> bool {
         if self.parted.is_empty() {
             let low = place.map(|x| x >> level);
             let high = place.map(|x| (x + (1 << level) - 1) >> level);
@@ -279,6 +255,7 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
+    use super::super::packed::AtCoarser;
     use super::*;
     use proptest::prelude::*;
 
@@ -323,9 +300,12 @@ mod tests {
         assert_eq!((node.level, node.whole), (1, false));
         let inner = pattern.node(&body, [4, 8, 0]).unwrap();
         assert_eq!((inner.level, inner.whole), (0, false));
-        let at_coarser = |x, reach| pattern.is_at_coarser(&body, (1, [x, 8, 0]), [0.5; 3], reach);
+        let at_coarser = |x, reach| {
+            let at_coarser = AtCoarser::new(&pattern, 1, [0.5; 3], reach);
+            at_coarser.has(&body, [x, 4, 0])
+        };
         assert!(!at_coarser(0, 0.5) && at_coarser(0, 1.2));
-        assert!(!at_coarser(2, 0.5) && at_coarser(2, 0.75));
+        assert!(!at_coarser(1, 0.5) && at_coarser(1, 0.75));
     }
 
     /// Refined at random, some nodes twice or three times over, with places where nothing is born.

@@ -106,9 +106,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
             return Ok(None);
         }
         let facets = Facets::new(self);
-        grids.part(&self.grids, &|a, b| {
-            facets.lie_between(&facets.near(a), a, b)
-        });
+        if !facets.are_none() {
+            grids.part(&self.grids, &|a, b| {
+                facets.lie_between(&facets.near(a), a, b)
+            });
+        }
         let (energy, bonds) = self.held(&snapshot);
         let before = self.model.total;
         self.regrid(grids, &left, &facets)?;

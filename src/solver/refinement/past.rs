@@ -16,7 +16,7 @@ pub struct Past {
     pub columns: Vec<Vec<f64>>,
     /// What new points have of each.
     births: Vec<Birth>,
-    /// Local index by body and place, in steps of the finest level.
+    /// Local index by body and place, in steps of the finest level, of points where a grid is refined.
     at: FxHashMap<(usize, Place), usize>,
     /// Which local points leave.
     leaves: Vec<bool>,
@@ -52,11 +52,19 @@ impl Past {
             column.resize(local, 0.0);
             simulation.forces.bring(comm, column);
         }
+        // New points and those that leave lie between points where one of the grids is refined.
+        let bodies = 0..plan.bodies.len();
+        let changed =
+            bodies.map(|body| [grids, &simulation.grids].map(|grids| grids.changed(body)));
+        let changed: Vec<_> = changed.collect();
         let blocks = &columns[columns.len() - 1];
         let place = |point: usize| {
             let body = plan.body_of(blocks[point] as usize);
             let place = grids.place_at(body, simulation.model.position(point))?;
-            Some(((body, place), point))
+            let cell = grids.cell_of(place);
+            let mut changed = changed[body].iter().flatten();
+            let is_near = changed.any(|cells| cells.contains(cell));
+            is_near.then_some(((body, place), point))
         };
         let at = (0..local).filter_map(place).collect();
         let mut past = Self {
@@ -157,41 +165,38 @@ impl Past {
             ids.push(model.ids[point]);
             rows.extend(self.columns.iter().map(|column| column[point]));
         }
-        let mut born = FxHashMap::default();
-        for piece in pieces {
+        let mut born = Born::default();
+        for piece in pieces.iter().filter(|piece| piece.id >= model.coarsest) {
             let body = simulation.plan.body_of(piece.block as usize);
             let Some(place) = grids.place_at(body, piece.position) else {
                 continue;
             };
             if !self.at.contains_key(&(body, place)) {
                 ids.push(piece.id);
-                rows.extend(self.row(grids, body, place, &mut born));
+                let row = self.row(grids, (body, place), &mut born);
+                rows.extend_from_slice(&born.rows[row..row + self.columns.len()]);
             }
         }
         (ids, rows)
     }
 
-    /// The row of a place: of the point there, or the mean of those that it lies between.
-    fn row(
-        &self,
-        grids: &Grids<'_>,
-        body: usize,
-        place: Place,
-        born: &mut FxHashMap<(usize, Place), Vec<f64>>,
-    ) -> Vec<f64> {
-        if let Some(point) = self.at.get(&(body, place)) {
-            return self.columns.iter().map(|column| column[*point]).collect();
-        }
-        if let Some(row) = born.get(&(body, place)) {
-            return row.clone();
+    /// Where the row of a new point starts: the mean of those that it lies between.
+    fn row(&self, grids: &Grids<'_>, (body, place): (usize, Place), born: &mut Born) -> usize {
+        if let Some(row) = born.at.get(&(body, place)) {
+            return *row;
         }
         let mut row = vec![0.0; self.columns.len()];
         let parents = grids.parents(place);
         for parent in &parents {
-            let theirs = self.row(grids, body, *parent, born);
-            row.iter_mut()
-                .zip(theirs)
-                .for_each(|(sum, value)| *sum += value);
+            let parent = (body, *parent);
+            if let Some(point) = self.at.get(&parent) {
+                let columns = row.iter_mut().zip(&self.columns);
+                columns.for_each(|(sum, column)| *sum += column[*point]);
+            } else {
+                let start = self.row(grids, parent, born);
+                let values = row.iter_mut().zip(&born.rows[start..]);
+                values.for_each(|(sum, value)| *sum += value);
+            }
         }
         for (value, birth) in row.iter_mut().zip(&self.births) {
             *value = match birth {
@@ -200,7 +205,17 @@ impl Past {
             };
         }
         *row.last_mut().expect("the block") = NOWHERE;
-        born.insert((body, place), row.clone());
-        row
+        let start = born.rows.len();
+        born.rows.extend(row);
+        born.at.insert((body, place), start);
+        start
     }
+}
+
+/// The rows of new points.
+#[derive(Default)]
+struct Born {
+    /// Where the row starts, by body and place.
+    at: FxHashMap<(usize, Place), usize>,
+    rows: Vec<f64>,
 }
