@@ -88,11 +88,7 @@ impl BondLattice {
             own_volume: volume(here),
             offsets,
             weighted: [false; 2],
-            vectors: if none {
-                Vec::new()
-            } else {
-                vectors(&grid, domain.owned)
-            },
+            vectors: if none { Vec::new() } else { vectors(&grid, domain.owned) },
             around,
             shifts,
             store: Store::default(),
@@ -215,7 +211,8 @@ impl BondLattice {
         }
     }
 
-    /// As [`super::BondList::weigh`], where `weight` is that of an offset ξ (m).
+    /// Sets what volumes are multiplied by in the sums of one end, 0 the own, 1 the far one: `weight` of an
+    /// offset ξ (m).
     pub fn weigh(&mut self, end: usize, weight: impl Fn([f64; 3]) -> f64) {
         for offset in &mut self.offsets {
             offset.weights[end] = weight(offset.reference);
@@ -230,8 +227,14 @@ impl BondLattice {
     /// of both ends.
     fn for_each(&self, mut found: impl FnMut(usize, usize, [usize; 2])) {
         for k in 0..self.vectors.len() {
-            self.for_each_of(&self.store.intact, k, &mut found);
+            self.for_each_of(self.intact(k), k, &mut found);
         }
+    }
+
+    /// The bits of a vector's intact bonds.
+    fn intact(&self, vector: usize) -> &[u8] {
+        let count = self.offsets.len();
+        &self.store.intact[vector * count..(vector + 1) * count]
     }
 
     /// As [`Self::for_each`], of the bonds of one vector whose bits are given.
@@ -244,16 +247,15 @@ impl BondLattice {
         let first = vector * self.offsets.len();
         let vector = &self.vectors[vector];
         let shifts = &self.shifts[vector.line as usize * self.around.len()..];
-        for (o, offset) in self.offsets.iter().enumerate() {
-            let byte = first + o;
-            let mut bits = bits[byte];
+        for (o, (offset, bits)) in self.offsets.iter().zip(bits).enumerate() {
+            let mut bits = *bits;
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let shift = shifts[offset.line as usize] + offset.x;
                 let place = vector.place as i64 + i64::from(shift) + lane as i64;
                 let there = self.grid.points[place as usize] as usize;
-                found(byte, lane, [vector.point as usize + lane, there]);
+                found(first + o, lane, [vector.point as usize + lane, there]);
             }
         }
     }
@@ -280,7 +282,7 @@ impl BondLattice {
     /// See [`super::BlockBonds::for_each_neighbour`].
     pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
         if let Some(vector) = self.vector_of(point) {
-            self.for_each_of(&self.store.intact, vector, &mut |_, _, [here, there]| {
+            self.for_each_of(self.intact(vector), vector, &mut |_, _, [here, there]| {
                 if here == point {
                     found(there);
                 }
@@ -304,7 +306,7 @@ impl BondLattice {
         let mut gone = Vec::new();
         for k in 0..self.vectors.len() {
             if self.points_of(k).any(&concerned) {
-                self.for_each_of(&self.store.intact, k, &mut |byte, lane, [here, there]| {
+                self.for_each_of(self.intact(k), k, &mut |byte, lane, [here, there]| {
                     if concerned(here) && cut(here, there) {
                         gone.push((byte, lane));
                     }
@@ -323,11 +325,16 @@ impl BondLattice {
 
     /// Calls `found` with the local indices of both ends of every broken bond.
     pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
-        let mut broken = self.whole();
-        for (bits, intact) in broken.iter_mut().zip(&self.store.intact) {
-            *bits &= !intact;
-        }
-        for k in 0..self.vectors.len() {
+        let mut broken = vec![0; self.offsets.len()];
+        for (k, vector) in self.vectors.iter().enumerate() {
+            let intact = self.intact(k);
+            if intact.iter().all(|bits| *bits == u8::MAX) {
+                continue;
+            }
+            self.family(vector, &mut broken);
+            for (bits, intact) in broken.iter_mut().zip(intact) {
+                *bits &= !intact;
+            }
             self.for_each_of(&broken, k, &mut |_, _, [here, there]| found(here, there));
         }
     }

@@ -110,35 +110,49 @@ impl BondList {
         }
     }
 
-    /// Sets what volumes are multiplied by in the sums of one end, 0 the own, 1 the far one: `weight`
-    /// of the two local indices.
-    pub fn weigh(&mut self, end: usize, weight: impl Fn(usize, usize) -> f64 + Sync) {
-        let mut weights = vec![Lanes::splat(0.0); self.neighbours.len()];
-        let mut rest = &mut weights[..];
+    /// Sets what volumes are multiplied by in the sums of the first `ends` ends, 0 the own, 1 the far one: `weight`
+    /// of an end and of ξ (m), which `offset` has of the two local indices.
+    pub fn weigh(
+        &mut self,
+        ends: usize,
+        offset: impl Fn(usize, usize) -> [f64; 3] + Sync,
+        weight: impl Fn(usize, [f64; 3]) -> f64 + Sync,
+    ) {
+        let none =
+            |end| vec![Lanes::splat(0.0); if end < ends { self.neighbours.len() } else { 0 }];
+        let mut all = [none(0), none(1)];
+        let mut rest = all.each_mut().map(Vec::as_mut_slice);
         let mut tasks = Vec::new();
         for first in (0..self.points.len()).step_by(CHUNK) {
             let rows = first..(first + CHUNK).min(self.points.len());
             let groups = self.starts[rows.end] - self.starts[rows.start];
-            let (weights, others) = std::mem::take(&mut rest).split_at_mut(groups);
-            rest = others;
-            tasks.push((rows, weights));
+            let own = rest.each_mut().map(|rest| {
+                let groups = groups.min(rest.len());
+                rest.split_off_mut(..groups).unwrap_or_default()
+            });
+            tasks.push((rows, own));
         }
-        tasks.into_par_iter().for_each(|(rows, weights)| {
-            let mut weights = weights.iter_mut();
+        tasks.into_par_iter().for_each(|(rows, mut weights)| {
+            let first = self.starts[rows.start];
             for row in rows {
                 let own = self.points[row];
-                let groups = self.starts[row]..self.starts[row + 1];
-                for (group, weights) in groups.zip(weights.by_ref()) {
-                    for (there, value) in self.neighbours.indices(group).iter().zip(&mut weights.0)
-                    {
-                        if *there != own {
-                            *value = weight(own as usize, *there as usize);
+                for group in self.starts[row]..self.starts[row + 1] {
+                    let neighbours = self.neighbours.indices(group);
+                    for (lane, there) in neighbours.iter().enumerate() {
+                        if *there == own {
+                            continue;
+                        }
+                        let offset = offset(own as usize, *there as usize);
+                        for (end, weights) in weights.iter_mut().enumerate().take(ends) {
+                            weights[group - first].0[lane] = weight(end, offset);
                         }
                     }
                 }
             }
         });
-        self.weights[end] = Some(weights);
+        for (kept, weights) in self.weights.iter_mut().zip(all).take(ends) {
+            *kept = Some(weights);
+        }
     }
 
     /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
@@ -205,7 +219,8 @@ impl BondList {
     pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
         for row in 0..self.points.len() {
             let own = self.points[row];
-            for group in self.starts[row]..self.starts[row + 1] {
+            let groups = self.starts[row]..self.starts[row + 1];
+            for group in groups.filter(|group| self.store.intact[*group] != u8::MAX) {
                 for (k, there) in self.neighbours.indices(group).iter().enumerate() {
                     if *there != own && self.store.intact[group] >> k & 1 == 0 {
                         found(own as usize, *there as usize);

@@ -299,13 +299,18 @@ fn weigh<const D: usize>(plan: &Plan, model: &Model<D>, bonds: &mut BlockBonds, 
     // The far end of bonds within a block has the same weights.
     let [here, there] = bonds.blocks();
     let count = if here == there { 1 } else { 2 };
-    for (k, end) in ends.iter().enumerate().take(count) {
-        match bonds {
-            BlockBonds::Lattice(lattice) => lattice.weigh(k, |offset| end.weight(offset)),
-            BlockBonds::List(list) => list.weigh(k, |here, there| {
+    match bonds {
+        BlockBonds::Lattice(lattice) => {
+            for (k, end) in ends.iter().enumerate().take(count) {
+                lattice.weigh(k, |offset| end.weight(offset));
+            }
+        }
+        BlockBonds::List(list) => {
+            let offset = |here: usize, there: usize| {
                 let [a, b] = [here, there].map(|point| model.position(point));
-                end.weight(std::array::from_fn(|k| b[k] - a[k]))
-            }),
+                std::array::from_fn(|k| b[k] - a[k])
+            };
+            list.weigh(count, offset, |k, offset| ends[k].weight(offset));
         }
     }
 }
