@@ -68,8 +68,6 @@ pub struct Grid {
     /// The grid.
     pub frame: GridFrame,
     pub(super) lines: Vec<Line>,
-    /// Local index of the point in each place.
-    pub(super) points: Vec<u32>,
     /// Block of the point in each place, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
     /// Owned points and ghosts, and where each chunk's runs start.
@@ -157,7 +155,6 @@ impl Grid {
         Ok(Self {
             frame,
             lines,
-            points,
             blocks,
             runs,
             by_line,
@@ -166,7 +163,26 @@ impl Grid {
 
     /// Number of places, those before and after all lines included.
     pub fn places(&self) -> usize {
-        self.points.len()
+        self.blocks.len()
+    }
+
+    /// The places of the owned points with their local indices, in the order of places.
+    pub(super) fn owned(&self) -> impl Iterator<Item = (usize, u32)> {
+        let (runs, _) = &self.runs[0];
+        runs.iter()
+            .flat_map(|run| (0..run.length).map(|k| ((run.place + k) as usize, run.point + k)))
+    }
+
+    /// Finds which points places have.
+    pub(super) fn lookup(&self) -> Lookup<'_> {
+        Lookup {
+            grid: self,
+            last: Run {
+                place: 0,
+                point: 0,
+                length: 0,
+            },
+        }
     }
 
     /// The line in this band with this y and z, if there is one.
@@ -200,10 +216,37 @@ impl Grid {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         let runs: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
-        self.points.len() * (4 + 2)
+        self.blocks.len() * 2
             + size_of_val(&self.lines[..])
             + runs * size_of::<Run>()
             + self.by_line.capacity() * 24
+    }
+}
+
+/// Finds the local indices of the points at places, those of places near one another fastest.
+pub(super) struct Lookup<'a> {
+    grid: &'a Grid,
+    last: Run,
+}
+
+impl Lookup<'_> {
+    /// The local index of the point at a place that has one.
+    pub(super) fn point(&mut self, place: usize) -> usize {
+        let place = place as u32;
+        let has = |run: &Run| (run.place..run.place + run.length).contains(&place);
+        if !has(&self.last) {
+            let chunk = place as usize / CHUNK;
+            let last = |(runs, starts): &(Vec<Run>, Vec<u32>)| {
+                let runs = &runs[starts[chunk] as usize..starts[chunk + 1] as usize];
+                let before = runs
+                    .partition_point(|run| run.place <= place)
+                    .checked_sub(1)?;
+                Some(runs[before]).filter(has)
+            };
+            let run = self.grid.runs.iter().find_map(last);
+            self.last = run.expect("the place has a point");
+        }
+        (self.last.point + (place - self.last.place)) as usize
     }
 }
 

@@ -88,7 +88,7 @@ impl BondLattice {
             own_volume: volume(here),
             offsets,
             weighted: [false; 2],
-            vectors: if none { Vec::new() } else { vectors(&grid, domain.owned) },
+            vectors: if none { Vec::new() } else { vectors(&grid) },
             around,
             shifts,
             store: Store::default(),
@@ -247,6 +247,7 @@ impl BondLattice {
         let first = vector * self.offsets.len();
         let vector = &self.vectors[vector];
         let shifts = &self.shifts[vector.line as usize * self.around.len()..];
+        let mut lookup = self.grid.lookup();
         for (o, (offset, bits)) in self.offsets.iter().zip(bits).enumerate() {
             let mut bits = *bits;
             while bits != 0 {
@@ -254,7 +255,7 @@ impl BondLattice {
                 bits &= bits - 1;
                 let shift = shifts[offset.line as usize] + offset.x;
                 let place = vector.place as i64 + i64::from(shift) + lane as i64;
-                let there = self.grid.points[place as usize] as usize;
+                let there = lookup.point(place as usize);
                 found(first + o, lane, [vector.point as usize + lane, there]);
             }
         }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::lanes::WIDTH;
 
-use super::grid::{Grid, HOLE};
+use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
@@ -56,35 +56,34 @@ pub(super) struct Shared<'a> {
 }
 
 /// The vectors of a grid by local index; all their points are members.
-pub(super) fn vectors(grid: &Grid, owned: usize) -> Vec<Vector> {
-    let mut vectors = Vec::new();
-    for (line, index) in grid.lines.iter().zip(0..) {
-        let mut open: Option<(Vector, u32)> = None;
-        for place in line.start..line.start + line.length {
-            let point = grid.points[place];
-            if grid.blocks[place] == HOLE || point as usize >= owned {
-                vectors.extend(open.take().map(|(vector, _)| vector));
-                continue;
+pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
+    let mut vectors: Vec<Vector> = Vec::new();
+    let mut line = 0;
+    let mut length = 0;
+    for (place, point) in grid.owned() {
+        while place >= grid.lines[line].start + grid.lines[line].length {
+            line += 1;
+        }
+        match vectors.last_mut() {
+            Some(vector)
+                if (length as usize) < WIDTH
+                    && vector.line as usize == line
+                    && vector.place + length == place as u32
+                    && vector.point + length == point =>
+            {
+                vector.members |= 1 << length;
+                length += 1;
             }
-            match &mut open {
-                Some((vector, length))
-                    if (*length as usize) < WIDTH && vector.point + *length == point =>
-                {
-                    vector.members |= 1 << *length;
-                    *length += 1;
-                }
-                _ => {
-                    let first = Vector {
-                        place: place as u32,
-                        point,
-                        line: index,
-                        members: 1,
-                    };
-                    vectors.extend(open.replace((first, 1)).map(|(vector, _)| vector));
-                }
+            _ => {
+                length = 1;
+                vectors.push(Vector {
+                    place: place as u32,
+                    point,
+                    line: line as u32,
+                    members: 1,
+                });
             }
         }
-        vectors.extend(open.map(|(vector, _)| vector));
     }
     vectors.sort_unstable_by_key(|vector| vector.point);
     vectors

@@ -41,7 +41,7 @@ impl EnergyWatch {
         let (plan, model) = (simulation.plan, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
         let mut stiffness = [ExactSum::ZERO];
-        for (volume, block) in model.volume[..model.owned()].iter().zip(&model.block) {
+        for (volume, block) in model.volume.iter().zip(&model.block) {
             let material = &plan.block(usize::from(*block)).body.material;
             stiffness[0].add(material.elastic.youngs_modulus * volume);
         }

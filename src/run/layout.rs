@@ -48,10 +48,11 @@ impl<'a> Layout<'a> {
         };
         let ids = pick(kept, order.collect(comm, &model.ids[..owned], 1), 1);
         let (first, total) = comm::scan(comm, ids.len() as u64);
+        let volumes: Vec<f64> = model.volume.iter().take(owned).collect();
         Self {
             places: pick(kept, order.collect(comm, &places, 3), 3),
             blocks: pick(kept, order.collect(comm, &blocks, 1), 1),
-            volumes: pick(kept, order.collect(comm, &model.volume[..owned], 1), 1),
+            volumes: pick(kept, order.collect(comm, &volumes, 1), 1),
             ids,
             levels: levels.map(|levels| pick(kept, order.collect(comm, &levels, 1), 1)),
             changing: simulation.may_refine(),

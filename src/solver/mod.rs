@@ -9,6 +9,7 @@ pub mod motion;
 pub mod observers;
 pub mod refinement;
 pub mod repartition;
+pub mod repeated;
 pub mod simulation;
 pub mod size;
 mod stages;

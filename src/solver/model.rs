@@ -3,12 +3,14 @@
 use crate::deck::plan::Plan;
 use crate::partition::Domain;
 
+use super::repeated::Repeated;
+
 /// The local points by component, and the constants of the blocks.
 pub struct Model<const D: usize> {
     /// Reference positions by component, m; owned points, then ghosts.
     pub reference: [Vec<f64>; D],
     /// Volumes, m³; owned points, then ghosts.
-    pub volume: Vec<f64>,
+    pub volume: Repeated,
     /// Block of each owned point.
     pub block: Vec<u16>,
     /// Global ids; owned points, then ghosts.
@@ -37,7 +39,7 @@ impl<const D: usize> Model<D> {
                     .map(|point| point.position[d])
                     .collect()
             }),
-            volume: domain.points.iter().map(|point| point.volume).collect(),
+            volume: Repeated::new(domain.points.iter().map(|point| point.volume).collect()),
             block: owned.iter().map(|point| point.block as u16).collect(),
             ids: domain.points.iter().map(|point| point.id).collect(),
             density: plan
@@ -59,7 +61,7 @@ impl<const D: usize> Model<D> {
     pub fn empty() -> Self {
         Self {
             reference: std::array::from_fn(|_| Vec::new()),
-            volume: Vec::new(),
+            volume: Repeated::new(Vec::new()),
             block: Vec::new(),
             ids: Vec::new(),
             density: Vec::new(),

@@ -22,6 +22,7 @@ use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::{Clock, Fields, Kept, verlet};
 use super::refinement::{self, Refined};
+use super::repeated::Repeated;
 use super::size;
 use super::steps::choose_steps;
 
@@ -52,7 +53,7 @@ pub struct Simulation<'a, const D: usize> {
     /// Step (s) of each stage, and how many of them it takes.
     pub(super) steps: Vec<(f64, f64)>,
     /// Volume of each owned point's whole family, broken bonds included, m³.
-    pub family_volume: Vec<f64>,
+    pub family_volume: Repeated,
     /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
     pub cut: Vec<u64>,
     /// Bonds of the owned points that were intact before any could break, counted from their ends here;
@@ -174,7 +175,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let stages = plan.all_stages();
         let steps = choose_steps(plan, stable)?;
         let clock = Clock::new(steps[0].0, stages[0].time.end);
-        let family_volume = forces.intact_families(&model).volume;
+        let family_volume = Repeated::new(forces.intact_families(&model).volume);
         let cut = pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 

@@ -46,8 +46,8 @@ impl CrackPath {
         let points = members(plan, model, rule.set);
         let key = format!("[history.crack.{}] set", rule.name);
         not_empty(plan, comm, rule.set, &points, (&key, rule.span.clone()))?;
-        let volumes = &model.volume[..model.owned()];
-        let mut largest = [volumes.iter().copied().fold(0.0, f64::max)];
+        let volumes = (0..model.owned()).map(|point| model.volume[point]);
+        let mut largest = [volumes.fold(0.0, f64::max)];
         comm.max(&mut largest);
         let spacing = libm::pow(largest[0] / plan.dimension.section(), 1.0 / D as f64);
         let link = (LINK * plan.horizon).max(DIAGONAL * spacing);

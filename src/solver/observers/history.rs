@@ -252,7 +252,7 @@ impl HistoryObserver {
         let mut sums = point_sums(simulation, snapshot);
         sums.push(sum(fields.external_work.as_deref().unwrap_or_default()));
         let mut dissipated = sum(fields.damped_energy.as_deref().unwrap_or_default());
-        for (density, volume) in snapshot.stored.dissipated.iter().zip(&model.volume) {
+        for (density, volume) in snapshot.stored.dissipated.iter().zip(model.volume.iter()) {
             dissipated.add(density * volume);
         }
         sums.push(dissipated);

@@ -9,6 +9,7 @@ use crate::material::determinant;
 use crate::solver::Simulation;
 use crate::solver::bonds::Stored;
 use crate::solver::motion::Fields;
+use crate::solver::repeated::Repeated;
 
 /// What the bonds hold at one moment; found once, used by fields and history.
 pub struct Snapshot {
@@ -37,7 +38,7 @@ impl Snapshot {
 
     /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
     /// al. 2014, eq. 7). A point without family has 0.
-    pub fn damage(&self, family_volume: &[f64], point: usize) -> f64 {
+    pub fn damage(&self, family_volume: &Repeated, point: usize) -> f64 {
         match family_volume[point] {
             0.0 => 0.0,
             whole => 1.0 - self.stored.volume[point] / whole,

@@ -280,7 +280,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             fields.flat_map(|(field, columns)| columns.iter_mut().map(move |c| (field, c)));
         for (k, (field, column)) in columns.enumerate() {
             let values = rows.iter().skip(k).step_by(width);
-            for ((number, value), volume) in column.iter_mut().zip(values).zip(volume) {
+            for ((number, value), volume) in column.iter_mut().zip(values).zip(volume.iter()) {
                 *number = match field.birth {
                     Birth::Shared => value * volume,
                     _ => *value,

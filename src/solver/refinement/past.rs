@@ -38,7 +38,7 @@ impl Past {
         for (field, state) in simulation.fields.each().filter(|(field, _)| field.state) {
             for column in state {
                 let volumes = model.volume.iter();
-                let value = |(value, volume): (&f64, &f64)| match field.birth {
+                let value = |(value, volume): (&f64, f64)| match field.birth {
                     Birth::Shared => value / volume,
                     _ => *value,
                 };
@@ -89,7 +89,7 @@ impl Past {
     ) {
         let comm = simulation.comm;
         let owned = simulation.model.owned();
-        let mut volume = simulation.model.volume.clone();
+        let mut volume: Vec<f64> = simulation.model.volume.iter().collect();
         for level in left.chunk_by(|a, b| a[1] == b[1]) {
             let near: Vec<(usize, Vec<usize>)> = level
                 .iter()
