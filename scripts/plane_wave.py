@@ -1,7 +1,7 @@
 """What a refined patch does to a plane wave, beside table 3 of Dipasquale et al. (2014).
 
-Runs inputs/plane_wave_refined.toml for both rules of convergence, levels 1 to 3, with and without the
-enlarged horizon at interfaces, and the same plate without refinement, and compares energy densities in the
+Runs inputs/plane_wave_refined.toml for both rules of convergence, levels 1 to 3, with bonds between levels that
+have their ends' horizons or the mean of them, with and without the enlarged horizon at interfaces, and the same plate without refinement, and compares energy densities in the
 patch at the moment when the crest is there, and the largest displacement of a node that only a reflected
 wave reaches afterwards.
 """
@@ -45,7 +45,7 @@ def horizons(rule, level):
     return {"delta": 3.0 * 0.5**level, "delta-m": (3.0 + level) * 0.5**level}[rule]
 
 
-def deck(rule, levels, factor, seen, end):
+def deck(rule, levels, factor, bonds, seen, end):
     """The deck's text, with an output at the time `seen`; no refinement with 0 levels."""
     text = DECK.read_text()
     text = re.sub(r"(?m)^end = 0\.17 .*$", f"end = {end}", text)
@@ -56,6 +56,7 @@ def deck(rule, levels, factor, seen, end):
     lines = [f'[refinement]\nlevels = {levels}\nrule = "{rule}"']
     if factor is not None:
         lines.append(f"interface_factor = {factor}")
+    lines.append(f'bonds = "{bonds}"')
     for level in range(1, levels + 1):
         radius = horizons(rule, level - 1) + 1e-4
         lines.append(
@@ -111,17 +112,18 @@ def main():
     crest = CENTRE[0] - 0.03 / 2**0.5
     seen = crest / SPEED
     after = (2 * CENTRE[0] - 0.1) / SPEED
-    plain = run(arguments, "uniform", deck("delta", 0, None, seen, after))
+    plain = run(arguments, "uniform", deck("delta", 0, None, "own", seen, after))
     uniform = Energy(plain)
     at, density = uniform.profile()
     before, times = columns(plain, "probe_reflected_displacement_x", "time")
 
-    print("rule     level  factor    loss % (paper)     gain % (paper)   reflected % (paper)")
-    cases = [(rule, level, None) for rule in ("delta", "delta-m") for level in (1, 2, 3)]
-    cases += [("delta", level, 1.0) for level in (1, 2, 3)]
-    for rule, level, factor in cases:
-        name = f"{rule}_{level}_{factor}"
-        file = run(arguments, name, deck(rule, level, factor, seen, after))
+    print("rule     level  factor  bonds      loss % (paper)     gain % (paper)   reflected % (paper)")
+    each = [(rule, level) for rule in ("delta", "delta-m") for level in (1, 2, 3)]
+    cases = [(rule, level, None, bonds) for bonds in ("own", "average") for rule, level in each]
+    cases += [("delta", level, 1.0, "own") for level in (1, 2, 3)]
+    for rule, level, factor, bonds in cases:
+        name = f"{rule}_{level}_{factor}_{bonds}"
+        file = run(arguments, name, deck(rule, level, factor, bonds, seen, after))
         energy = Energy(file)
         # Steps differ, and with them the moments at which outputs are written.
         shift = SPEED * (energy.time - uniform.time)
@@ -136,7 +138,7 @@ def main():
             loss, gain, coming_back = (PAPER_UNCORRECTED if rule == "delta" and level == 3 else "-", "-", "-")
         factor = "default" if factor is None else f"{factor:.3f}"
         print(
-            f"{rule:8} {level:5}  {factor:7} {-change.min():8.2f} ({loss:>5})   {change.max():8.2f} ({gain:>5})"
+            f"{rule:8} {level:5}  {factor:7} {bonds:8} {-change.min():8.2f} ({loss:>5})   {change.max():8.2f} ({gain:>5})"
             f"   {reflected:8.2f} ({coming_back:>5})",
             flush=True,
         )

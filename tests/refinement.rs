@@ -118,7 +118,16 @@ fn action_and_reaction_cancel_across_levels() {
         "grid = { spacing = 1, horizon = 3 }",
         "grid.spacing = 1\ngrid.horizon = 3",
     );
-    for text in [plate(""), plate(rising), ordinary, exact] {
+    let mean = "refinement.bonds = 'average'";
+    let mean_ordinary = format!("{ordinary}\n{mean}");
+    for text in [
+        plate(""),
+        plate(rising),
+        ordinary,
+        exact,
+        plate(mean),
+        mean_ordinary,
+    ] {
         let share = unbalanced::<2>(&text);
         assert!(share < 1e-13, "{share}: {text}");
     }
@@ -203,6 +212,41 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     let [least, most] = energies("", patch);
     // No theory gives these: measured were 0.930 and 1.083, as docs/refinement.md has it.
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
+}
+
+#[test]
+fn mean_horizons_leave_less_force_at_interfaces() {
+    // Under a uniform strain no force should be left inside: what there is belongs to the change of spacing.
+    let force = |bonds: &str| {
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid.spacing = 1
+            grid.horizon = 3
+            grid.volume_correction = 'linear'
+            material.glass.linear_microelastic = {{ density = 1, youngs_modulus = 1 }}
+            body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [41, 41] }} }}
+            refinement.levels = 1
+            refinement.bonds = '{bonds}'
+            refinement.region.middle.where = '(x - 20.5)^2 + (y - 20.5)^2 < 9.01'
+            time.end = 1"
+        );
+        simulate::<2, _>(&text, |mut simulation| {
+            displace(&mut simulation, |[x, y, z]| [1.001 * x, y, z]);
+            let model = &simulation.model;
+            let inside = |k: &usize| {
+                model.position(*k)[..2]
+                    .iter()
+                    .all(|x| (7.0..34.0).contains(x))
+            };
+            let force = &simulation.fields.internal_force;
+            let squares = (0..model.owned()).filter(inside);
+            let squares =
+                squares.map(|k| model.volume[k] * (force[0][k].powi(2) + force[1][k].powi(2)));
+            squares.sum::<f64>().sqrt()
+        })
+    };
+    let [own, mean] = ["own", "average"].map(force);
+    assert!(mean > 0.0 && mean < 0.75 * own, "{mean} {own}");
 }
 
 /// A notched plate that is torn and refined where it is strained most, in three places by the end.
@@ -294,6 +338,14 @@ fn runs_that_become_coarser_are_the_same_on_any_number_of_ranks() {
     are_the_same(&torn_and_coarsened(), [200, 100]);
 }
 
+#[test]
+fn bonds_of_mean_horizons_are_the_same_on_any_number_of_ranks() {
+    let mean = "refinement.trigger = { energy = 0.6, damage = 0.5, every_steps = 6 }";
+    let text = TORN.replace(mean, &format!("{mean}\n    refinement.bonds = 'average'"));
+    assert_ne!(text, TORN);
+    are_the_same(&text, [100, 0]);
+}
+
 /// Mass, momentum by component, energy set free, and volume.
 fn sums(simulation: &Simulation<'_, 2>) -> Vec<f64> {
     let (model, fields) = (&simulation.model, &simulation.fields);
@@ -383,7 +435,13 @@ fn loads<const D: usize>(text: &str) -> [f64; D] {
     simulate::<D, _>(text, |simulation| {
         let external = simulation.fields.external_force.as_ref().expect("loads");
         let volume = &simulation.model.volume;
-        let sum = |d: usize| external[d].iter().zip(volume).map(|(f, v)| f * v).sum();
+        let sum = |d: usize| {
+            external[d]
+                .iter()
+                .zip(volume.iter())
+                .map(|(f, v)| f * v)
+                .sum()
+        };
         std::array::from_fn(sum)
     })
 }

@@ -2,9 +2,9 @@
 
 use serde_spanned::Spanned;
 
-use super::grammar::{self, Deck, HorizonRule};
+use super::grammar::{self, Deck, HorizonRule, LevelBonds};
 use super::number::{Number, shown};
-use super::plan::{self, PointSource};
+use super::plan::{self, InterfaceRule, PointSource};
 use super::resolve::{ALL_VARIABLES, POSITION, Scope};
 use crate::error::Result;
 
@@ -77,6 +77,10 @@ pub fn refinement(
         levels: finest,
         rule,
         interface_factor,
+        bonds: match refinement.bonds {
+            LevelBonds::Own => InterfaceRule::Own,
+            LevelBonds::Average => InterfaceRule::Average,
+        },
         regions: regions.collect::<Result<_>>()?,
         trigger: trigger(scope, refinement, bodies)?,
     }))

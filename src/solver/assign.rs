@@ -30,7 +30,12 @@ fn constants(plan: &Plan, here: &Block, there: &Block) -> Constants {
         },
         horizon: of(own.1, other.1),
     };
-    match plan.interface.between(here.body, there.body) {
+    let within = plan.refinement.as_ref().map(|refinement| refinement.bonds);
+    let rule = match within.filter(|_| here.body.name == there.body.name) {
+        Some(rule) => rule,
+        None => plan.interface.between(here.body, there.body),
+    };
+    match rule {
         // Where there are no bonds, these are asked for none.
         InterfaceRule::Own | InterfaceRule::None => combine(|own, _| own),
         InterfaceRule::Average => combine(|own, other| 0.5 * (own + other)),

@@ -23,6 +23,10 @@ pub struct Refinement {
     /// families do not lose volume; √2 with `"delta"` and 1 with `"delta-m"` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
+    /// The bonds between levels: `"own"`, each end exerts its half with its own horizon, or `"average"`, both have
+    /// the mean of the horizons.
+    #[serde(default)]
+    pub bonds: LevelBonds,
     /// What is refined from the start, by any name.
     #[serde(default)]
     pub region: Tables<RefinedRegion>,
@@ -70,6 +74,17 @@ pub enum HorizonRule {
     Delta,
     /// δ/dx rises with the level.
     DeltaM,
+}
+
+/// Which horizons the bonds between levels have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelBonds {
+    /// Each end its own.
+    #[default]
+    Own,
+    /// Both ends the mean.
+    Average,
 }
 
 /// Points that are refined from the start.

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use crate::deck::expression::Expression;
 
+use super::InterfaceRule;
+
 /// Refinement of the grid (Dipasquale et al. 2014, §2).
 #[derive(Debug, Clone)]
 pub struct Refinement {
@@ -15,6 +17,9 @@ pub struct Refinement {
     pub rule: HorizonRule,
     /// What the horizon of points is multiplied by that have a coarser level within it.
     pub interface_factor: f64,
+    /// Which horizons the bonds between points of one body with different ones have: each end its own, or both the
+    /// mean.
+    pub bonds: InterfaceRule,
     /// What is refined from the start.
     pub regions: Vec<RefinedRegion>,
     /// What is refined during the run, if anything.
