@@ -455,7 +455,7 @@ fn a_pressure_pushes_against_its_normal() {
         time = { end = 1 }
         ";
     simulate::<2, _>(text, |simulation| {
-        let volumes = &simulation.model.volume;
+        let volumes = simulation.model.volume.iter();
         let loads = simulation.fields.external_force.as_ref().unwrap();
         let loads = loads[1].iter().zip(volumes);
         let total: f64 = loads.map(|(force, volume)| force * volume).sum();

@@ -168,7 +168,7 @@ fn momentum_is_kept_by_every_rule() {
             for d in 0..2 {
                 let forces = simulation.fields.internal_force[d].iter();
                 let products: Vec<f64> = forces
-                    .zip(&simulation.model.volume)
+                    .zip(simulation.model.volume.iter())
                     .map(|(force, volume)| force * volume)
                     .collect();
                 let gross: f64 = products.iter().map(|force| force.abs()).sum();

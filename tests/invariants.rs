@@ -271,7 +271,10 @@ fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
     }
     for d in 0..D {
         let (mut net, mut gross) = (0.0_f64, 0.0);
-        for (force, volume) in forces(&simulation).iter().zip(&simulation.model.volume) {
+        for (force, volume) in forces(&simulation)
+            .iter()
+            .zip(simulation.model.volume.iter())
+        {
             net += force[d] * volume;
             gross += force[d].abs() * volume;
         }
@@ -340,7 +343,7 @@ fn two_blocks() -> Vec<String> {
 fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     simulation.evaluate(Evolution::None);
     let stored = simulation.forces.stored(&simulation.model);
-    let energy = stored.energy.iter().zip(&simulation.model.volume);
+    let energy = stored.energy.iter().zip(simulation.model.volume.iter());
     energy.map(|(density, volume)| density * volume).sum()
 }
 

@@ -52,7 +52,7 @@ fn energies<const D: usize>(simulation: &mut Simulation<D>) -> [f64; 2] {
     let stored = simulation.forces.stored(&simulation.model);
     let volume = &simulation.model.volume;
     [stored.energy, stored.dissipated]
-        .map(|density| density.iter().zip(volume).map(|(w, v)| w * v).sum())
+        .map(|density| density.iter().zip(volume.iter()).map(|(w, v)| w * v).sum())
 }
 
 #[test]

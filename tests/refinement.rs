@@ -42,8 +42,8 @@ fn volumes_add_up_to_that_of_the_cells() {
         let volumes = simulate_on::<2, _>(ranks, &plate(""), |simulation| {
             let mut sum = [ExactSum::ZERO];
             let model = &simulation.model;
-            for volume in &model.volume[..model.owned()] {
-                sum[0].add(*volume);
+            for volume in model.volume.iter().take(model.owned()) {
+                sum[0].add(volume);
             }
             let cells = 0.5 * model.coarsest as f64;
             (
