@@ -4,6 +4,7 @@
 mod adaptive;
 mod commands;
 mod communicator;
+mod confirmation;
 mod contact;
 mod correspondence;
 mod correspondence_plastic;

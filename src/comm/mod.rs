@@ -6,12 +6,14 @@
 //! threads of one process, in tests.
 
 mod by_id;
+mod file_sync;
 pub mod halo;
 pub mod mpi;
 pub mod sum;
 pub mod threads;
 
 pub use by_id::IdOrder;
+pub use file_sync::without_confirmation;
 pub use halo::Halo;
 pub use sum::ExactSum;
 

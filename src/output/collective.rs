@@ -5,7 +5,7 @@ use super::attribute::{Attribute, set_attribute};
 use super::dataset::{Dataset, Rows};
 use super::reserve::Reservation;
 use super::transfer::{self, Transfer};
-use crate::comm::{Communicator, agree};
+use crate::comm::{Communicator, agree, without_confirmation};
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::VarLenUnicode;
@@ -32,7 +32,9 @@ const OBJECT_BYTES: u64 = 8192;
 /// ranks or more it would leave some of them waiting for ever.
 ///
 /// A process that is killed leaves the file as the last flush did: metadata is held in memory
-/// until then.
+/// until then. A machine that loses its power leaves at least what was written until the file was last
+/// [confirmed](Self::confirm): after that only numbers change in it, in their places, until it grows, and what
+/// makes it grow is confirmed at once.
 ///
 /// Dropping a serial file closes it; a collective one must be [closed](Self::close) by all ranks.
 pub struct CollectiveFile<'a> {
@@ -45,6 +47,8 @@ pub struct CollectiveFile<'a> {
     /// An upper bound of the file's size in bytes, as the library knows its own only until the
     /// first write.
     size: u64,
+    /// The same when the disc last confirmed it.
+    confirmed: u64,
     /// What has been reserved on the disc, in bytes; rank 0 holds the reservation.
     reserved: u64,
     reservation: Option<Reservation>,
@@ -119,6 +123,7 @@ impl<'a> CollectiveFile<'a> {
             no_collective_cause: 0,
             usable: true,
             size: length + OBJECT_BYTES,
+            confirmed: length + OBJECT_BYTES,
             reserved: 0,
             reservation,
         })
@@ -322,11 +327,37 @@ impl<'a> CollectiveFile<'a> {
     }
 
     /// Hands everything written so far to the file system, so that the file survives the end of
-    /// the process as it is now.
+    /// the process as it is now. Where it has grown, this confirms it: were only a part of what says where
+    /// things are on the disc when the power goes, all of the file could be lost.
     ///
     /// # Errors
     /// The disc is full.
     pub fn flush(&mut self) -> Result<()> {
+        if self.size > self.confirmed {
+            return self.confirm();
+        }
+        without_confirmation(|| self.write_out())
+    }
+
+    /// As [`flush`](Self::flush), and waits for the disc to confirm it, so that the file survives a loss of power
+    /// as well.
+    ///
+    /// # Errors
+    /// The disc is full or cannot be written.
+    pub fn confirm(&mut self) -> Result<()> {
+        // MPI's ranks ask for the confirmation within.
+        self.write_out()?;
+        if self.comm.raw().is_none() {
+            let file = std::fs::File::open(&self.path);
+            let confirmed = file.and_then(|file| file.sync_all());
+            self.usable &= confirmed.is_ok();
+            confirmed.map_err(|error| Error::run(format!("{}: {error}", self.path.display())))?;
+        }
+        self.confirmed = self.size;
+        Ok(())
+    }
+
+    fn write_out(&mut self) -> Result<()> {
         self.reserve()?;
         self.together("cannot write out the file", |file| file.inner.flush())?;
         // The library cuts the file to its length here, and thereby gives space back.
@@ -337,12 +368,12 @@ impl<'a> CollectiveFile<'a> {
         Ok(())
     }
 
-    /// Closes the file.
+    /// Confirms the file and closes it.
     ///
     /// # Errors
     /// The disc is full, or an earlier operation failed.
     pub fn close(mut self) -> Result<()> {
-        self.flush()?;
+        self.confirm()?;
         self.together("cannot close the file", |file| {
             // SAFETY: the handle is not used again, as the file is no longer usable.
             let inner = unsafe { ManuallyDrop::take(&mut file.inner) };

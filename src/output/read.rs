@@ -85,6 +85,12 @@ impl ResultReader {
         let Ok(steps) = steps.and_then(|attribute| attribute.read_scalar::<i64>()) else {
             return problem("this VTKHDF file is not a result of Fissure: it has no time steps");
         };
+        // A loss of power may have left any of the three numbers as it was before.
+        let rows = ["Values", "Step"].map(|name| {
+            let table = file.dataset(&format!("{STEPS}/{name}"));
+            table.map_or(0, |table| table.size())
+        });
+        let steps = rows.into_iter().fold(steps as usize, usize::min);
         let points = file.dataset("/VTKHDF/NumberOfPoints");
         let points = match points
             .and_then(|dataset| dataset.read_raw::<u64>())
@@ -100,7 +106,7 @@ impl ResultReader {
             file,
             path: path.to_path_buf(),
             counts: points,
-            steps: steps as usize,
+            steps,
         })
     }
 

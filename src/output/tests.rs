@@ -1,11 +1,12 @@
 //! What is written reads back.
 
 use super::access::Creation;
+use super::attribute::Attribute;
 use super::collective::CollectiveFile;
 use super::field::{FieldData, FieldDescription};
 use super::history::HistoryContents;
 use super::read::ResultReader;
-use super::vtkhdf::{Contents, Piece, ResultFile};
+use super::vtkhdf::{Contents, Piece, ResultFile, STEPS};
 use crate::comm::threads;
 use crate::error::Result;
 use std::path::Path;
@@ -94,6 +95,12 @@ fn what_is_written_reads_back() -> Result<()> {
     assert_eq!(history[1].values, [4.5, 4.5]);
     let csv = std::fs::read_to_string(path.with_extension("csv")).unwrap();
     assert_eq!(csv, "time [s],a\n0,4.5\n1,4.5\n");
+    drop(reader);
+    // As a loss of power may leave it.
+    let mut file = CollectiveFile::open_to_append(&path, &comm)?;
+    file.set_attribute(STEPS, "NSteps", Attribute::Integer(3))?;
+    file.close()?;
+    assert_eq!(ResultReader::open(&path)?.times()?, [0.0, 0.5]);
     for name in ["h5", "csv"] {
         std::fs::remove_file(path.with_extension(name)).unwrap();
     }

@@ -245,7 +245,7 @@ impl<'a> Recorder<'a> {
         simulation: &mut Simulation<'_, D>,
     ) -> Result<()> {
         if self.outputs.is_due(&simulation.clock) {
-            self.flush()
+            self.confirm()
         } else {
             self.write(simulation, true, false)
         }
@@ -261,13 +261,13 @@ impl<'a> Recorder<'a> {
         agree(comm, self.side_car.map_or(Ok(()), SideCar::finish))
     }
 
-    /// Makes all that has been recorded safe on the disc. Collective.
+    /// Makes all that has been recorded safe from a loss of power. Collective.
     ///
     /// # Errors
     /// When the disc is full.
-    pub fn flush(&mut self) -> Result<()> {
+    pub fn confirm(&mut self) -> Result<()> {
         self.write_rows()?;
-        self.file.flush()
+        self.file.confirm()
     }
 
     fn write_rows(&mut self) -> Result<()> {

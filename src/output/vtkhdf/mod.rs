@@ -327,12 +327,12 @@ impl<'a> ResultFile<'a> {
         self.steps
     }
 
-    /// Makes what has been written so far safe, history rows included.
+    /// Makes what has been written so far safe from a loss of power, history rows included.
     ///
     /// # Errors
     /// The disc is full.
-    pub fn flush(&mut self) -> Result<()> {
-        self.file.flush()
+    pub fn confirm(&mut self) -> Result<()> {
+        self.file.confirm()
     }
 
     fn create_table(
