@@ -91,6 +91,18 @@ impl<const D: usize> Model<D> {
         self.damping[usize::from(self.block[point])]
     }
 
+    /// A component of a force density (N/m³) on an owned point less what viscous damping takes of it at a
+    /// velocity (m/s).
+    #[inline]
+    pub fn less_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
+        let damping = self.damping_of(point);
+        if damping > 0.0 {
+            force - damping * self.density_of(point) * velocity
+        } else {
+            force
+        }
+    }
+
     /// Density of an owned point, kg/m³.
     pub fn density_of(&self, point: usize) -> f64 {
         self.density[usize::from(self.block[point])]

@@ -1,9 +1,12 @@
 //! Loads: force densities on some points.
 
+use rayon::prelude::*;
+
 use crate::deck::expression::Expression;
 use crate::solver::model::Model;
 use crate::solver::motion::Fields;
 
+use super::scattered::{CHUNK, for_each_point};
 use super::values::Values;
 
 /// A body force density on some points.
@@ -50,62 +53,70 @@ impl<const D: usize> Load<D> {
 
     /// Evaluates the force density at a time (s).
     pub fn update(&mut self, time: f64) {
-        for d in 0..D {
-            let (force, factor) = (&mut self.force, self.factors[d]);
-            self.values[d].at(&self.positions, time, |k, value| {
-                force[k][d] = factor * value;
+        let (positions, shares, factors) = (&self.positions, self.shares.as_ref(), self.factors);
+        let values = self
+            .values
+            .each_ref()
+            .map(|values| values.at(positions, time));
+        let forces = self.force.par_iter_mut().with_min_len(CHUNK).enumerate();
+        forces.for_each(|(k, force)| {
+            *force = std::array::from_fn(|d| {
+                let component = factors[d] * values[d](k);
+                shares.map_or(component, |shares| shares[k] * component)
             });
-        }
-        for (force, share) in self.force.iter_mut().zip(self.shares.iter().flatten()) {
-            *force = force.map(|component| share * component);
-        }
+        });
     }
 
     /// Takes the load's points out of a field of external forces.
     pub fn clear(&self, external: &mut [Vec<f64>; D]) {
-        for component in external {
-            for point in &self.points {
-                component[*point as usize] = 0.0;
-            }
-        }
+        let columns = external.each_mut().map(Vec::as_mut_slice);
+        for_each_point(&self.points, columns, |_, _, entries| {
+            entries.into_iter().for_each(|entry| *entry = 0.0);
+            true
+        });
     }
 
     /// Adds the load to a field of external forces.
     pub fn add(&self, external: &mut [Vec<f64>; D]) {
-        for (force, point) in self.force.iter().zip(&self.points) {
-            for d in 0..D {
-                external[d][*point as usize] += force[d];
+        let columns = external.each_mut().map(Vec::as_mut_slice);
+        for_each_point(&self.points, columns, |k, _, entries| {
+            for (entry, force) in entries.into_iter().zip(self.force[k]) {
+                *entry += force;
             }
-        }
+            true
+        });
     }
 
     /// Remembers force and place, for the work of the coming step.
     pub fn before_moving(&mut self, fields: &Fields<D>) {
-        self.before.copy_from_slice(&self.force);
-        for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
-            *from = std::array::from_fn(|d| fields.displacement[d][*point as usize]);
-        }
+        self.remember_now(&fields.displacement);
     }
 
     /// Remembers force and place at an earlier time (s), when points had these displacements (m).
     pub fn remember(&mut self, displacement: &[Vec<f64>; D], time: f64, now: f64) {
         self.update(time);
-        self.before.copy_from_slice(&self.force);
+        self.remember_now(displacement);
         self.update(now);
-        for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
+    }
+
+    fn remember_now(&mut self, displacement: &[Vec<f64>; D]) {
+        let now = self.force.par_iter().with_min_len(CHUNK).zip(&self.points);
+        let past = self.before.par_iter_mut().zip(&mut self.moved_from);
+        past.zip(now).for_each(|((before, from), (force, point))| {
+            *before = *force;
             *from = std::array::from_fn(|d| displacement[d][*point as usize]);
-        }
+        });
     }
 
     /// Adds the work of the step (J), by the trapezoid rule.
     pub fn add_work(&self, model: &Model<D>, displacement: &[Vec<f64>; D], work: &mut [f64]) {
-        for (k, point) in self.points.iter().enumerate() {
-            let point = *point as usize;
+        for_each_point(&self.points, [work], |k, point, [work]| {
             for d in 0..D {
                 let moved = displacement[d][point] - self.moved_from[k][d];
                 let force = 0.5 * (self.before[k][d] + self.force[k][d]);
-                work[point] += force * moved * model.volume[point];
+                *work += force * moved * model.volume[point];
             }
-        }
+            true
+        });
     }
 }

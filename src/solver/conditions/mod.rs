@@ -3,6 +3,7 @@
 mod finite;
 mod initial;
 mod loads;
+mod scattered;
 mod supports;
 mod values;
 

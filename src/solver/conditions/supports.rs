@@ -1,9 +1,13 @@
 //! Supports: prescribed motions, and the reactions that they take.
 
+use rayon::prelude::*;
+
 use crate::deck::expression::Expression;
 use crate::solver::model::Model;
 use crate::solver::motion::Fields;
+use crate::solver::motion::fields::Exerted;
 
+use super::scattered::{CHUNK, for_each_point};
 use super::values::Values;
 
 /// What a support prescribes.
@@ -70,35 +74,31 @@ impl Support {
 
     /// Remembers reaction and place, for the work of the coming step.
     pub fn before_moving<const D: usize>(&mut self, fields: &Fields<D>) {
-        let displacement = &fields.displacement[self.component];
-        for (k, point) in self.points.iter().enumerate() {
-            self.moved_from[k] = displacement[*point as usize];
-        }
-        if let Some(reaction) = &fields.reaction {
-            for (k, point) in self.points.iter().enumerate() {
-                self.before[k] = reaction[self.component][*point as usize];
-            }
-        }
+        self.remember(&fields.displacement, fields.reaction.as_ref());
     }
 
     /// After the points have moved to time `time` (s): puts those supported in their place. `step` is
     /// the step just made (s), 0 at the start.
     pub fn place(&self, displacement: &mut [f64], time: f64, step: f64) {
-        let points = &self.points;
+        let at = |time| self.values.at(&self.positions, time);
         match self.motion {
-            Motion::Displacement => self.values.at(&self.positions, time, |k, value| {
-                displacement[points[k] as usize] = value;
-            }),
+            Motion::Displacement => {
+                let value = at(time);
+                for_each_point(&self.points, [displacement], |k, _, [place]| {
+                    *place = value(k);
+                    true
+                });
+            }
             // The trapezoid rule, from where the points were before they drifted.
             Motion::Velocity if step > 0.0 => {
-                for (from, point) in self.moved_from.iter().zip(points) {
-                    displacement[*point as usize] = *from;
-                }
-                for now in [time - step, time] {
-                    self.values.at(&self.positions, now, |k, value| {
-                        displacement[points[k] as usize] += 0.5 * step * value;
-                    });
-                }
+                let velocities = [at(time - step), at(time)];
+                for_each_point(&self.points, [displacement], |k, _, [place]| {
+                    *place = self.moved_from[k];
+                    for velocity in &velocities {
+                        *place += 0.5 * step * velocity(k);
+                    }
+                    true
+                });
             }
             // At the start the points are at their initial displacement.
             Motion::Velocity => {}
@@ -107,10 +107,10 @@ impl Support {
 
     /// Gives the points their mean velocity in the step just made (s).
     pub fn set_mean_velocity(&self, displacement: &[f64], velocity: &mut [f64], step: f64) {
-        for (from, point) in self.moved_from.iter().zip(&self.points) {
-            let point = *point as usize;
-            velocity[point] = (displacement[point] - from) / step;
-        }
+        for_each_point(&self.points, [velocity], |k, point, [velocity]| {
+            *velocity = (displacement[point] - self.moved_from[k]) / step;
+            true
+        });
     }
 
     /// Gives the points their velocity at `time` (s), and finds the reactions: what must be added to
@@ -123,63 +123,71 @@ impl Support {
         time: f64,
         step: f64,
     ) -> bool {
-        let component = self.component;
-        let mut finite = true;
-        // Value now, and its changes in the step before and the one to come; before the start the motion is
-        // extrapolated.
-        let mut now = 0.0;
-        let mut changes = [0.0; 2];
-        for (k, point) in self.points.iter().enumerate() {
-            let position = self.positions[k];
+        let motion = |position: [f64; 3]| {
+            // Before the start the motion is extrapolated, and where it ends, as √(1 − t) does.
             let change = |step: f64| self.values.expression.increment(position, time, step);
-            if self.values.varies || k == 0 {
-                now = self.values.expression.evaluate(position, time);
-                // The motion may end here, as √(1 − t) does: then it is extrapolated.
-                let to_come = match change(step) {
-                    to_come if to_come.is_finite() || time < step => to_come,
-                    _ => -change(-step),
-                };
-                let before = match self.motion {
-                    _ if time >= step => -change(-step),
-                    Motion::Displacement => to_come,
-                    Motion::Velocity => 0.0,
-                };
-                changes = [before, to_come];
-            }
-            let [before, to_come] = changes;
-            let (velocity, acceleration) = match self.motion {
+            let to_come = match change(step) {
+                to_come if to_come.is_finite() || time < step => to_come,
+                _ => -change(-step),
+            };
+            let before = match self.motion {
+                _ if time >= step => -change(-step),
+                Motion::Displacement => to_come,
+                Motion::Velocity => 0.0,
+            };
+            match self.motion {
                 Motion::Displacement => (
                     (before + to_come) / (2.0 * step),
                     (to_come - before) / (step * step),
                 ),
-                Motion::Velocity => (now, (before + to_come) / (2.0 * step)),
-            };
-            let point = *point as usize;
-            fields.velocity[component][point] = velocity;
-            let needed = model.density_of(point) * acceleration;
-            let reaction = needed - fields.acting(model, component, point);
-            if let Some(field) = &mut fields.reaction {
-                field[component][point] = reaction;
+                Motion::Velocity => (
+                    self.values.expression.evaluate(position, time),
+                    (before + to_come) / (2.0 * step),
+                ),
             }
-            finite &= velocity.is_finite() && reaction.is_finite();
-        }
-        finite
+        };
+        let first = self.positions.first();
+        let same = first.filter(|_| !self.values.varies).map(|at| motion(*at));
+        self.react(model, fields, |k, point| {
+            let (velocity, acceleration) = same.unwrap_or_else(|| motion(self.positions[k]));
+            (velocity, model.density_of(point) * acceleration)
+        })
     }
 
     /// Finds the reactions that keep the points where they are, at rest. Returns whether they are
     /// finite.
     pub fn hold<const D: usize>(&self, model: &Model<D>, fields: &mut Fields<D>) -> bool {
-        let mut finite = true;
-        for point in &self.points {
-            let point = *point as usize;
-            fields.velocity[self.component][point] = 0.0;
-            let reaction = -fields.acting(model, self.component, point);
-            if let Some(field) = &mut fields.reaction {
-                field[self.component][point] = reaction;
-            }
-            finite &= reaction.is_finite();
-        }
-        finite
+        // A reaction is then the force with its sign changed, that of 0 as well.
+        self.react(model, fields, |_, _| (0.0, -0.0))
+    }
+
+    /// Gives the points their velocities, and finds the reactions with which the forces are those that are needed
+    /// (N/m³): both are `wanted` of a point, by its number here and its local index. Returns whether all is finite.
+    fn react<const D: usize>(
+        &self,
+        model: &Model<D>,
+        fields: &mut Fields<D>,
+        wanted: impl Fn(usize, usize) -> (f64, f64) + Sync,
+    ) -> bool {
+        let component = self.component;
+        let Fields {
+            velocity,
+            internal_force,
+            external_force,
+            reaction: Some(reaction),
+            ..
+        } = fields
+        else {
+            unreachable!("a run with supports has reactions");
+        };
+        let exerted = Exerted::new(internal_force, external_force.as_ref(), component);
+        let columns = [&mut velocity[component][..], &mut reaction[component][..]];
+        for_each_point(&self.points, columns, |k, point, [velocity, reaction]| {
+            let (moving, needed) = wanted(k, point);
+            *velocity = moving;
+            *reaction = needed - model.less_damping(point, exerted.at(point), moving);
+            velocity.is_finite() && reaction.is_finite()
+        })
     }
 
     /// Remembers reaction (N/m³) and place of an earlier time, when points had these displacements (m).
@@ -188,11 +196,14 @@ impl Support {
         displacement: &[Vec<f64>; D],
         reaction: Option<&[Vec<f64>; D]>,
     ) {
-        for (k, point) in self.points.iter().enumerate() {
+        let component = self.component;
+        let past = self.before.par_iter_mut().zip(&mut self.moved_from);
+        let past = past.with_min_len(CHUNK).zip(&self.points);
+        past.for_each(|((before, from), point)| {
             let point = *point as usize;
-            self.moved_from[k] = displacement[self.component][point];
-            self.before[k] = reaction.map_or(0.0, |field| field[self.component][point]);
-        }
+            *from = displacement[component][point];
+            *before = reaction.map_or(0.0, |field| field[component][point]);
+        });
     }
 
     /// Adds the work of the step (J), by the trapezoid rule. `displacement` and `reaction` (N/m³) are
@@ -204,11 +215,11 @@ impl Support {
         reaction: &[f64],
         work: &mut [f64],
     ) {
-        for (k, point) in self.points.iter().enumerate() {
-            let point = *point as usize;
+        for_each_point(&self.points, [work], |k, point, [work]| {
             let moved = displacement[point] - self.moved_from[k];
             let force = 0.5 * (self.before[k] + reaction[point]);
-            work[point] += force * moved * model.volume[point];
-        }
+            *work += force * moved * model.volume[point];
+            true
+        });
     }
 }

@@ -21,15 +21,9 @@ impl Values {
         }
     }
 
-    /// Calls `set` with the number of each position and the value there.
-    pub fn at(&self, positions: &[[f64; 3]], time: f64, mut set: impl FnMut(usize, f64)) {
-        if self.varies {
-            for (k, position) in positions.iter().enumerate() {
-                set(k, self.expression.evaluate(*position, time));
-            }
-        } else {
-            let value = self.expression.evaluate([0.0; 3], time);
-            (0..positions.len()).for_each(|k| set(k, value));
-        }
+    /// The values at a time (s), by the number of the position.
+    pub fn at<'a>(&'a self, positions: &'a [[f64; 3]], time: f64) -> impl Fn(usize) -> f64 + 'a {
+        let same = (!self.varies).then(|| self.expression.evaluate([0.0; 3], time));
+        move |k| same.unwrap_or_else(|| self.expression.evaluate(positions[k], time))
     }
 }

@@ -300,6 +300,38 @@ pub fn plastic_columns<'a>(
     std::array::from_fn(|_| columns.next().map(Vec::as_mut_slice).unwrap_or_default())
 }
 
+/// A component of the force densities of bonds and loads, N/m³.
+#[derive(Clone, Copy)]
+pub struct Exerted<'a> {
+    /// Of bonds.
+    pub internal: &'a [f64],
+    /// Of loads, if there are any.
+    pub external: Option<&'a [f64]>,
+}
+
+impl<'a> Exerted<'a> {
+    /// A component of [`Fields::internal_force`] and [`Fields::external_force`].
+    pub fn new<const D: usize>(
+        internal: &'a [Vec<f64>; D],
+        external: Option<&'a [Vec<f64>; D]>,
+        component: usize,
+    ) -> Self {
+        Self {
+            internal: &internal[component],
+            external: external.map(|field| &field[component][..]),
+        }
+    }
+
+    /// Their sum.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> f64 {
+        match self.external {
+            Some(external) => self.internal[k] + external[k],
+            None => self.internal[k],
+        }
+    }
+}
+
 impl<const D: usize> Fields<D> {
     /// Everything at rest in its reference place.
     pub fn new(model: &Model<D>, needs: Needs) -> Self {
@@ -334,15 +366,8 @@ impl<const D: usize> Fields<D> {
     /// N/m³: all but the reaction.
     #[inline]
     pub fn acting(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
-        let mut force = self.internal_force[d][point];
-        if let Some(load) = &self.external_force {
-            force += load[d][point];
-        }
-        let damping = model.damping_of(point);
-        if damping > 0.0 {
-            force -= damping * model.density_of(point) * self.velocity[d][point];
-        }
-        force
+        let exerted = Exerted::new(&self.internal_force, self.external_force.as_ref(), d);
+        model.less_damping(point, exerted.at(point), self.velocity[d][point])
     }
 
     /// The force density of all forces on an owned point, N/m³; 0 in equilibrium.

@@ -7,34 +7,18 @@
 use rayon::prelude::*;
 
 use super::Fields;
+use super::fields::Exerted;
 use crate::solver::model::Model;
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
-
-/// A component of the internal and external force densities on some points.
-#[derive(Clone, Copy)]
-struct Acting<'a> {
-    internal: &'a [f64],
-    external: Option<&'a [f64]>,
-}
-
-impl Acting<'_> {
-    #[inline(always)]
-    fn at(&self, k: usize) -> f64 {
-        match self.external {
-            Some(external) => self.internal[k] + external[k],
-            None => self.internal[k],
-        }
-    }
-}
 
 /// Calls `work` with each part of a component: displacement, velocity, forces and blocks of the points.
 /// Returns whether all calls did.
 fn for_each_part<const D: usize>(
     model: &Model<D>,
     fields: &mut Fields<D>,
-    work: impl Fn(&mut [f64], &mut [f64], Acting<'_>, &[u16]) -> bool + Sync,
+    work: impl Fn(&mut [f64], &mut [f64], Exerted<'_>, &[u16]) -> bool + Sync,
 ) -> bool {
     let mut all = true;
     for d in 0..D {
@@ -50,7 +34,12 @@ fn for_each_part<const D: usize>(
             .enumerate()
             .map(|(chunk, (((displacement, velocity), internal), block))| {
                 let external = part(chunk, internal.len());
-                work(displacement, velocity, Acting { internal, external }, block)
+                work(
+                    displacement,
+                    velocity,
+                    Exerted { internal, external },
+                    block,
+                )
             })
             .reduce(|| true, |a, b| a & b);
     }
