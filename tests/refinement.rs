@@ -214,39 +214,49 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
 }
 
+/// The least strain energy density in a patch refined twice, as a share of that far from it, when a strip with
+/// blocked sides is strained along x and at rest.
+fn least_energy_at_rest(bonds: &str) -> f64 {
+    let text = format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3, volume_correction = 'linear' }}
+        material.glass.linear_microelastic = {{ density = 1, youngs_modulus = 1 }}
+        body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [41, 31] }} }}
+        refinement.levels = 2
+        refinement.bonds = '{bonds}'
+        refinement.region.outer = {{ where = '(x - 20.5)^2 + (y - 15.5)^2 < 9.01', level = 1 }}
+        refinement.region.inner = {{ where = '(x - 20.5)^2 + (y - 15.5)^2 < 2.26', level = 2 }}
+        set.left.where = 'x < 3'
+        set.right.where = 'x > 38'
+        condition.sides = {{ set = 'all', displacement = ['free', 0] }}
+        condition.hold = {{ set = 'left', displacement = ['1e-3*x*t', 'free'] }}
+        condition.pull = {{ set = 'right', displacement = ['1e-3*x*t', 'free'] }}
+        time = {{ end = 1, method = 'relaxation', relaxation = {{ load_steps = 1 }} }}"
+    );
+    simulate::<2, _>(&text, |mut simulation| {
+        while !simulation.is_over() {
+            simulation.advance();
+            simulation.check().unwrap();
+        }
+        let snapshot = Snapshot::new(&mut simulation);
+        let model = &simulation.model;
+        let energy = |k: usize| snapshot.stored.energy[k];
+        let near = |k: &usize| {
+            let [x, y, _] = model.position(*k);
+            (x - 20.5).abs().max((y - 15.5).abs()) < 5.0
+        };
+        let far = (0..model.owned()).find(|k| model.position(*k)[..2] == [8.5, 15.5]);
+        let patch = (0..model.owned()).filter(near).map(energy);
+        patch.fold(f64::MAX, f64::min) / energy(far.expect("a node"))
+    })
+}
+
 #[test]
-fn mean_horizons_leave_less_force_at_interfaces() {
-    // Under a uniform strain no force should be left inside: what there is belongs to the change of spacing.
-    let force = |bonds: &str| {
-        let text = format!(
-            "dimension = 'plane-stress'
-            grid.spacing = 1
-            grid.horizon = 3
-            grid.volume_correction = 'linear'
-            material.glass.linear_microelastic = {{ density = 1, youngs_modulus = 1 }}
-            body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = [41, 41] }} }}
-            refinement.levels = 1
-            refinement.bonds = '{bonds}'
-            refinement.region.middle.where = '(x - 20.5)^2 + (y - 20.5)^2 < 9.01'
-            time.end = 1"
-        );
-        simulate::<2, _>(&text, |mut simulation| {
-            displace(&mut simulation, |[x, y, z]| [1.001 * x, y, z]);
-            let model = &simulation.model;
-            let inside = |k: &usize| {
-                model.position(*k)[..2]
-                    .iter()
-                    .all(|x| (7.0..34.0).contains(x))
-            };
-            let force = &simulation.fields.internal_force;
-            let squares = (0..model.owned()).filter(inside);
-            let squares =
-                squares.map(|k| model.volume[k] * (force[0][k].powi(2) + force[1][k].powi(2)));
-            squares.sum::<f64>().sqrt()
-        })
-    };
-    let [own, mean] = ["own", "average"].map(force);
-    assert!(mean > 0.0 && mean < 0.75 * own, "{mean} {own}");
+fn patches_lose_less_with_bonds_of_mean_horizons() {
+    let [own, mean] = ["own", "average"].map(least_energy_at_rest);
+    // A wave, whose energy is half kinetic, loses 17.1 and 8.2 % in such a patch (docs/refinement.md).
+    assert!(own < 0.75, "{own}");
+    assert!((0.78..0.9).contains(&mean), "{mean}");
 }
 
 /// A notched plate that is torn and refined where it is strained most, in three places by the end.

@@ -129,7 +129,9 @@ impl Cost {
 /// Memory of the set-up and after it, by formula.
 fn estimated(plan: &Plan, points: f64, bonds: f64, listed: f64) -> Measured {
     let dimension = plan.dimension.count();
-    let state = 8 * (2 * dimension + 1) + 8 * dimension + 8 * (dimension + 1) + 8 + 2;
+    // Place, displacement, velocity, force; what its bonds have set free; volumes of few different sizes, of the
+    // point and its family; id, block.
+    let state = 4 * 8 * dimension + 8 + 2 + 8 + 2;
     let kept = bonds + state as f64 * points;
     Measured {
         peak: kept.max(SET_UP[0] * points + SET_UP[1] * listed),
