@@ -64,8 +64,16 @@ impl Bins {
 
     /// Calls `found` with the index and the squared distance (m²) of every point within the radius
     /// of a position, itself included if it is one of them.
-    pub fn within(&self, position: [f64; 3], found: impl FnMut(u32, f64)) {
-        self.for_each_within(position, self.radius_squared, found);
+    pub fn within(&self, position: [f64; 3], mut found: impl FnMut(u32, f64)) {
+        let square = self.radius_squared;
+        self.for_each_run(position, square, |entries| {
+            for (index, other) in entries {
+                let squared = distance_squared(position, *other);
+                if squared <= square {
+                    found(*index, squared);
+                }
+            }
+        });
     }
 
     /// Appends the index of every point whose distance from a position is above 0 and has at most this square (m²),
@@ -86,17 +94,6 @@ impl Bins {
             found.truncate(end);
         });
         here
-    }
-
-    fn for_each_within(&self, position: [f64; 3], square: f64, mut found: impl FnMut(u32, f64)) {
-        self.for_each_run(position, square, |entries| {
-            for (index, other) in entries {
-                let squared = distance_squared(position, *other);
-                if squared <= square {
-                    found(*index, squared);
-                }
-            }
-        });
     }
 
     /// Calls `run` with points, one after the other in memory, among which are all whose distance from a position

@@ -10,9 +10,10 @@ use crate::error::Result;
 use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
 
-use super::packed::{AtCoarser, PlaceSet};
+use super::at_coarser::AtCoarser;
 use super::pattern::{Node, Pattern};
 use super::place::{Place, born, numbered, parents};
+use super::place_set::PlaceSet;
 
 /// The grids of all bodies, by body; the same on all ranks.
 #[derive(Clone)]

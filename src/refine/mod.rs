@@ -6,14 +6,15 @@
 //! [`Pattern`] holds which nodes are refined; places, levels and volumes of all nodes follow from it and
 //! from the cells of the body alone, so they are the same on any number of ranks.
 
+mod at_coarser;
 mod grids;
-mod packed;
 mod pattern;
 mod place;
+mod place_set;
 mod shares;
 
 pub use grids::{Grids, Pick};
-pub use packed::PlaceSet;
 pub use pattern::{Node, Pattern};
 pub use place::Place;
+pub use place_set::PlaceSet;
 pub use shares::Shares;

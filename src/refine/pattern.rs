@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
-use super::packed::PlaceSet;
 use super::place::{Place, around, between, born, halves, parents};
+use super::place_set::PlaceSet;
 
 /// A node of a refined grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -255,7 +255,7 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::packed::AtCoarser;
+    use super::super::at_coarser::AtCoarser;
     use super::*;
     use proptest::prelude::*;
 
