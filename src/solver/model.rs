@@ -57,7 +57,6 @@ impl<const D: usize> Model<D> {
     }
 
     /// Without points.
-    #[cfg(test)]
     pub fn empty() -> Self {
         Self {
             reference: std::array::from_fn(|_| Vec::new()),

@@ -12,6 +12,7 @@ use crate::partition::Cost;
 use crate::points::Point;
 
 use super::Simulation;
+use super::model::Model;
 
 /// A repartition; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +93,14 @@ impl<const D: usize> Simulation<'_, D> {
         (0..model.owned()).map(point).collect()
     }
 
+    /// Frees the memory of points and bonds, before they are dealt out anew.
+    pub(super) fn release(&mut self) {
+        self.model = Model::empty();
+        self.forces.release();
+        let columns = self.fields.each_mut().flat_map(|(_, columns)| columns);
+        columns.for_each(|column| *column = Vec::new());
+    }
+
     /// The way from the owned points to the order of ids. Collective.
     pub fn id_order(&self) -> IdOrder {
         let model = &self.model;
@@ -109,6 +118,7 @@ impl<const D: usize> Simulation<'_, D> {
         let mut before: Vec<u64> = pieces.iter().map(|point| point.id).collect();
         before.sort_unstable();
         let cost = Cost::of(time, pieces.len());
+        self.release();
         let mut other = Self::of_points(
             self.plan,
             self.comm,

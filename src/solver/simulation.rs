@@ -489,5 +489,5 @@ fn protect<const D: usize>(
             }
         }
     }
-    forces.protect(comm, &mut protected);
+    forces.protect(comm, &model.block, &mut protected);
 }

@@ -218,6 +218,13 @@ impl<const D: usize> Forces<D> {
         bonds + size_of_val(&self.nodes[..]) + grids
     }
 
+    /// Frees the memory of the bonds and of what they read of the points; nothing can be evaluated then.
+    pub fn release(&mut self) {
+        self.interactions = Vec::new();
+        self.nodes = Vec::new();
+        self.grids = Vec::new();
+    }
+
     /// The owned points, one after the other, whose bonds are worked on together with those of one of them.
     fn together(&self, point: usize) -> Range<usize> {
         let bonds = self.interactions.iter().map(|it| &it.bonds);
@@ -286,10 +293,20 @@ impl<const D: usize> Forces<D> {
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
     /// brought from their owners.
-    pub fn protect(&mut self, comm: &dyn Communicator, protected: &mut [f64]) {
+    pub fn protect(&mut self, comm: &dyn Communicator, block: &[u16], protected: &mut [f64]) {
         self.bring(comm, protected);
+        let mut in_block = vec![0.0_f64; self.blocks.len()];
+        for (block, protected) in block.iter().zip(&*protected) {
+            let most = &mut in_block[usize::from(*block)];
+            *most = most.max(*protected);
+        }
+        comm.max(&mut in_block);
         for interaction in &mut self.interactions {
-            interaction.bonds.protect(|point| protected[point] == 1.0);
+            let blocks = interaction.bonds.blocks();
+            if blocks.into_iter().any(|block| in_block[block] == 1.0) {
+                let is_protected = |point: usize| protected[point] == 1.0;
+                interaction.bonds.protect(is_protected);
+            }
         }
     }
 }

@@ -62,6 +62,18 @@ impl Refined {
     }
 }
 
+/// What the points of other grids begin with, in the order of ids.
+struct Kept {
+    /// The numbers of their state, and at last the block that they had.
+    rows: Vec<f64>,
+    /// Numbers of a row.
+    width: usize,
+    /// How many of their bonds are broken.
+    lengths: Vec<u32>,
+    /// The ids of the other ends of these, ascending for each point.
+    broken: Vec<u64>,
+}
+
 impl<'a, const D: usize> Simulation<'a, D> {
     /// Whether bonds can be given to new points.
     ///
@@ -112,6 +124,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             });
         }
         let (energy, bonds) = self.held(&snapshot);
+        drop(snapshot);
         let before = self.model.total;
         self.regrid(grids, &left, &facets)?;
         let snapshot = Snapshot::new(self);
@@ -142,29 +155,20 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// When METIS fails; the same on all ranks.
     fn regrid(&mut self, grids: Grids<'a>, left: &[Pick], facets: &Facets) -> Result<()> {
         let comm = self.comm;
-        let past = Past::new(self, &grids, left);
         let pieces = self.pieces_on(&grids);
-        let (ids, rows) = past.rows(self, &grids, &pieces);
-        let mut all_broken = self.broken();
-        let staying = past.staying(self.model.owned());
-        let mut broken: Vec<Vec<u64>> = staying
-            .map(|k| std::mem::take(&mut all_broken[k]))
-            .collect();
-        broken.resize(ids.len(), Vec::new());
-        let source = IdOrder::new(comm, &ids, self.model.coarsest);
-        let width = past.columns.len();
-        let rows = source.collect(comm, &rows, width);
-        let lengths: Vec<u32> = broken.iter().map(|ids| ids.len() as u32).collect();
-        let block_lengths = source.collect(comm, &lengths, 1);
-        let broken = source.collect_ragged(comm, &broken.concat(), &lengths, &block_lengths);
-        drop(past);
-
+        let Kept {
+            rows,
+            width,
+            lengths,
+            broken,
+        } = self.kept(&grids, left, &pieces);
+        self.release();
         let mut other = self.on(grids, pieces)?;
         let order = other.id_order();
         let rows = order.spread(comm, &rows, width);
-        let lengths = order.spread(comm, &block_lengths, 1);
-        let broken = order.spread_ragged(comm, &broken, &lengths, &block_lengths);
-        other.inherit(&rows, width, (&lengths, &broken), facets);
+        let own_lengths = order.spread(comm, &lengths, 1);
+        let broken = order.spread_ragged(comm, &broken, &own_lengths, &lengths);
+        other.inherit(&rows, width, (&own_lengths, &broken), facets);
         other.take_rows(&rows, width);
         let steps = std::mem::take(&mut other.steps);
         other.continue_from(&self.progress());
@@ -210,6 +214,29 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
+    /// What the points of other grids, of which this rank makes these `pieces`, begin with. Collective.
+    fn kept(&mut self, grids: &Grids<'_>, left: &[Pick], pieces: &[Point]) -> Kept {
+        let comm = self.comm;
+        let past = Past::new(self, grids, left);
+        let (ids, rows) = past.rows(self, grids, pieces);
+        let mut all_broken = self.broken();
+        let (mut own, mut own_lengths) = (Vec::new(), vec![0; ids.len()]);
+        let staying = past.staying(self.model.owned());
+        for (length, point) in own_lengths.iter_mut().zip(staying) {
+            *length = all_broken[point].len() as u32;
+            own.append(&mut all_broken[point]);
+        }
+        let order = IdOrder::new(comm, &ids, self.model.coarsest);
+        let width = past.columns.len();
+        let lengths = order.collect(comm, &own_lengths, 1);
+        Kept {
+            rows: order.collect(comm, &rows, width),
+            width,
+            broken: order.collect_ragged(comm, &own, &own_lengths, &lengths),
+            lengths,
+        }
+    }
+
     /// For each owned point the ids of those to which its bond is broken, ascending.
     fn broken(&self) -> Vec<Vec<u64>> {
         let mut broken = vec![Vec::new(); self.model.owned()];
@@ -238,8 +265,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .step_by(width)
             .copied()
             .collect();
-        was.resize(model.volume.len(), 0.0);
-        self.forces.bring(self.comm, &mut was);
+        let blocks = model.block.iter().map(|block| f64::from(*block));
+        let same = was.iter().zip(blocks);
+        let mut same: Vec<f64> = same
+            .map(|(was, is)| f64::from(u8::from(*was == is)))
+            .collect();
+        for column in [&mut was, &mut same] {
+            column.resize(model.volume.len(), 0.0);
+            self.forces.bring(self.comm, column);
+        }
         let ends = lengths.iter().scan(0, |end, length| {
             *end += *length as usize;
             Some(*end)
@@ -252,14 +286,21 @@ impl<'a, const D: usize> Simulation<'a, D> {
             starts[point] < starts[point + 1] || facets.are_near(model.position(point))
         };
         let concerned: Vec<bool> = (0..model.owned()).map(concerned).collect();
+        let was_broken = |here: usize, there: usize| {
+            let own = &broken[starts[here]..starts[here + 1]];
+            own.binary_search(&model.ids[there]).is_ok()
+        };
         let cut = |here: usize, there: usize| {
+            // Between such ends there was the same bond.
+            if same[here] == 1.0 && same[there] == 1.0 {
+                return was_broken(here, there);
+            }
             let [a, b] = [here, there].map(|point| model.position(point));
             let [old, other] = [was[here], was[there]];
             if old != NOWHERE && other != NOWHERE {
                 let cutoff = cutoffs[old as usize * count + other as usize];
                 if distance_squared(a, b) <= cutoff * cutoff {
-                    let own = &broken[starts[here]..starts[here + 1]];
-                    return own.binary_search(&model.ids[there]).is_ok();
+                    return was_broken(here, there);
                 }
             }
             let near = near[here].get_or_init(|| facets.near(a));

@@ -110,12 +110,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
-        let seen = self.seen(&self.sources(|point| triggers[point]));
-        let finer = self.picks(&seen, |block, position| self.grids.pick(block, position));
+        let pick = |block, position| self.grids.pick(block, position);
+        // Where nothing becomes coarse again, points that cannot be refined need not be looked at.
+        let matters =
+            |block, position| trigger.coarsen_after.is_some() || pick(block, position).is_some();
+        let seen = self.seen(&self.sources(|point| triggers[point]), matters);
+        let finer = self.picks(&seen, pick);
         let mut coarser = Vec::new();
         if let Some(limit) = trigger.coarsen_after {
             let is_torn = |point| snapshot.damage(&self.family_volume, point) > LEAST_DAMAGE;
-            let at_torn = self.seen(&self.sources(is_torn));
+            let at_torn = self.seen(&self.sources(is_torn), |_, _| true);
             let now = self.clock.time();
             let last = self.fields.last_seen.iter_mut().flatten();
             let silent = last
@@ -185,8 +189,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own)
     }
 
-    /// Which owned points lie within the horizon of one of the sources.
-    fn seen(&self, sources: &[Source]) -> Vec<bool> {
+    /// Which owned points lie within the horizon of one of the sources, of those that matter (by block and position).
+    fn seen(&self, sources: &[Source], matters: impl Fn(usize, [f64; 3]) -> bool) -> Vec<bool> {
         let model = &self.model;
         let longest = sources
             .iter()
@@ -198,8 +202,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let places: Vec<[f64; 3]> = sources.iter().map(|source| source.position).collect();
         let bins = Bins::new(&places, longest * (1.0 + 1e-9));
         let is_seen = |point: usize| {
+            let position = model.position(point);
+            if !matters(usize::from(model.block[point]), position) {
+                return false;
+            }
             let mut seen = false;
-            bins.within(model.position(point), |source, square| {
+            bins.within(position, |source, square| {
                 let horizon = sources[source as usize].horizon * (1.0 + 1e-9);
                 seen |= square <= horizon * horizon;
             });
