@@ -1,6 +1,6 @@
 """A crack that branches on a grid that is refined where it runs, beside uniform grids (Dipasquale et al. 2014, §4).
 
-Runs inputs/crack_branching_adaptive.toml with horizons of 3 and 6 of its finer spacings, and with two levels, and
+Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 of its finer spacings, and with two levels, and
 the same plate on the coarse grid and on grids that are fine everywhere, one after the other on one core. Prints for
 each the points, the time of the run, the fracture energy, the length of the crack and, for a refined grid, the largest
 distance of its crack from that of the uniform fine grid, and from that of a uniform grid whose points lie where the
@@ -19,25 +19,24 @@ import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DECK = ROOT / "inputs" / "crack_branching_adaptive.toml"
-COARSE = 1e-3  # spacing of the deck, m
 BEYOND_THE_NOTCH = 0.055  # m
 
 
-def without_refinement(text):
-    return re.sub(r"(?ms)^\[refinement[^\]]*\]\n.*?(?=^\[(?!refinement)|\Z)", "", text)
+def deck(spacing):
+    """The refined plate with a spacing (m) of the coarse grid."""
+    return re.sub(r"(?m)^dx = \S+", f"dx = {spacing}", DECK.read_text(), count=1)
 
 
-def uniform(spacing, horizon):
-    """The plate on a grid of one spacing; spacing and horizon in m."""
-    text = without_refinement(DECK.read_text())
-    text = re.sub(r"(?m)^dx = \S+", f"dx = {spacing}", text)
-    return re.sub(r'(?m)^horizon = "3\*dx"', f"horizon = {horizon}", text)
+def uniform(spacing, ratio):
+    """The plate on a grid of one spacing (m), with so many of them a horizon."""
+    text = re.sub(r"(?ms)^\[refinement[^\]]*\]\n.*?(?=^\[(?!refinement)|\Z)", "", deck(spacing))
+    return re.sub(r'(?m)^horizon = "3\*dx"', f'horizon = "{ratio}*dx"', text)
 
 
-def same_places(ratio):
+def same_places(coarse, ratio):
     """The plate on a fine grid with points at the places of the coarse one and half-way between them, but on the notch."""
-    text = uniform(COARSE / 2, ratio * COARSE / 2)
-    shift = COARSE / 4
+    text = uniform(coarse / 2, ratio)
+    shift = coarse / 4
     whole = 'shape.box = { lower = [0, "-height/2"], upper = ["length", "height/2"] }'
     box = f'lower = [{shift}, "-height/2 + {shift}"], upper = ["length - {shift}", "height/2 - {shift}"]'
     notch = 'lower = [0, "-dx/4"], upper = ["length/2 + dx/4", "dx/4"]'
@@ -46,7 +45,6 @@ def same_places(ratio):
         whole: f"shape.difference = [{{ box = {{ {box} }} }}, {{ box = {{ {notch} }} }}]",
         'where = "y > height/2 - dx"': 'where = "y > height/2 - 1.5*dx"',
         'where = "y < -height/2 + dx"': 'where = "y < -height/2 + 1.5*dx"',
-        'from = ["length/2 + 5*dx", 0]': 'from = ["length/2 + 20*dx", "4*dx"]',
     }
     for old, new in changes.items():
         if text.count(old) != 1:
@@ -55,30 +53,28 @@ def same_places(ratio):
     return text
 
 
-def refined(ratio):
+def refined(coarse, ratio):
     """The plate on a grid that is refined once, with so many finer spacings a horizon there."""
-    return re.sub(r"(?m)^m = \S+", f"m = {ratio}", DECK.read_text(), count=1)
+    return re.sub(r"(?m)^m = \S+", f"m = {ratio}", deck(coarse), count=1)
 
 
-def refined_twice():
+def refined_twice(coarse):
     """The plate on a grid that is refined twice, with the same ratio on all levels."""
-    text = re.sub(r"(?m)^levels = 1", "levels = 2", DECK.read_text())
+    text = re.sub(r"(?m)^levels = 1", "levels = 2", deck(coarse))
     text = re.sub(r'(?m)^rule = .*\n^m = \["m"\]\n', 'rule = "delta"\n', text)
     return re.sub(r"(?m)^interface_factor = .*\n", "", text)
 
 
-# Name, deck, and the uniform grids that it is compared with.
-CASES = [
-    ("coarse", uniform(COARSE, 3 * COARSE), []),
-    ("fine, m = 3", uniform(COARSE / 2, 1.5 * COARSE), []),
-    ("same places, m = 3", same_places(3), ["fine, m = 3"]),
-    ("refined, m = 3", refined(3), ["fine, m = 3", "same places, m = 3"]),
-    ("fine, m = 6", uniform(COARSE / 2, 3 * COARSE), []),
-    ("same places, m = 6", same_places(6), ["fine, m = 6"]),
-    ("refined, m = 6", refined(6), ["fine, m = 6", "same places, m = 6"]),
-    ("finer, m = 3", uniform(COARSE / 4, 0.75 * COARSE), []),
-    ("refined twice, m = 3", refined_twice(), ["finer, m = 3"]),
-]
+def cases(coarse):
+    """Name, deck, and the uniform grids that it is compared with."""
+    yield "coarse", uniform(coarse, 3), []
+    for ratio in (3, 4, 5, 6):
+        fine, same = f"fine, m = {ratio}", f"same places, m = {ratio}"
+        yield fine, uniform(coarse / 2, ratio), []
+        yield same, same_places(coarse, ratio), [fine]
+        yield f"refined, m = {ratio}", refined(coarse, ratio), [fine, same]
+    yield "finer, m = 3", uniform(coarse / 4, 3), []
+    yield "refined twice, m = 3", refined_twice(coarse), ["finer, m = 3"]
 
 
 def run(arguments, name, text):
@@ -133,11 +129,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
     parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/branching")
+    parser.add_argument("--dx", type=float, default=1e-3, help="spacing of the coarse grid, m [1e-3]")
     parser.add_argument("--repeat", type=int, default=1, help="runs of each case, of which the fastest counts [1]")
     arguments = parser.parse_args()
     found = {}
     print("grid                   points at start, end    time, s   fracture, mJ   length, mm   branches   apart from fine, same places, mm")
-    for name, text, references in CASES:
+    for name, text, references in cases(arguments.dx):
         out, seconds = run(arguments, name, text)
         with h5py.File(out / "result.vtkhdf") as file:
             table = file["history"]
