@@ -111,7 +111,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// changed their rank over all ranks. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks.
+    /// When METIS fails; the same on all ranks. The points are gone then.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

@@ -292,7 +292,7 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
-    /// brought from their owners.
+    /// brought from their owners. `block` is that of the owned points. Collective.
     pub fn protect(&mut self, comm: &dyn Communicator, block: &[u16], protected: &mut [f64]) {
         self.bring(comm, protected);
         let mut in_block = vec![0.0_f64; self.blocks.len()];

@@ -100,7 +100,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Returns what came of it if the points were dealt out anew. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks.
+    /// When METIS fails; the same on all ranks. The points are gone then.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -152,7 +152,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Puts the run on other grids, with everything that points and bonds have. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks.
+    /// When METIS fails; the same on all ranks. The points are gone then.
     fn regrid(&mut self, grids: Grids<'a>, left: &[Pick], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
