@@ -22,6 +22,7 @@ mod fracture_energy;
 mod fronts;
 mod interfaces;
 mod invariants;
+mod joined_steps;
 mod laws;
 mod library;
 mod ordinary_history;

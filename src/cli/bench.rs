@@ -90,9 +90,9 @@ impl Family {
 }
 
 /// Bytes of a point that a step cannot but read or write beside its bonds, in three dimensions:
-/// motion (displacement and velocity read and written, response and block read, twice), and in each
-/// pass over the bonds (reference, displacement and volume read, response read and written).
-const MOTION_BYTES: u64 = 212;
+/// motion (displacement, velocity and response read and written, block read, displacement written for the
+/// bonds), and in each pass over the bonds (reference, displacement and volume read, response read and written).
+const MOTION_BYTES: u64 = 170;
 const PASS_BYTES: u64 = 120;
 
 /// Parses `N` or `X,Y,Z` into the edges of a block in points.

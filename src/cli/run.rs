@@ -197,6 +197,10 @@ impl Observer for Log {
         self.progress.show(now.number(), now.last(), now.time());
     }
 
+    fn looks_at_velocities(&self) -> bool {
+        false
+    }
+
     fn end(&mut self, complete: bool) {
         self.progress.finish(complete);
     }

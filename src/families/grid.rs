@@ -6,6 +6,8 @@
 //! grid falls into bands, between which there are no bonds. Lines follow one another without gaps, so
 //! a place is one number.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -72,6 +74,8 @@ pub struct Grid {
     pub(super) blocks: Vec<u16>,
     /// Owned points and ghosts, and where each chunk's runs start.
     runs: [(Vec<Run>, Vec<u32>); 2],
+    /// Those of the owned points by ascending point.
+    by_point: Vec<Run>,
     by_line: FxHashMap<[i64; 3], u32>,
 }
 
@@ -152,11 +156,13 @@ impl Grid {
             };
             runs(&points, wanted)
         });
+        let by_point = by_point(&runs[0].0);
         Ok(Self {
             frame,
             lines,
             blocks,
             runs,
+            by_point,
             by_line,
         })
     }
@@ -213,9 +219,24 @@ impl Grid {
             });
     }
 
+    /// Where some of the owned points lie: each first place with the points, by local index, of which it is
+    /// that of the first, and after which those of the others follow. No two points have the same place.
+    pub fn places_of(&self, points: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let end = |run: &Run| (run.point + run.length) as usize;
+        let first = (self.by_point).partition_point(|run| end(run) <= points.start);
+        let runs = self.by_point[first..].iter();
+        let runs = runs.take_while(move |run| (run.point as usize) < points.end);
+        runs.map(move |run| {
+            let from = points.start.max(run.point as usize);
+            let place = run.place as usize + from - run.point as usize;
+            (place, from..points.end.min(end(run)))
+        })
+    }
+
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        let runs: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
+        let by_place: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
+        let runs = by_place + self.by_point.len();
         self.blocks.len() * 2
             + size_of_val(&self.lines[..])
             + runs * size_of::<Run>()
@@ -272,6 +293,22 @@ fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
         .into_iter()
         .chain(all.windows(2).filter_map(apart))
         .collect()
+}
+
+/// Runs by ascending point, those that follow one another as one.
+fn by_point(runs: &[Run]) -> Vec<Run> {
+    let mut sorted = runs.to_vec();
+    sorted.sort_unstable_by_key(|run| run.point);
+    sorted.dedup_by(|later, first| {
+        let follows =
+            first.point + first.length == later.point && first.place + first.length == later.place;
+        if follows {
+            first.length += later.length;
+        }
+        follows
+    });
+    sorted.shrink_to_fit();
+    sorted
 }
 
 /// The longest runs of wanted places whose points follow one another, cut at the ends of chunks, and

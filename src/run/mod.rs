@@ -248,13 +248,17 @@ impl<'a> Job<'a> {
                     points: simulation.model.total,
                 });
             }
-            simulation.advance();
+            simulation.advance_halfway();
             let clock = simulation.clock;
             let complete = simulation.is_over();
             let step = simulation.load_step.is_settled.then_some(&clock);
             let due = step.is_some_and(|clock| recorder.is_due(clock));
             let mut stop = None;
-            if watch.end_turn(step) || due || complete || simulation.load_step.has_failed {
+            let looks = watch.end_turn(step) || due || complete || simulation.load_step.has_failed;
+            if looks || self.observer.looks_at_velocities() {
+                simulation.complete_step();
+            }
+            if looks {
                 if let Err(error) = simulation.check() {
                     // The reader of the result should see where it went wrong.
                     recorder.write(simulation, true, true)?;

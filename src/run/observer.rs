@@ -20,6 +20,12 @@ pub trait Observer {
     /// A step has been made, and what was due after it has been written.
     fn step(&mut self, _now: &dyn View) {}
 
+    /// Whether [`Self::step`] looks at velocities. If not, steps may run into one another, which is faster, and
+    /// velocities are known where a row or an output is due.
+    fn looks_at_velocities(&self) -> bool {
+        true
+    }
+
     /// A row of the history has been found.
     fn row(&mut self, _now: &dyn View, _row: &Row) {}
 
@@ -30,7 +36,11 @@ pub trait Observer {
 /// An observer that does nothing.
 pub struct Unobserved;
 
-impl Observer for Unobserved {}
+impl Observer for Unobserved {
+    fn looks_at_velocities(&self) -> bool {
+        false
+    }
+}
 
 /// What a run tells, most of it before its first step.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,6 +123,9 @@ pub trait View {
     fn displacement(&self, component: usize) -> &[f64];
 
     /// A component of the velocities, m/s.
+    ///
+    /// # Panics
+    /// When the observer does not [look at velocities](Observer::looks_at_velocities) and they are not known.
     fn velocity(&self, component: usize) -> &[f64];
 }
 
@@ -150,6 +163,7 @@ impl<const D: usize> View for Simulation<'_, D> {
     }
 
     fn velocity(&self, component: usize) -> &[f64] {
+        assert!(self.is_complete(), "velocities are not known yet");
         &self.fields.velocity[component]
     }
 }

@@ -113,6 +113,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// When METIS fails; the same on all ranks. The points are gone then.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
+        self.complete_step();
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();
         let mut before: Vec<u64> = pieces.iter().map(|point| point.id).collect();

@@ -13,13 +13,14 @@ use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, Evolution, ForceTimes, Forces};
-use super::conditions::{Conditions, apply_initials, are_finite, members};
+use super::conditions::{Conditions, Here, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
 use super::motion::fields::{Needs, plastic_columns};
 use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
+use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
 use super::refinement::{self, Refined};
 use super::repeated::Repeated;
@@ -75,6 +76,8 @@ pub struct Simulation<'a, const D: usize> {
     pub refined: Refined,
     /// Where the time went.
     pub times: Times,
+    /// Whether the second half kick of the present step is still to be made.
+    is_halfway: bool,
     bad: Option<BadPoint>,
 }
 
@@ -227,6 +230,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             grids: refined,
             refined: Refined::default(),
             times: Times::default(),
+            is_halfway: false,
             bad: None,
         };
         simulation.scale_density();
@@ -236,16 +240,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Places what is supported, and evaluates the forces at time 0. Collective.
     fn begin(&mut self) {
-        self.conditions.place(&mut self.fields, 0.0, 0.0);
-        self.conditions.load(&mut self.fields, 0.0, true);
+        self.place(0.0, 0.0);
+        self.load(0.0, true);
         self.evaluate(match self.time_rule().method {
             Method::Explicit => Evolution::Step(0.0),
             // This is no equilibrium.
             Method::Relaxation(_) => Evolution::None,
         });
         self.guide();
-        self.fields.add_damped_energy(&self.model, 0.0);
-        self.bad = self.first_bad();
+        self.find_damping();
+        self.bad = self.first_bad(&self.clock);
         self.times = Times::default();
     }
 
@@ -256,6 +260,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Makes one step, or one iteration of a load step. Collective.
     pub fn advance(&mut self) {
+        self.advance_halfway();
+        self.complete_step();
+    }
+
+    /// As [`Self::advance`], but the second half kick may be left to the next step, which then goes over the
+    /// points once. Until it is made velocities are those in the middle of the step, and work and reactions those of
+    /// the step before. Collective.
+    pub fn advance_halfway(&mut self) {
         if self.is_stage_over() && self.stage + 1 < self.stages.len() {
             self.begin_stage(self.stage + 1);
         }
@@ -269,34 +281,97 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Makes one step by the equation of motion. Collective.
+    /// Makes the second half kick, if that was left.
+    pub fn complete_step(&mut self) {
+        if !std::mem::take(&mut self.is_halfway) {
+            return;
+        }
+        let start = Instant::now();
+        let clock = self.clock;
+        self.set_second_half(&clock);
+        let finite = self.walk(|part, mut here| second_half(part, &mut here, clock.step()));
+        if !finite {
+            self.note_bad(&clock);
+        }
+        self.times.motion += start.elapsed();
+    }
+
+    /// Whether the present step is complete.
+    pub fn is_complete(&self) -> bool {
+        !self.is_halfway
+    }
+
+    /// Makes one step by the equation of motion, but for its second half kick. Collective.
     pub(super) fn make_step(&mut self) {
         let start = Instant::now();
-        let step = self.clock.step();
-        self.conditions.before_moving(&self.fields);
-        verlet::half_kick_and_drift(&self.model, &mut self.fields, step);
-        self.clock.advance();
-        let time = self.clock.time();
-        self.conditions.place(&mut self.fields, time, step);
-        self.times.motion += start.elapsed();
-        self.evaluate(Evolution::Step(step));
-        let start = Instant::now();
-        let (model, fields) = (&self.model, &mut self.fields);
-        self.conditions.load(fields, time, false);
-        let finite = verlet::second_half_kick(model, fields, step);
-        let finite = self.guide() && finite;
-        if !finite {
-            self.note_bad();
+        let before = self.clock;
+        let step = before.step();
+        let was_halfway = std::mem::replace(&mut self.is_halfway, true);
+        if was_halfway {
+            self.set_second_half(&before);
         }
-        let (model, fields) = (&self.model, &mut self.fields);
-        self.conditions.add_work(model, fields);
-        fields.add_damped_energy(model, step);
+        self.clock.advance();
+        self.conditions.set_places(self.clock.time(), step);
+        let finite = self.walk(|part, mut here| {
+            let finite = if was_halfway && here.is_empty() && part.damping.is_none() {
+                verlet::kick_and_drift(part, step)
+            } else {
+                let finite = !was_halfway || second_half(part, &mut here, step);
+                here.before_moving(part);
+                verlet::half_kick_and_drift(part, step);
+                here.place(part);
+                finite
+            };
+            part.show();
+            finite
+        });
+        if !finite {
+            self.note_bad(&before);
+        }
         self.times.motion += start.elapsed();
+        self.evaluate_shown(Evolution::Step(step));
+    }
+
+    /// Gets ready for the second half kick of the step that a clock has come to.
+    fn set_second_half(&mut self, clock: &Clock) {
+        let (time, step) = (clock.time(), clock.step());
+        self.conditions.set_loads(time, false);
+        self.conditions.set_guidance(time, step);
+    }
+
+    /// Calls `work` with each part of the owned points and the loads and supports on it, from several threads.
+    /// Returns whether all calls did.
+    pub(super) fn walk(
+        &mut self,
+        work: impl Fn(&mut Part<'_, D>, Here<'_, D>) -> bool + Sync,
+    ) -> bool {
+        let Self {
+            model,
+            fields,
+            forces,
+            conditions,
+            ..
+        } = self;
+        let (all, on_parts) = conditions.by_part();
+        forces.with_shown(model.owned(), |shown| {
+            walk(Part::all(model, fields, shown), on_parts, |part, on| {
+                work(part, Here::new(all, on))
+            })
+        })
     }
 
     /// Internal forces at the present place; bonds break and remember, or nothing changes but forces.
     /// Collective.
     pub fn evaluate(&mut self, evolution: Evolution) {
+        self.walk(|part, _| {
+            part.show();
+            true
+        });
+        self.evaluate_shown(evolution);
+    }
+
+    /// As [`Self::evaluate`], after all parts of the points were [shown](Part::show).
+    fn evaluate_shown(&mut self, evolution: Evolution) {
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -316,49 +391,78 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
+    /// Puts supported points in their place at `time` (s). `step` is the step just made (s), or 0.
+    pub(super) fn place(&mut self, time: f64, step: f64) {
+        self.conditions.set_places(time, step);
+        self.walk(|part, here| {
+            here.place(part);
+            true
+        });
+    }
+
+    /// Finds the external forces at `time` (s); those that do not change only where `all` are wanted.
+    pub(super) fn load(&mut self, time: f64, all: bool) {
+        self.conditions.set_loads(time, all);
+        self.walk(|part, mut here| {
+            here.load(part);
+            true
+        });
+    }
+
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
     pub(super) fn guide(&mut self) -> bool {
-        let (time, step) = (self.clock.time(), self.clock.step());
-        let method = self.time_rule().method;
-        let (model, fields) = (&self.model, &mut self.fields);
-        match method {
-            Method::Explicit => self.conditions.guide(model, fields, time, step),
-            Method::Relaxation(_) => self.conditions.hold(model, fields),
+        match self.time_rule().method {
+            Method::Explicit => {
+                self.conditions
+                    .set_guidance(self.clock.time(), self.clock.step());
+                self.walk(|part, here| here.guide(part))
+            }
+            Method::Relaxation(_) => self.walk(|part, here| here.hold(part)),
         }
+    }
+
+    /// Finds the power of damping at the present velocities.
+    fn find_damping(&mut self) {
+        self.walk(|part, _| {
+            part.add_damped_energy(0.0);
+            true
+        });
     }
 
     /// Finds from the state, after it has been put back, what is not part of it. Collective.
     pub(super) fn find_anew(&mut self) {
-        let time = self.clock.time();
-        self.conditions.load(&mut self.fields, time, true);
-        self.fields.add_damped_energy(&self.model, 0.0);
+        self.load(self.clock.time(), true);
+        self.find_damping();
         self.evaluate(Evolution::None);
     }
 
-    /// Takes note of a motion that is not finite.
-    pub(super) fn note_bad(&mut self) {
+    /// Takes note of a motion that is not finite, at the time of a clock.
+    pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
-            self.bad = self.first_bad();
+            self.bad = self.first_bad(clock);
         }
     }
 
-    /// The point with the smallest id among those with a motion or force that is not finite.
-    fn first_bad(&self) -> Option<BadPoint> {
+    /// The point with the smallest id among those with a motion, force or reaction that is not finite at the time
+    /// of a clock.
+    fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
                 let Fields {
                     displacement,
                     velocity,
                     internal_force,
+                    reaction,
                     ..
                 } = &self.fields;
-                let mut columns = displacement.iter().chain(velocity).chain(internal_force);
+                let columns = displacement.iter().chain(velocity).chain(internal_force);
+                let mut columns = columns.chain(reaction.iter().flatten());
                 columns.any(|column| !column[*k].is_finite())
             })
             .min_by_key(|k| self.model.ids[*k])
             .map(|index| BadPoint {
-                step: self.clock.number(),
-                time: self.clock.time(),
+                step: clock.number(),
+                time: clock.time(),
                 id: self.model.ids[index],
                 index,
             })
@@ -415,6 +519,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
         };
         agree(self.comm, named)
     }
+}
+
+/// The second half of a step (s), after forces are known at the new place. Returns whether all is finite.
+fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, step: f64) -> bool {
+    here.load(part);
+    let finite = verlet::second_half_kick(part, step);
+    let finite = here.guide(part) && finite;
+    here.add_work(part);
+    part.add_damped_energy(step);
+    finite
 }
 
 /// Whether bonds may break in the place where the points begin.

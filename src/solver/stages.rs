@@ -38,6 +38,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Goes on with another stage from where the points are. Nothing moves in a relaxation, nor after
     /// one.
     pub(super) fn begin_stage(&mut self, stage: usize) {
+        self.complete_step();
         let relaxed = self.relaxes();
         self.enter(stage);
         let (step, _) = self.steps[stage];
@@ -52,10 +53,10 @@ impl<const D: usize> Simulation<'_, D> {
         let forces = [&mut self.fields.external_force, &mut self.fields.reaction];
         let components = forces.into_iter().flatten().flatten();
         components.for_each(|component| component.fill(0.0));
-        self.conditions
-            .load(&mut self.fields, self.clock.time(), true);
+        let clock = self.clock;
+        self.load(clock.time(), true);
         if !self.guide() {
-            self.note_bad();
+            self.note_bad(&clock);
         }
     }
 

@@ -59,16 +59,16 @@ impl ForceTimes {
 pub struct Acting<'a, const D: usize> {
     /// Displacements of the local points, m; those of ghosts are brought up to date.
     pub displacement: &'a mut [Vec<f64>; D],
-    /// Internal force density of the owned points, N/m³; replaced.
+    /// Internal force density of the owned points, N/m³; that of bonds is added to it.
     pub force: &'a mut [Vec<f64>; D],
     /// What plastic flow has left at the owned points; changed in a step.
     pub plastic: PlasticColumns<'a>,
 }
 
 impl<const D: usize> Forces<D> {
-    /// Brings the ghosts up to date and replaces the internal force densities. Bonds break and
-    /// remember, or nothing changes but forces; what comes of bonds that break is in
-    /// [`Self::broken`]. Collective.
+    /// Brings the ghosts up to date and adds up the internal force densities. The bonds have been
+    /// [shown](Self::with_shown) the owned points. Bonds break and remember, or nothing changes but forces; what
+    /// comes of bonds that break is in [`Self::broken`]. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -87,11 +87,6 @@ impl<const D: usize> Forces<D> {
         let piece = PIECE * rayon::current_num_threads();
         let start = Instant::now();
         let mut in_bonds = Duration::ZERO;
-        for component in force.iter_mut() {
-            component
-                .par_chunks_mut(CHUNK)
-                .for_each(|part| part.fill(0.0));
-        }
         for turn in 0..self.passes.len() {
             let pass = self.passes[turn];
             let news = self.news(turn);
@@ -183,7 +178,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Shows the bonds what is new of some of the points.
+    /// Shows the bonds what is new of some of the points; they have been shown the displacements of the owned ones.
     pub(super) fn update(
         &mut self,
         news: News,
@@ -193,7 +188,8 @@ impl<const D: usize> Forces<D> {
     ) {
         for grid in &mut self.grids {
             match news {
-                News::Displacement => grid.update_displacement(which, displacement),
+                News::Displacement if which == Which::Ghosts => grid.update_ghosts(displacement),
+                News::Displacement => {}
                 News::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
                 News::OwnNumbers if which == Which::Ghosts => {}
                 News::Numbers | News::OwnNumbers => {
@@ -203,14 +199,16 @@ impl<const D: usize> Forces<D> {
                 News::Nothing => {}
             }
         }
-        if news == News::Displacement && !self.nodes.is_empty() {
-            let (owned, local) = (model.owned(), model.volume.len());
-            let points = match which {
-                Which::Owned => 0..owned,
-                Which::Ghosts => owned..local,
-                Which::All => 0..local,
-            };
-            list_points::update(&mut self.nodes, points, displacement);
+        if news == News::Displacement && which == Which::Ghosts && !self.nodes.is_empty() {
+            let owned = model.owned();
+            let ghosts = self.nodes[owned..].par_chunks_mut(CHUNK).enumerate();
+            ghosts.for_each(|(chunk, nodes)| {
+                let first = owned + chunk * CHUNK;
+                list_points::update(
+                    nodes,
+                    displacement.each_ref().map(|column| &column[first..]),
+                );
+            });
         }
     }
 

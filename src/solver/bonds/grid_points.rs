@@ -1,6 +1,7 @@
 //! What kernels read of the local points of a grid, in the order of their places: eight adjacent
 //! points at once.
 
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 use crate::damage::Limits;
@@ -37,10 +38,19 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Takes the displacements of some of the local points.
-    pub fn update_displacement(&mut self, which: Which, displacement: &[Vec<f64>; D]) {
+    /// Takes the displacements of the ghosts.
+    pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D]) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
-            self.grid.update(which, values, places);
+            self.grid.update(Which::Ghosts, values, places);
+        }
+    }
+
+    /// Where the displacements of the owned points go.
+    pub fn owned_places(&mut self) -> OwnedPlaces<'_, D> {
+        OwnedPlaces {
+            grid: &self.grid,
+            columns: (self.displacement.each_mut()).map(|column| column.as_mut_ptr()),
+            values: PhantomData,
         }
     }
 
@@ -67,6 +77,39 @@ impl<const D: usize> GridValues<D> {
         let columns = self.displacement.iter().chain(&self.numbers);
         let count: usize = columns.map(|column| column.len()).sum();
         size_of::<f64>() * count + self.limits.bytes() + self.grid.bytes()
+    }
+}
+
+/// Where the displacements of a grid's owned points go, from several threads.
+pub struct OwnedPlaces<'a, const D: usize> {
+    grid: &'a Grid,
+    columns: [*mut f64; D],
+    values: PhantomData<&'a mut f64>,
+}
+
+// SAFETY: threads write to its columns only what `take` says.
+unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
+// SAFETY: as above.
+unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
+
+impl<const D: usize> OwnedPlaces<'_, D> {
+    /// Takes the displacements of owned points from a local index on.
+    ///
+    /// # Safety
+    /// No other thread does so for any of these points at the same time.
+    pub unsafe fn take(&self, first: usize, displacement: [&[f64]; D]) {
+        let count = displacement[0].len();
+        for (place, points) in self.grid.places_of(first..first + count) {
+            for d in 0..D {
+                let values = &displacement[d][points.start - first..points.end - first];
+                // SAFETY: these are places of the grid, for each of which a column has an entry, and no other
+                // points have them.
+                unsafe {
+                    let entries = self.columns[d].add(place);
+                    entries.copy_from_nonoverlapping(values.as_ptr(), values.len());
+                }
+            }
+        }
     }
 }
 

@@ -1,10 +1,6 @@
 //! What kernels read of the local points where bonds are listed: all geometry of a point in one cache
 //! line.
 
-use std::ops::Range;
-
-use rayon::prelude::*;
-
 use crate::damage::Limits;
 use crate::families::{Groups, Row};
 use crate::lanes::numbers::gather;
@@ -14,9 +10,6 @@ use crate::solver::model::Model;
 
 use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, ReadLimits};
-
-/// Points handled by one task.
-const CHUNK: usize = 4096;
 
 /// Reference position (m), displacement (m) and volume (m³) of a point, three components each.
 #[derive(Debug, Clone, Copy)]
@@ -38,23 +31,13 @@ pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
     (0..model.volume.len()).map(node).collect()
 }
 
-/// Brings the displacements of a range of points up to date.
-pub fn update<const D: usize>(
-    nodes: &mut [Node],
-    points: Range<usize>,
-    displacement: &[Vec<f64>; D],
-) {
-    let first = points.start;
-    nodes[points]
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .for_each(|(chunk, nodes)| {
-            for (k, node) in nodes.iter_mut().enumerate() {
-                for d in 0..D {
-                    node.0[DISPLACEMENT + d] = displacement[d][first + chunk * CHUNK + k];
-                }
-            }
-        });
+/// Brings the displacements of some points up to date.
+pub fn update<const D: usize>(nodes: &mut [Node], displacement: [&[f64]; D]) {
+    for (k, node) in nodes.iter_mut().enumerate() {
+        for d in 0..D {
+            node.0[DISPLACEMENT + d] = displacement[d][k];
+        }
+    }
 }
 
 /// The local points, ghosts included, as a kernel reads them.

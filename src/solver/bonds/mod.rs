@@ -21,6 +21,7 @@ mod point_numbers;
 mod point_sums;
 mod saved;
 mod seen;
+mod shown;
 mod sweep;
 
 use std::ops::Range;
@@ -48,6 +49,7 @@ pub use interaction::{BlockLaws, Interaction};
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
 pub use seen::Stored;
+pub use shown::Shown;
 
 /// One sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,21 +1,27 @@
 //! Loads: force densities on some points.
 
-use rayon::prelude::*;
-
 use crate::deck::expression::Expression;
-use crate::solver::model::Model;
-use crate::solver::motion::Fields;
+use crate::solver::motion::walk::Part;
 
-use super::scattered::{CHUNK, for_each_point};
-use super::values::Values;
+use super::values::{At, Values};
 
-/// A body force density on some points.
+/// A body force density.
 pub struct Load<const D: usize> {
-    points: Vec<u32>,
-    positions: Vec<[f64; 3]>,
     values: [Values; D],
     factors: [f64; D],
-    /// With which share points take part; wholly if there is none.
+    now: [At; D],
+    /// Whether it is to be found on its points: it changes, or all are wanted.
+    pub is_due: bool,
+}
+
+/// The points of a part that a load acts on.
+pub struct Loaded<const D: usize> {
+    /// Which load.
+    load: usize,
+    /// Their numbers in the part.
+    points: Vec<u16>,
+    positions: Vec<[f64; 3]>,
+    /// With which share they take part; wholly if there is none.
     shares: Option<Vec<f64>>,
     /// Force density now, N/m³.
     force: Vec<[f64; D]>,
@@ -25,98 +31,104 @@ pub struct Load<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// On some of the owned points: each component is its expression times its factor, N/m³, times the
-    /// point's share if there are shares.
-    pub fn new(
-        model: &Model<D>,
-        (points, shares): (Vec<u32>, Option<Vec<f64>>),
-        values: &[Expression],
-        factors: [f64; D],
-    ) -> Self {
-        let position = |point: &u32| model.position(*point as usize);
+    /// Each component is its expression times its factor, N/m³.
+    pub fn new(values: &[Expression], factors: [f64; D]) -> Self {
+        let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
-            positions: points.iter().map(position).collect(),
-            values: std::array::from_fn(|d| Values::new(&values[d])),
+            now: values.each_ref().map(|values| values.at(0.0)),
+            values,
             factors,
-            shares,
-            force: vec![[0.0; D]; points.len()],
-            before: vec![[0.0; D]; points.len()],
-            moved_from: vec![[0.0; D]; points.len()],
-            points,
+            is_due: false,
         }
     }
 
-    /// Whether it changes in time.
-    pub fn changes(&self) -> bool {
-        self.values.iter().any(|values| values.changes)
+    /// Gets ready for a time (s); `all`: also where nothing changes.
+    pub fn set_time(&mut self, time: f64, all: bool) {
+        self.is_due = all || self.values.iter().any(|values| values.changes);
+        if self.is_due {
+            self.now = self.values.each_ref().map(|values| values.at(time));
+        }
     }
 
-    /// Evaluates the force density at a time (s).
-    pub fn update(&mut self, time: f64) {
-        let (positions, shares, factors) = (&self.positions, self.shares.as_ref(), self.factors);
-        let values = self
-            .values
-            .each_ref()
-            .map(|values| values.at(positions, time));
-        let forces = self.force.par_iter_mut().with_min_len(CHUNK).enumerate();
-        forces.for_each(|(k, force)| {
-            *force = std::array::from_fn(|d| {
-                let component = factors[d] * values[d](k);
-                shares.map_or(component, |shares| shares[k] * component)
-            });
-        });
+    /// The force density (N/m³) on all of a point at a position (m).
+    fn on(&self, position: [f64; 3]) -> [f64; D] {
+        std::array::from_fn(|d| self.factors[d] * self.values[d].of(&self.now[d], position))
+    }
+}
+
+impl<const D: usize> Loaded<D> {
+    /// Of the load with this number, on the points with these numbers in the part.
+    pub fn new(
+        load: usize,
+        points: Vec<u16>,
+        positions: Vec<[f64; 3]>,
+        shares: Option<Vec<f64>>,
+    ) -> Self {
+        let none = || vec![[0.0; D]; points.len()];
+        Self {
+            load,
+            force: none(),
+            before: none(),
+            moved_from: none(),
+            points,
+            positions,
+            shares,
+        }
     }
 
-    /// Takes the load's points out of a field of external forces.
-    pub fn clear(&self, external: &mut [Vec<f64>; D]) {
-        let columns = external.each_mut().map(Vec::as_mut_slice);
-        for_each_point(&self.points, columns, |_, _, entries| {
-            entries.into_iter().for_each(|entry| *entry = 0.0);
-            true
-        });
+    /// Finds the force densities, if they are due.
+    pub fn find(&mut self, loads: &[Load<D>]) {
+        let load = &loads[self.load];
+        if !load.is_due {
+            return;
+        }
+        for (k, force) in self.force.iter_mut().enumerate() {
+            let whole = load.on(self.positions[k]);
+            let share = self.shares.as_ref().map(|shares| shares[k]);
+            *force = whole.map(|component| share.map_or(component, |share| share * component));
+        }
     }
 
-    /// Adds the load to a field of external forces.
-    pub fn add(&self, external: &mut [Vec<f64>; D]) {
-        let columns = external.each_mut().map(Vec::as_mut_slice);
-        for_each_point(&self.points, columns, |k, _, entries| {
-            for (entry, force) in entries.into_iter().zip(self.force[k]) {
-                *entry += force;
+    /// Takes the points out of the external forces.
+    pub fn clear(&self, part: &mut Part<'_, D>) {
+        for component in part.external_force.iter_mut().flatten() {
+            for point in &self.points {
+                component[usize::from(*point)] = 0.0;
             }
-            true
-        });
+        }
     }
 
-    /// Remembers force and place, for the work of the coming step.
-    pub fn before_moving(&mut self, fields: &Fields<D>) {
-        self.remember_now(&fields.displacement);
+    /// Adds the load to the external forces.
+    pub fn add(&self, part: &mut Part<'_, D>) {
+        let components = part.external_force.iter_mut().flatten();
+        for (d, component) in components.enumerate() {
+            for (point, force) in self.points.iter().zip(&self.force) {
+                component[usize::from(*point)] += force[d];
+            }
+        }
     }
 
-    /// Remembers force and place at an earlier time (s), when points had these displacements (m).
-    pub fn remember(&mut self, displacement: &[Vec<f64>; D], time: f64, now: f64) {
-        self.update(time);
-        self.remember_now(displacement);
-        self.update(now);
-    }
-
-    fn remember_now(&mut self, displacement: &[Vec<f64>; D]) {
-        let now = self.force.par_iter().with_min_len(CHUNK).zip(&self.points);
-        let past = self.before.par_iter_mut().zip(&mut self.moved_from);
-        past.zip(now).for_each(|((before, from), (force, point))| {
-            *before = *force;
-            *from = std::array::from_fn(|d| displacement[d][*point as usize]);
-        });
+    /// Remembers force and place, for the work of the coming step, when the points of the part have these
+    /// displacements (m).
+    pub fn remember(&mut self, displacement: [&[f64]; D]) {
+        self.before.copy_from_slice(&self.force);
+        for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
+            *from = displacement.map(|column| column[usize::from(*point)]);
+        }
     }
 
     /// Adds the work of the step (J), by the trapezoid rule.
-    pub fn add_work(&self, model: &Model<D>, displacement: &[Vec<f64>; D], work: &mut [f64]) {
-        for_each_point(&self.points, [work], |k, point, [work]| {
+    pub fn add_work(&self, part: &mut Part<'_, D>) {
+        let Some([work]) = &mut part.external_work else {
+            return;
+        };
+        for (k, point) in self.points.iter().enumerate() {
+            let point = usize::from(*point);
             for d in 0..D {
-                let moved = displacement[d][point] - self.moved_from[k][d];
+                let moved = part.displacement[d][point] - self.moved_from[k][d];
                 let force = 0.5 * (self.before[k][d] + self.force[k][d]);
-                *work += force * moved * model.volume[point];
+                work[point] += force * moved * part.model.volume[part.first + point];
             }
-            true
-        });
+        }
     }
 }

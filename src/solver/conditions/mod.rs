@@ -3,7 +3,6 @@
 mod finite;
 mod initial;
 mod loads;
-mod scattered;
 mod supports;
 mod values;
 
@@ -17,16 +16,39 @@ use crate::refine::{Grids, Shares};
 
 use super::model::Model;
 use super::motion::Fields;
+use super::motion::walk::{PART, Part, parts};
 pub use finite::are_finite;
 pub use initial::apply_initials;
-use loads::Load;
-use supports::{Motion, Support};
+use loads::{Load, Loaded};
+use supports::{Motion, Support, Supported};
 
-/// Loads and supports of this rank's points.
+/// Loads and supports, and this rank's points that they act on.
 #[derive(Default)]
 pub struct Conditions<const D: usize> {
     loads: Vec<Load<D>>,
     supports: Vec<Support>,
+    /// By part of the points.
+    on_parts: Vec<OnPart<D>>,
+}
+
+/// What loads and supports act on in a part of the points, in the order of the deck.
+#[derive(Default)]
+pub struct OnPart<const D: usize> {
+    loads: Vec<Loaded<D>>,
+    supports: Vec<Supported>,
+}
+
+/// Loads and supports on a part of the points.
+pub struct Here<'a, const D: usize> {
+    all: All<'a, D>,
+    on: &'a mut OnPart<D>,
+}
+
+/// Loads and supports, as all parts share them.
+#[derive(Clone, Copy)]
+pub struct All<'a, const D: usize> {
+    loads: &'a [Load<D>],
+    supports: &'a [Support],
 }
 
 /// Local indices of the owned points of a set, by index.
@@ -97,10 +119,16 @@ impl<const D: usize> Conditions<D> {
         (model, grids): (&Model<D>, &Grids<'_>),
         acting: &[bool],
     ) -> Result<Self> {
-        let mut loads = Vec::new();
-        let mut supports: Vec<Support> = Vec::new();
-        let conditions = plan.conditions.iter().zip(acting);
-        for (condition, _) in conditions.filter(|(_, acting)| **acting) {
+        let mut conditions = Self {
+            on_parts: (0..parts(model.owned()))
+                .map(|_| OnPart::default())
+                .collect(),
+            ..Self::default()
+        };
+        // The points of the supports, until all are known.
+        let mut supported: Vec<Vec<u32>> = Vec::new();
+        let of_deck = plan.conditions.iter().zip(acting);
+        for (condition, _) in of_deck.filter(|(_, acting)| **acting) {
             let points = members(plan, model, condition.set);
             let key = format!("[condition.{}] set", condition.name);
             let place = (&key[..], condition.span.clone());
@@ -108,11 +136,13 @@ impl<const D: usize> Conditions<D> {
             let mut prescribe = |motion, components: &[Option<Expression>]| {
                 for (component, value) in components.iter().enumerate() {
                     let Some(value) = value else { continue };
-                    for earlier in supports.iter_mut().filter(|s| s.component == component) {
-                        earlier.release(&points);
+                    let earlier = conditions.supports.iter().zip(&mut supported);
+                    for (_, others) in earlier.filter(|(other, _)| other.component == component) {
+                        others.retain(|point| points.binary_search(point).is_err());
                     }
-                    let points = points.clone();
-                    supports.push(Support::new(model, component, motion, points, value));
+                    let support = Support::new(component, motion, value);
+                    conditions.supports.push(support);
+                    supported.push(points.clone());
                 }
             };
             match &condition.action {
@@ -121,7 +151,7 @@ impl<const D: usize> Conditions<D> {
                 Action::BodyForce(values, factors) => {
                     let factors = std::array::from_fn(|d| factors[d]);
                     let points = loaded(plan, model, grids, condition.set);
-                    loads.push(Load::new(model, points, values, factors));
+                    conditions.add_load(model, Load::new(values, factors), points);
                 }
                 Action::Force(values) => {
                     let mut volume = [ExactSum::default()];
@@ -131,11 +161,40 @@ impl<const D: usize> Conditions<D> {
                         volume[0].add(share * model.volume[*point as usize]);
                     }
                     let volume = reduce(comm, &mut volume)[0];
-                    loads.push(Load::new(model, points, values, [1.0 / volume; D]));
+                    let load = Load::new(values, [1.0 / volume; D]);
+                    conditions.add_load(model, load, points);
                 }
             }
         }
-        Ok(Self { loads, supports })
+        for (support, points) in supported.iter().enumerate() {
+            for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
+                let (numbers, positions) = numbers_in_part(model, points);
+                let supported = Supported::new(support, numbers, positions);
+                conditions.on_parts[part_of(points[0])]
+                    .supports
+                    .push(supported);
+            }
+        }
+        Ok(conditions)
+    }
+
+    /// Adds a load on some of the owned points, ascending, with their shares if it has them.
+    fn add_load(
+        &mut self,
+        model: &Model<D>,
+        load: Load<D>,
+        (points, shares): (Vec<u32>, Option<Vec<f64>>),
+    ) {
+        let mut first = 0;
+        for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
+            let own = first..first + points.len();
+            first = own.end;
+            let shares = shares.as_ref().map(|shares| shares[own].to_vec());
+            let (numbers, positions) = numbers_in_part(model, points);
+            let loaded = Loaded::new(self.loads.len(), numbers, positions, shares);
+            self.on_parts[part_of(points[0])].loads.push(loaded);
+        }
+        self.loads.push(load);
     }
 
     /// Whether there are loads; the same on all ranks.
@@ -148,100 +207,36 @@ impl<const D: usize> Conditions<D> {
         !self.supports.is_empty()
     }
 
-    /// Before the points move: remembers forces and places, for the work of the coming step.
-    pub fn before_moving(&mut self, fields: &Fields<D>) {
-        for load in &mut self.loads {
-            load.before_moving(fields);
-        }
+    /// Gets ready to put supported points in their place at `time` (s). `step` is the step just made (s), 0 at
+    /// the start.
+    pub fn set_places(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
-            support.before_moving(fields);
+            support.set_place(time, step);
         }
     }
 
-    /// After the points have moved to time `time` (s): puts supported ones in their place. `step` is
-    /// the step just made (s), 0 at the start.
-    pub fn place(&self, fields: &mut Fields<D>, time: f64, step: f64) {
-        for support in &self.supports {
-            let component = support.component;
-            support.place(&mut fields.displacement[component], time, step);
-            if step > 0.0 {
-                let displacement = &fields.displacement[component];
-                support.set_mean_velocity(displacement, &mut fields.velocity[component], step);
-            }
-        }
-    }
-
-    /// Finds the external forces at `time` (s); those that do not change are found only where `all` are
-    /// wanted.
-    pub fn load(&mut self, fields: &mut Fields<D>, time: f64, all: bool) {
-        let Some(external) = &mut fields.external_force else {
-            return;
-        };
-        if !all && !self.loads.iter().any(Load::changes) {
-            return;
-        }
-        for load in self.loads.iter_mut().filter(|load| all || load.changes()) {
-            load.update(time);
-        }
-        for load in &self.loads {
-            load.clear(external);
-        }
-        for load in &self.loads {
-            load.add(external);
-        }
-    }
-
-    /// Gives supported points their velocity at `time` (s), and finds the reactions. `step` is the time
-    /// step (s). Returns whether all of that is finite.
-    pub fn guide(&self, model: &Model<D>, fields: &mut Fields<D>, time: f64, step: f64) -> bool {
-        let mut finite = true;
-        for support in &self.supports {
-            finite &= support.guide(model, fields, time, step);
-        }
-        finite
-    }
-
-    /// Finds the reactions that keep supported points where they are, at rest. Returns whether they are
-    /// finite.
-    pub fn hold(&self, model: &Model<D>, fields: &mut Fields<D>) -> bool {
-        let mut finite = true;
-        for support in &self.supports {
-            finite &= support.hold(model, fields);
-        }
-        finite
-    }
-
-    /// Remembers forces and places of the last equilibrium, at the time `then` (s), for the work until
-    /// the one at `now` (s).
-    pub fn remember_equilibrium(&mut self, fields: &Fields<D>, then: f64, now: f64) {
-        let Some(displacement) = &fields.equilibrium_displacement else {
-            return;
-        };
+    /// Gets ready to find the external forces at `time` (s); those that do not change are found only where `all`
+    /// are wanted.
+    pub fn set_loads(&mut self, time: f64, all: bool) {
         for load in &mut self.loads {
-            load.remember(displacement, then, now);
-        }
-        for support in &mut self.supports {
-            support.remember(displacement, fields.equilibrium_reaction.as_ref());
+            load.set_time(time, all);
         }
     }
 
-    /// After forces and reactions are known at the new place: adds up the work of the step, by the
-    /// trapezoid rule.
-    pub fn add_work(&self, model: &Model<D>, fields: &mut Fields<D>) {
-        let Some(work) = &mut fields.external_work else {
-            return;
-        };
-        for load in &self.loads {
-            load.add_work(model, &fields.displacement, work);
+    /// Gets ready to guide supported points at `time` (s). `step` is the time step (s).
+    pub fn set_guidance(&mut self, time: f64, step: f64) {
+        for support in &mut self.supports {
+            support.set_guidance(time, step);
         }
-        let Some(reaction) = &fields.reaction else {
-            return;
+    }
+
+    /// What all parts share, and what each has.
+    pub fn by_part(&mut self) -> (All<'_, D>, &mut [OnPart<D>]) {
+        let all = All {
+            loads: &self.loads,
+            supports: &self.supports,
         };
-        for support in &self.supports {
-            let component = support.component;
-            let displacement = &fields.displacement[component];
-            support.add_work(model, displacement, &reaction[component], work);
-        }
+        (all, &mut self.on_parts)
     }
 
     /// Sums the force of the supports on a set's points by component, N. `members` is sorted.
@@ -250,15 +245,118 @@ impl<const D: usize> Conditions<D> {
         let Some(reaction) = &fields.reaction else {
             return sums;
         };
-        for support in &self.supports {
-            for point in support.points() {
-                if members.binary_search(point).is_ok() {
-                    let point = *point as usize;
-                    let force = reaction[support.component][point] * model.volume[point];
-                    sums[support.component].add(force);
+        for (number, part) in self.on_parts.iter().enumerate() {
+            for supported in &part.supports {
+                let (component, points) = supported.points(&self.supports);
+                for point in points.map(|point| number * PART + point) {
+                    if members.binary_search(&(point as u32)).is_ok() {
+                        let force = reaction[component][point] * model.volume[point];
+                        sums[component].add(force);
+                    }
                 }
             }
         }
         sums
+    }
+}
+
+/// The part that an owned point is in.
+fn part_of(point: u32) -> usize {
+    point as usize / PART
+}
+
+/// The numbers in their part of owned points, and their positions (m).
+fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16>, Vec<[f64; 3]>) {
+    let each = points.iter().map(|point| *point as usize);
+    each.map(|point| ((point % PART) as u16, model.position(point)))
+        .unzip()
+}
+
+impl<'a, const D: usize> Here<'a, D> {
+    /// From what all parts share and what one has.
+    pub fn new(all: All<'a, D>, on: &'a mut OnPart<D>) -> Self {
+        Self { all, on }
+    }
+
+    /// Whether none acts on this part.
+    pub fn is_empty(&self) -> bool {
+        self.on.loads.is_empty() && self.on.supports.is_empty()
+    }
+
+    /// Before the points move: remembers forces and places, for the work of the coming step.
+    pub fn before_moving(&mut self, part: &Part<'_, D>) {
+        let displacement = part.displacement.each_ref().map(|column| &**column);
+        let reaction = part.reaction.as_ref();
+        let reaction = reaction.map(|reaction| reaction.each_ref().map(|column| &**column));
+        self.remember(displacement, reaction);
+    }
+
+    /// Remembers forces and places when the points of the part have these displacements (m) and supports exert
+    /// these reactions (N/m³).
+    pub fn remember(&mut self, displacement: [&[f64]; D], reaction: Option<[&[f64]; D]>) {
+        for load in &mut self.on.loads {
+            load.remember(displacement);
+        }
+        for support in &mut self.on.supports {
+            support.remember(self.all.supports, displacement, reaction);
+        }
+    }
+
+    /// After the points have moved: puts supported ones in their place.
+    pub fn place(&self, part: &mut Part<'_, D>) {
+        for support in &self.on.supports {
+            support.place(self.all.supports, part);
+        }
+    }
+
+    /// Finds the forces of the loads that are due.
+    pub fn find_loads(&mut self) {
+        for load in &mut self.on.loads {
+            load.find(self.all.loads);
+        }
+    }
+
+    /// Finds the external forces, if any load is due.
+    pub fn load(&mut self, part: &mut Part<'_, D>) {
+        if !self.all.loads.iter().any(|load| load.is_due) {
+            return;
+        }
+        self.find_loads();
+        for load in &self.on.loads {
+            load.clear(part);
+        }
+        for load in &self.on.loads {
+            load.add(part);
+        }
+    }
+
+    /// Gives supported points their velocity, and finds the reactions. Returns whether all of that is finite.
+    pub fn guide(&self, part: &mut Part<'_, D>) -> bool {
+        let mut finite = true;
+        for support in &self.on.supports {
+            finite &= support.guide(self.all.supports, part);
+        }
+        finite
+    }
+
+    /// Finds the reactions that keep supported points where they are, at rest. Returns whether they are
+    /// finite.
+    pub fn hold(&self, part: &mut Part<'_, D>) -> bool {
+        let mut finite = true;
+        for support in &self.on.supports {
+            finite &= support.hold(self.all.supports, part);
+        }
+        finite
+    }
+
+    /// After forces and reactions are known at the new place: adds up the work of the step, by the
+    /// trapezoid rule.
+    pub fn add_work(&self, part: &mut Part<'_, D>) {
+        for load in &self.on.loads {
+            load.add_work(part);
+        }
+        for support in &self.on.supports {
+            support.add_work(self.all.supports, part);
+        }
     }
 }

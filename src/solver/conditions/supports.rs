@@ -1,14 +1,9 @@
 //! Supports: prescribed motions, and the reactions that they take.
 
-use rayon::prelude::*;
-
 use crate::deck::expression::Expression;
-use crate::solver::model::Model;
-use crate::solver::motion::Fields;
-use crate::solver::motion::fields::Exerted;
+use crate::solver::motion::walk::Part;
 
-use super::scattered::{CHUNK, for_each_point};
-use super::values::Values;
+use super::values::{At, Values};
 
 /// What a support prescribes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,207 +14,225 @@ pub enum Motion {
     Velocity,
 }
 
-/// One component of the motion of some points.
+/// A prescribed component of motion.
 pub struct Support {
     /// Which component.
     pub component: usize,
     motion: Motion,
-    /// Local indices, ascending.
-    points: Vec<u32>,
-    positions: Vec<[f64; 3]>,
     values: Values,
-    /// Force density and place (m) before the step.
+    place: Place,
+    guidance: Guidance,
+}
+
+/// Where the points are put.
+struct Place {
+    /// Length of the step just made, s; 0 at the start.
+    step: f64,
+    /// The values at its begin and its end.
+    values: [At; 2],
+}
+
+/// How the points move.
+struct Guidance {
+    time: f64,
+    step: f64,
+    /// Velocity (m/s) and acceleration (m/s²) of all points, if they have the same.
+    same: Option<(f64, f64)>,
+}
+
+/// The points of a part that a support holds.
+pub struct Supported {
+    /// Which support.
+    support: usize,
+    /// Their numbers in the part.
+    points: Vec<u16>,
+    positions: Vec<[f64; 3]>,
+    /// Force density (N/m³) and place (m) before the step.
     before: Vec<f64>,
     moved_from: Vec<f64>,
 }
 
 impl Support {
-    /// Prescribes a component of the motion of some of the owned points.
-    pub fn new<const D: usize>(
-        model: &Model<D>,
-        component: usize,
-        motion: Motion,
-        points: Vec<u32>,
-        value: &Expression,
-    ) -> Self {
-        let position = |point: &u32| model.position(*point as usize);
+    /// Prescribes a component of motion.
+    pub fn new(component: usize, motion: Motion, value: &Expression) -> Self {
+        let values = Values::new(value);
+        let start = || values.at(0.0);
         Self {
             component,
             motion,
-            positions: points.iter().map(position).collect(),
-            values: Values::new(value),
+            place: Place {
+                step: 0.0,
+                values: [start(), start()],
+            },
+            guidance: Guidance {
+                time: 0.0,
+                step: 0.0,
+                same: None,
+            },
+            values,
+        }
+    }
+
+    /// Gets ready to put points in their place at `time` (s). `step` is the step just made (s), 0 at the start.
+    pub fn set_place(&mut self, time: f64, step: f64) {
+        self.place = Place {
+            step,
+            values: [time - step, time].map(|time| self.values.at(time)),
+        };
+    }
+
+    /// Gets ready to give points their velocity at `time` (s); `step` is the time step (s).
+    pub fn set_guidance(&mut self, time: f64, step: f64) {
+        let same = || self.moving([0.0; 3], time, step);
+        self.guidance = Guidance {
+            time,
+            step,
+            same: (!self.values.varies).then(same),
+        };
+    }
+
+    /// The velocity (m/s) and the acceleration (m/s²) of a point at a position (m) that the Verlet scheme
+    /// makes at a time (s) with a step (s).
+    fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
+        // Before the start the motion is extrapolated, and where it ends, as √(1 − t) does.
+        let change = |step: f64| self.values.expression.increment(position, time, step);
+        let to_come = match change(step) {
+            to_come if to_come.is_finite() || time < step => to_come,
+            _ => -change(-step),
+        };
+        let before = match self.motion {
+            _ if time >= step => -change(-step),
+            Motion::Displacement => to_come,
+            Motion::Velocity => 0.0,
+        };
+        match self.motion {
+            Motion::Displacement => (
+                (before + to_come) / (2.0 * step),
+                (to_come - before) / (step * step),
+            ),
+            Motion::Velocity => (
+                self.values.expression.evaluate(position, time),
+                (before + to_come) / (2.0 * step),
+            ),
+        }
+    }
+}
+
+impl Supported {
+    /// Of the support with this number, the points with these numbers in the part.
+    pub fn new(support: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
+        Self {
+            support,
             before: vec![0.0; points.len()],
             moved_from: vec![0.0; points.len()],
             points,
+            positions,
         }
     }
 
-    /// Leaves those points alone that `others` (ascending) names.
-    pub fn release(&mut self, others: &[u32]) {
-        let mut keep = (self.points.iter()).map(|point| others.binary_search(point).is_err());
-        let kept: Vec<bool> = keep.by_ref().collect();
-        let mut each = kept.iter();
-        self.points.retain(|_| *each.next().expect("one a point"));
-        let mut each = kept.iter();
-        self.positions
-            .retain(|_| *each.next().expect("one a point"));
-        self.before.truncate(self.points.len());
-        self.moved_from.truncate(self.points.len());
+    /// The component, and the numbers of the points in the part.
+    pub fn points<'a>(&'a self, supports: &[Support]) -> (usize, impl Iterator<Item = usize> + 'a) {
+        let points = self.points.iter().map(|point| usize::from(*point));
+        (supports[self.support].component, points)
     }
 
-    /// The points that it holds.
-    pub fn points(&self) -> &[u32] {
-        &self.points
+    /// Remembers reaction (N/m³) and place, when the points of the part have these displacements (m).
+    pub fn remember<const D: usize>(
+        &mut self,
+        supports: &[Support],
+        displacement: [&[f64]; D],
+        reaction: Option<[&[f64]; D]>,
+    ) {
+        let component = supports[self.support].component;
+        for (k, point) in self.points.iter().enumerate() {
+            let point = usize::from(*point);
+            self.moved_from[k] = displacement[component][point];
+            self.before[k] = reaction.map_or(0.0, |field| field[component][point]);
+        }
     }
 
-    /// Remembers reaction and place, for the work of the coming step.
-    pub fn before_moving<const D: usize>(&mut self, fields: &Fields<D>) {
-        self.remember(&fields.displacement, fields.reaction.as_ref());
-    }
-
-    /// After the points have moved to time `time` (s): puts those supported in their place. `step` is
-    /// the step just made (s), 0 at the start.
-    pub fn place(&self, displacement: &mut [f64], time: f64, step: f64) {
-        let at = |time| self.values.at(&self.positions, time);
-        match self.motion {
-            Motion::Displacement => {
-                let value = at(time);
-                for_each_point(&self.points, [displacement], |k, _, [place]| {
-                    *place = value(k);
-                    true
-                });
-            }
-            // The trapezoid rule, from where the points were before they drifted.
-            Motion::Velocity if step > 0.0 => {
-                let velocities = [at(time - step), at(time)];
-                for_each_point(&self.points, [displacement], |k, _, [place]| {
+    /// After the points have moved: puts them in their place, and gives them their mean velocity in the step just
+    /// made.
+    pub fn place<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) {
+        let support = &supports[self.support];
+        let Place { step, values: at } = &support.place;
+        let value = |at: &At, k: usize| support.values.of(at, self.positions[k]);
+        let moving = part.component(support.component);
+        for (k, point) in self.points.iter().enumerate() {
+            let point = usize::from(*point);
+            let place = &mut moving.displacement[point];
+            match support.motion {
+                Motion::Displacement => *place = value(&at[1], k),
+                // The trapezoid rule, from where the points were before they drifted.
+                Motion::Velocity if *step > 0.0 => {
                     *place = self.moved_from[k];
-                    for velocity in &velocities {
-                        *place += 0.5 * step * velocity(k);
+                    for at in at {
+                        *place += 0.5 * step * value(at, k);
                     }
-                    true
-                });
+                }
+                // At the start the points are at their initial displacement.
+                Motion::Velocity => {}
             }
-            // At the start the points are at their initial displacement.
-            Motion::Velocity => {}
+            if *step > 0.0 {
+                moving.velocity[point] = (*place - self.moved_from[k]) / step;
+            }
         }
     }
 
-    /// Gives the points their mean velocity in the step just made (s).
-    pub fn set_mean_velocity(&self, displacement: &[f64], velocity: &mut [f64], step: f64) {
-        for_each_point(&self.points, [velocity], |k, point, [velocity]| {
-            *velocity = (displacement[point] - self.moved_from[k]) / step;
-            true
-        });
-    }
-
-    /// Gives the points their velocity at `time` (s), and finds the reactions: what must be added to
-    /// the other forces so that the Verlet scheme makes the prescribed motion. `step` is the time
-    /// step (s). Returns whether all of that is finite.
-    pub fn guide<const D: usize>(
-        &self,
-        model: &Model<D>,
-        fields: &mut Fields<D>,
-        time: f64,
-        step: f64,
-    ) -> bool {
-        let motion = |position: [f64; 3]| {
-            // Before the start the motion is extrapolated, and where it ends, as √(1 − t) does.
-            let change = |step: f64| self.values.expression.increment(position, time, step);
-            let to_come = match change(step) {
-                to_come if to_come.is_finite() || time < step => to_come,
-                _ => -change(-step),
-            };
-            let before = match self.motion {
-                _ if time >= step => -change(-step),
-                Motion::Displacement => to_come,
-                Motion::Velocity => 0.0,
-            };
-            match self.motion {
-                Motion::Displacement => (
-                    (before + to_come) / (2.0 * step),
-                    (to_come - before) / (step * step),
-                ),
-                Motion::Velocity => (
-                    self.values.expression.evaluate(position, time),
-                    (before + to_come) / (2.0 * step),
-                ),
-            }
-        };
-        let first = self.positions.first();
-        let same = first.filter(|_| !self.values.varies).map(|at| motion(*at));
-        self.react(model, fields, |k, point| {
-            let (velocity, acceleration) = same.unwrap_or_else(|| motion(self.positions[k]));
-            (velocity, model.density_of(point) * acceleration)
+    /// Gives the points their velocity, and finds the reactions: what must be added to the other forces so
+    /// that the Verlet scheme makes the prescribed motion. Returns whether all of that is finite.
+    pub fn guide<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) -> bool {
+        let support = &supports[self.support];
+        let Guidance { time, step, same } = support.guidance;
+        let (model, first) = (part.model, part.first);
+        self.react(support.component, part, |k, point| {
+            let own = || support.moving(self.positions[k], time, step);
+            let (velocity, acceleration) = same.unwrap_or_else(own);
+            (velocity, model.density_of(first + point) * acceleration)
         })
     }
 
     /// Finds the reactions that keep the points where they are, at rest. Returns whether they are
     /// finite.
-    pub fn hold<const D: usize>(&self, model: &Model<D>, fields: &mut Fields<D>) -> bool {
+    pub fn hold<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) -> bool {
         // A reaction is then the force with its sign changed, that of 0 as well.
-        self.react(model, fields, |_, _| (0.0, -0.0))
+        self.react(supports[self.support].component, part, |_, _| (0.0, -0.0))
     }
 
     /// Gives the points their velocities, and finds the reactions with which the forces are those that are needed
-    /// (N/m³): both are `wanted` of a point, by its number here and its local index. Returns whether all is finite.
+    /// (N/m³): both are `wanted` of a point, by its number here and in the part. Returns whether all is finite.
     fn react<const D: usize>(
         &self,
-        model: &Model<D>,
-        fields: &mut Fields<D>,
-        wanted: impl Fn(usize, usize) -> (f64, f64) + Sync,
+        component: usize,
+        part: &mut Part<'_, D>,
+        wanted: impl Fn(usize, usize) -> (f64, f64),
     ) -> bool {
-        let component = self.component;
-        let Fields {
-            velocity,
-            internal_force,
-            external_force,
-            reaction: Some(reaction),
-            ..
-        } = fields
-        else {
-            unreachable!("a run with supports has reactions");
+        let (model, first) = (part.model, part.first);
+        let moving = part.component(component);
+        let reaction = moving.reaction.expect("a run with supports has reactions");
+        let mut finite = true;
+        for (k, point) in self.points.iter().enumerate() {
+            let point = usize::from(*point);
+            let (velocity, needed) = wanted(k, point);
+            let other = model.less_damping(first + point, moving.force.at(point), velocity);
+            moving.velocity[point] = velocity;
+            reaction[point] = needed - other;
+            finite &= velocity.is_finite() && reaction[point].is_finite();
+        }
+        finite
+    }
+
+    /// Adds the work of the step (J), by the trapezoid rule.
+    pub fn add_work<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) {
+        let component = supports[self.support].component;
+        let (Some(reaction), Some([work])) = (&part.reaction, &mut part.external_work) else {
+            return;
         };
-        let exerted = Exerted::new(internal_force, external_force.as_ref(), component);
-        let columns = [&mut velocity[component][..], &mut reaction[component][..]];
-        for_each_point(&self.points, columns, |k, point, [velocity, reaction]| {
-            let (moving, needed) = wanted(k, point);
-            *velocity = moving;
-            *reaction = needed - model.less_damping(point, exerted.at(point), moving);
-            velocity.is_finite() && reaction.is_finite()
-        })
-    }
-
-    /// Remembers reaction (N/m³) and place of an earlier time, when points had these displacements (m).
-    pub fn remember<const D: usize>(
-        &mut self,
-        displacement: &[Vec<f64>; D],
-        reaction: Option<&[Vec<f64>; D]>,
-    ) {
-        let component = self.component;
-        let past = self.before.par_iter_mut().zip(&mut self.moved_from);
-        let past = past.with_min_len(CHUNK).zip(&self.points);
-        past.for_each(|((before, from), point)| {
-            let point = *point as usize;
-            *from = displacement[component][point];
-            *before = reaction.map_or(0.0, |field| field[component][point]);
-        });
-    }
-
-    /// Adds the work of the step (J), by the trapezoid rule. `displacement` and `reaction` (N/m³) are
-    /// those of the support's component.
-    pub fn add_work<const D: usize>(
-        &self,
-        model: &Model<D>,
-        displacement: &[f64],
-        reaction: &[f64],
-        work: &mut [f64],
-    ) {
-        for_each_point(&self.points, [work], |k, point, [work]| {
-            let moved = displacement[point] - self.moved_from[k];
-            let force = 0.5 * (self.before[k] + reaction[point]);
-            *work += force * moved * model.volume[point];
-            true
-        });
+        for (k, point) in self.points.iter().enumerate() {
+            let point = usize::from(*point);
+            let moved = part.displacement[component][point] - self.moved_from[k];
+            let force = 0.5 * (self.before[k] + reaction[component][point]);
+            work[point] += force * moved * part.model.volume[part.first + point];
+        }
     }
 }

@@ -2,13 +2,21 @@
 
 use crate::deck::expression::{Expression, Variable};
 
-/// Values of an expression at some points, evaluated no more often than it can change.
+/// An expression, evaluated no more often than it can change.
 pub struct Values {
     pub expression: Expression,
     /// In time.
     pub changes: bool,
     /// From point to point.
     pub varies: bool,
+}
+
+/// The values at a time.
+pub struct At {
+    /// s.
+    time: f64,
+    /// That of all points, if they have the same.
+    same: Option<f64>,
 }
 
 impl Values {
@@ -21,9 +29,18 @@ impl Values {
         }
     }
 
-    /// The values at a time (s), by the number of the position.
-    pub fn at<'a>(&'a self, positions: &'a [[f64; 3]], time: f64) -> impl Fn(usize) -> f64 + 'a {
-        let same = (!self.varies).then(|| self.expression.evaluate([0.0; 3], time));
-        move |k| same.unwrap_or_else(|| self.expression.evaluate(positions[k], time))
+    /// The values at a time (s).
+    pub fn at(&self, time: f64) -> At {
+        let same = || self.expression.evaluate([0.0; 3], time);
+        At {
+            time,
+            same: (!self.varies).then(same),
+        }
+    }
+
+    /// The value at a position (m).
+    pub fn of(&self, at: &At, position: [f64; 3]) -> f64 {
+        let own = || self.expression.evaluate(position, at.time);
+        at.same.unwrap_or_else(own)
     }
 }

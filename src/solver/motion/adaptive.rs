@@ -103,6 +103,7 @@ impl<const D: usize> Simulation<'_, D> {
                 self.clock.set_step(size);
             }
             self.make_step();
+            self.complete_step();
             let broken = self.forces.broken().iter().map(|broken| broken.count);
             let mut most = [broken.max().unwrap_or(0) as f64];
             self.comm.max(&mut most);

@@ -3,8 +3,6 @@
 //! Checkpoints, the undoing of a step and the result walk this list; a field that is added to it is
 //! saved, undone and offered as it says here. A field is a column of numbers for each component.
 
-use rayon::prelude::*;
-
 use crate::deck::plan::Field;
 use crate::solver::bonds::{Broken, PlasticColumns};
 use crate::solver::model::Model;
@@ -375,26 +373,6 @@ impl<const D: usize> Fields<D> {
     pub fn total_force(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let reaction = self.reaction.as_ref().map_or(0.0, |field| field[d][point]);
         self.acting(model, d, point) + reaction
-    }
-
-    /// Finds the power of damping at the present velocities, and adds the energy that it takes in a step
-    /// (s), by the trapezoid rule.
-    pub fn add_damped_energy(&mut self, model: &Model<D>, step: f64) {
-        let velocity = &self.velocity;
-        let (Some(power), Some(energy)) = (&mut self.damping_power, &mut self.damped_energy) else {
-            return;
-        };
-        power
-            .par_iter_mut()
-            .zip(energy)
-            .enumerate()
-            .for_each(|(point, (power, energy))| {
-                let before = *power;
-                let square: f64 = (0..D).map(|d| velocity[d][point].powi(2)).sum();
-                let mass = model.density_of(point) * model.volume[point];
-                *power = model.damping_of(point) * mass * square;
-                *energy += 0.5 * step * (before + *power);
-            });
     }
 
     /// Books what bonds set free that broke at the end of a step (s).

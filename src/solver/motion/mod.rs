@@ -8,6 +8,7 @@ pub mod saved;
 pub mod stable_step;
 pub mod undo;
 pub mod verlet;
+pub mod walk;
 
 pub use clock::Clock;
 pub use fields::Fields;

@@ -170,7 +170,8 @@ impl<const D: usize> Simulation<'_, D> {
             self.break_or_settle();
         } else if self.load_step.residual.is_nan() {
             self.load_step.has_failed = true;
-            self.note_bad();
+            let clock = self.clock;
+            self.note_bad(&clock);
         } else if self.load_step.since_breaking >= rule.iterations {
             self.load_step.has_failed = true;
         }
@@ -178,12 +179,15 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// Moves time, loads and supports on, and the points as far as in the last load step.
     fn begin_load_step(&mut self) {
-        self.conditions.before_moving(&self.fields);
+        self.walk(|part, mut here| {
+            here.before_moving(part);
+            true
+        });
         self.extrapolate();
         self.clock.advance();
         let (time, step) = (self.clock.time(), self.clock.step());
-        self.conditions.place(&mut self.fields, time, step);
-        self.conditions.load(&mut self.fields, time, false);
+        self.place(time, step);
+        self.load(time, false);
         self.load_step = LoadStep {
             scale: self.load_step.scale,
             is_settled: false,
@@ -335,10 +339,32 @@ impl<const D: usize> Simulation<'_, D> {
         let norms = reduce(self.comm, &mut [loads, reactions]);
         let scale = norms.into_iter().map(f64::sqrt).sum();
         self.load_step.scale = self.load_step.scale.max(scale);
+        self.add_work_since_equilibrium();
+    }
+
+    /// Adds up the work of loads and supports from the last equilibrium to this one.
+    fn add_work_since_equilibrium(&mut self) {
         let (then, now) = (self.clock.time_before(), self.clock.time());
-        self.conditions
-            .remember_equilibrium(&self.fields, then, now);
-        self.conditions.add_work(&self.model, &mut self.fields);
+        // Taken out while they are read.
+        let displacement = self.fields.equilibrium_displacement.take();
+        let reaction = self.fields.equilibrium_reaction.take();
+        if let Some(displacement) = &displacement {
+            self.conditions.set_loads(then, true);
+            self.walk(|part, mut here| {
+                let reaction = reaction.as_ref().map(|field| part.of(field));
+                here.find_loads();
+                here.remember(part.of(displacement), reaction);
+                true
+            });
+            self.conditions.set_loads(now, true);
+        }
+        self.walk(|part, mut here| {
+            here.find_loads();
+            here.add_work(part);
+            true
+        });
+        self.fields.equilibrium_displacement = displacement;
+        self.fields.equilibrium_reaction = reaction;
     }
 }
 

@@ -15,7 +15,11 @@ pub struct Kept {
 
 impl<const D: usize> Simulation<'_, D> {
     /// Takes note of the present state. Memory that was taken for an earlier one is used again.
+    ///
+    /// # Panics
+    /// When the present step is not complete.
     pub fn keep(&self, kept: &mut Kept) {
+        assert!(self.is_complete(), "half a step is no state");
         kept.clock = Some(self.clock);
         let columns = self.fields.each().filter(|(field, _)| field.undone);
         let columns = columns.flat_map(|(_, columns)| columns);
@@ -41,6 +45,6 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.forces.undo(&kept.bonds);
         // Loads know their values at the present time.
-        self.conditions.load(&mut self.fields, clock.time(), true);
+        self.load(clock.time(), true);
     }
 }

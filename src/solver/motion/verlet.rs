@@ -4,83 +4,107 @@
 //! steps. With viscous damping at a rate r the equation of motion is ρ ü = f − r ρ u̇ (Emmrich & Weckner
 //! 2006, eq. 11).
 
-use rayon::prelude::*;
-
-use super::Fields;
-use super::fields::Exerted;
 use crate::solver::model::Model;
 
-/// Points handled by one task.
-const CHUNK: usize = 4096;
+use super::walk::{Moving, Part};
 
-/// Calls `work` with each part of a component: displacement, velocity, forces and blocks of the points.
-/// Returns whether all calls did.
-fn for_each_part<const D: usize>(
-    model: &Model<D>,
-    fields: &mut Fields<D>,
-    work: impl Fn(&mut [f64], &mut [f64], Exerted<'_>, &[u16]) -> bool + Sync,
-) -> bool {
-    let mut all = true;
-    for d in 0..D {
-        let external = fields.external_force.as_ref().map(|field| &field[d]);
-        let part = |chunk: usize, length: usize| {
-            external.map(|field| &field[chunk * CHUNK..chunk * CHUNK + length])
-        };
-        all &= fields.displacement[d][..model.owned()]
-            .par_chunks_mut(CHUNK)
-            .zip(fields.velocity[d].par_chunks_mut(CHUNK))
-            .zip(fields.internal_force[d].par_chunks(CHUNK))
-            .zip(model.block.par_chunks(CHUNK))
-            .enumerate()
-            .map(|(chunk, (((displacement, velocity), internal), block))| {
-                let external = part(chunk, internal.len());
-                work(
-                    displacement,
-                    velocity,
-                    Exerted { internal, external },
-                    block,
-                )
-            })
-            .reduce(|| true, |a, b| a & b);
-    }
-    all
+/// Density (kg/m³) and damping (1/s) of a point.
+type Constants = (f64, f64);
+
+fn constants<const D: usize>(model: &Model<D>, block: u16) -> Constants {
+    let block = usize::from(block);
+    (model.density[block], model.damping[block])
+}
+
+/// The constants of the points, if all have the same: what is the same for all lets the compiler work on several at
+/// once.
+fn same_constants<const D: usize>(part: &Part<'_, D>) -> Option<Constants> {
+    let (first, others) = part.blocks().split_first()?;
+    let is_same = others.iter().all(|block| block == first);
+    is_same.then(|| constants(part.model, *first))
 }
 
 /// Half a kick with the forces at the old place, then the drift: u̇ += ½ Δt ü, u += Δt u̇. `step` in s.
-pub fn half_kick_and_drift<const D: usize>(model: &Model<D>, fields: &mut Fields<D>, step: f64) {
-    for_each_part(model, fields, |displacement, velocity, force, block| {
-        for k in 0..velocity.len() {
-            let block = usize::from(block[k]);
-            let (density, damping) = (model.density[block], model.damping[block]);
-            let mut total = force.at(k);
-            if damping > 0.0 {
-                total -= damping * density * velocity[k];
-            }
-            velocity[k] += 0.5 * step * (total / density);
-            displacement[k] += step * velocity[k];
+pub fn half_kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) {
+    for_each_component(part, |place, velocity, force, (density, damping)| {
+        let mut total = force;
+        if damping > 0.0 {
+            total -= damping * density * *velocity;
         }
+        *velocity += 0.5 * step * (total / density);
+        *place += step * *velocity;
         true
     });
 }
 
 /// Half a kick with the forces at the new place, and with the damping at the velocity that comes out:
 /// u̇ ← (u̇ + ½ Δt f/ρ)/(1 + ½ r Δt). Returns whether all velocities are still finite. `step` in s.
-pub fn second_half_kick<const D: usize>(
-    model: &Model<D>,
-    fields: &mut Fields<D>,
-    step: f64,
-) -> bool {
-    for_each_part(model, fields, |_, velocity, force, block| {
-        let mut finite = true;
-        for k in 0..velocity.len() {
-            let block = usize::from(block[k]);
-            let (density, damping) = (model.density[block], model.damping[block]);
-            velocity[k] += 0.5 * step * (force.at(k) / density);
-            if damping > 0.0 {
-                velocity[k] /= 1.0 + 0.5 * damping * step;
-            }
-            finite &= velocity[k].is_finite();
+pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
+    for_each_component(part, |_, velocity, force, (density, damping)| {
+        *velocity += 0.5 * step * (force / density);
+        if damping > 0.0 {
+            *velocity /= 1.0 + 0.5 * damping * step;
         }
+        velocity.is_finite()
+    })
+}
+
+/// As [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next one, as long (s), where nothing lies
+/// between them and there is no damping: the same bits.
+pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
+    for_each_component(part, |place, velocity, force, (density, _)| {
+        let half_kick = 0.5 * step * (force / density);
+        *velocity += half_kick;
+        let finite = velocity.is_finite();
+        *velocity += half_kick;
+        *place += step * *velocity;
         finite
     })
+}
+
+/// Calls `work` with a component of displacement (m), velocity (m/s) and force density (N/m³), each of them, of each
+/// point. Returns whether all calls did.
+fn for_each_component<const D: usize>(
+    part: &mut Part<'_, D>,
+    work: impl Fn(&mut f64, &mut f64, f64, Constants) -> bool,
+) -> bool {
+    let (model, blocks, same) = (part.model, part.blocks(), same_constants(part));
+    let mut all = true;
+    for d in 0..D {
+        let moving = part.component(d);
+        all &= match same {
+            Some(same) => for_each_point(moving, &work, |_| same),
+            None => for_each_point(moving, &work, |k| constants(model, blocks[k])),
+        };
+    }
+    all
+}
+
+#[inline(always)]
+fn for_each_point(
+    moving: Moving<'_>,
+    work: impl Fn(&mut f64, &mut f64, f64, Constants) -> bool,
+    constants: impl Fn(usize) -> Constants,
+) -> bool {
+    let count = moving.velocity.len();
+    let (places, velocities) = (&mut moving.displacement[..count], moving.velocity);
+    let internal = &moving.force.internal[..count];
+    let mut all = true;
+    // The same loop twice: what is asked once is not asked for each point.
+    match moving.force.external {
+        None => {
+            for k in 0..count {
+                let force = internal[k];
+                all &= work(&mut places[k], &mut velocities[k], force, constants(k));
+            }
+        }
+        Some(external) => {
+            let external = &external[..count];
+            for k in 0..count {
+                let force = internal[k] + external[k];
+                all &= work(&mut places[k], &mut velocities[k], force, constants(k));
+            }
+        }
+    }
+    all
 }

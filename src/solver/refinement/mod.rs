@@ -180,7 +180,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             let most = safety * other.scaled_stable_step();
             other.clock.set_step(rest / (rest / most).ceil());
         }
-        other.conditions.place(&mut other.fields, time, 0.0);
+        other.place(time, 0.0);
         other.find_anew();
         other.guide();
         *self = other;

@@ -1,0 +1,64 @@
+//! What bonds read of the displacements of the owned points, brought up to date part by part.
+
+use std::ops::Range;
+
+use super::Forces;
+use super::grid_points::{GridValues, OwnedPlaces};
+use super::list_points::{self, Node};
+
+/// What bonds read of some of the owned points; no two threads have that of the same point.
+pub struct Shown<'a, const D: usize> {
+    points: Range<usize>,
+    /// Of these points; empty if there is no list.
+    nodes: &'a mut [Node],
+    /// By grid.
+    places: &'a [OwnedPlaces<'a, D>],
+}
+
+impl<const D: usize> Shown<'_, D> {
+    /// Takes out what is of so many of the points, the first ones.
+    pub fn split_off_first(&mut self, count: usize) -> Self {
+        let middle = self.points.start + count;
+        assert!(middle <= self.points.end, "more points than there are");
+        let of_nodes = count.min(self.nodes.len());
+        let nodes = self.nodes.split_off_mut(..of_nodes);
+        let points = self.points.start..middle;
+        self.points.start = middle;
+        Self {
+            points,
+            nodes: nodes.unwrap_or_default(),
+            places: self.places,
+        }
+    }
+
+    /// Shows the bonds the displacements (m) of all these points.
+    ///
+    /// # Panics
+    /// When they are those of more or less points.
+    pub fn show(&mut self, displacement: [&[f64]; D]) {
+        let count = self.points.len();
+        assert!(displacement.iter().all(|column| column.len() == count));
+        list_points::update(self.nodes, displacement);
+        for places in self.places {
+            // SAFETY: only this has these points.
+            unsafe { places.take(self.points.start, displacement) };
+        }
+    }
+}
+
+impl<const D: usize> Forces<D> {
+    /// Calls `work` with what bonds read of the owned points, of which there are so many.
+    pub fn with_shown<R>(&mut self, owned: usize, work: impl FnOnce(Shown<'_, D>) -> R) -> R {
+        let places: Vec<_> = self
+            .grids
+            .iter_mut()
+            .map(GridValues::owned_places)
+            .collect();
+        let of_nodes = owned.min(self.nodes.len());
+        work(Shown {
+            points: 0..owned,
+            nodes: &mut self.nodes[..of_nodes],
+            places: &places,
+        })
+    }
+}

@@ -1,0 +1,200 @@
+//! One walk over the owned points by several threads, a part of them at a time, small enough that all steps of
+//! work on it find it in the cache.
+
+use rayon::iter::split;
+use rayon::prelude::*;
+
+use crate::solver::bonds::Shown;
+use crate::solver::model::Model;
+
+use super::Fields;
+use super::fields::Exerted;
+
+/// Points of a part; the last one may have less.
+pub const PART: usize = 2048;
+
+/// A column of numbers of some points for each of `N` components.
+type Columns<'a, const N: usize> = [&'a mut [f64]; N];
+
+/// Some of the owned points with what moves them.
+pub struct Part<'a, const D: usize> {
+    /// The points and their constants.
+    pub model: &'a Model<D>,
+    /// Local index of the first one.
+    pub first: usize,
+    /// As [`Fields::displacement`].
+    pub displacement: Columns<'a, D>,
+    /// As [`Fields::velocity`].
+    pub velocity: Columns<'a, D>,
+    /// As [`Fields::internal_force`].
+    pub internal_force: Columns<'a, D>,
+    /// As [`Fields::external_force`].
+    pub external_force: Option<Columns<'a, D>>,
+    /// As [`Fields::reaction`].
+    pub reaction: Option<Columns<'a, D>>,
+    /// As [`Fields::external_work`].
+    pub external_work: Option<Columns<'a, 1>>,
+    /// As [`Fields::damping_power`] and [`Fields::damped_energy`].
+    pub damping: Option<Columns<'a, 2>>,
+    shown: Shown<'a, D>,
+}
+
+/// A component of the motion of some points, and what moves them.
+pub struct Moving<'a> {
+    /// Displacements, m.
+    pub displacement: &'a mut [f64],
+    /// Velocities, m/s.
+    pub velocity: &'a mut [f64],
+    /// Force densities.
+    pub force: Exerted<'a>,
+    /// Reactions, N/m³, if there are any.
+    pub reaction: Option<&'a mut [f64]>,
+}
+
+impl<'a, const D: usize> Part<'a, D> {
+    /// All owned points.
+    pub fn all(model: &'a Model<D>, fields: &'a mut Fields<D>, shown: Shown<'a, D>) -> Self {
+        let owned = model.owned();
+        let vector = |field: &'a mut [Vec<f64>; D]| field.each_mut().map(Vec::as_mut_slice);
+        let scalars = fields
+            .damping_power
+            .as_mut()
+            .zip(fields.damped_energy.as_mut());
+        Self {
+            model,
+            first: 0,
+            displacement: (fields.displacement.each_mut()).map(|column| &mut column[..owned]),
+            velocity: vector(&mut fields.velocity),
+            internal_force: vector(&mut fields.internal_force),
+            external_force: fields.external_force.as_mut().map(vector),
+            reaction: fields.reaction.as_mut().map(vector),
+            external_work: fields.external_work.as_mut().map(|work| [&mut work[..]]),
+            damping: scalars.map(|(power, energy)| [&mut power[..], &mut energy[..]]),
+            shown,
+        }
+    }
+
+    /// Number of points.
+    pub fn count(&self) -> usize {
+        self.velocity[0].len()
+    }
+
+    /// Blocks of the points.
+    pub fn blocks(&self) -> &'a [u16] {
+        &self.model.block[self.first..self.first + self.count()]
+    }
+
+    /// The entries of the points in a field of all owned points.
+    pub fn of<'f>(&self, field: &'f [Vec<f64>; D]) -> [&'f [f64]; D] {
+        (field.each_ref()).map(|column| &column[self.first..self.first + self.count()])
+    }
+
+    /// A component of the motion.
+    pub fn component(&mut self, d: usize) -> Moving<'_> {
+        Moving {
+            displacement: self.displacement[d],
+            velocity: self.velocity[d],
+            force: Exerted {
+                internal: self.internal_force[d],
+                external: self.external_force.as_ref().map(|force| &*force[d]),
+            },
+            reaction: self.reaction.as_mut().map(|reaction| &mut *reaction[d]),
+        }
+    }
+
+    /// Finds the power of damping at the present velocities, and adds the energy that it takes in a step
+    /// (s), by the trapezoid rule.
+    pub fn add_damped_energy(&mut self, step: f64) {
+        let (model, first) = (self.model, self.first);
+        let Some([powers, energies]) = &mut self.damping else {
+            return;
+        };
+        let both = powers.iter_mut().zip(energies.iter_mut());
+        for (k, (power, energy)) in both.enumerate() {
+            let before = *power;
+            let square: f64 = self.velocity.iter().map(|column| column[k].powi(2)).sum();
+            let mass = model.density_of(first + k) * model.volume[first + k];
+            *power = model.damping_of(first + k) * mass * square;
+            *energy += 0.5 * step * (before + *power);
+        }
+    }
+
+    /// Shows the bonds the displacements, and begins the sums of their forces with 0.
+    pub fn show(&mut self) {
+        self.shown
+            .show(self.displacement.each_ref().map(|column| &**column));
+        for component in &mut self.internal_force {
+            component.fill(0.0);
+        }
+    }
+
+    /// Takes out so many of the points, the first ones.
+    fn split_off_first(&mut self, count: usize) -> Self {
+        let first = self.first;
+        self.first += count;
+        Self {
+            model: self.model,
+            first,
+            displacement: cut(&mut self.displacement, count),
+            velocity: cut(&mut self.velocity, count),
+            internal_force: cut(&mut self.internal_force, count),
+            external_force: self.external_force.as_mut().map(|force| cut(force, count)),
+            reaction: self.reaction.as_mut().map(|force| cut(force, count)),
+            external_work: self.external_work.as_mut().map(|work| cut(work, count)),
+            damping: self.damping.as_mut().map(|damping| cut(damping, count)),
+            shown: self.shown.split_off_first(count),
+        }
+    }
+}
+
+/// Takes out the first entries of columns.
+fn cut<'a, const N: usize>(columns: &mut Columns<'a, N>, count: usize) -> Columns<'a, N> {
+    columns.each_mut().map(|column| {
+        let (first, others) = std::mem::take(column).split_at_mut(count);
+        *column = others;
+        first
+    })
+}
+
+/// Number of parts that the owned points fall into.
+pub fn parts(owned: usize) -> usize {
+    owned.div_ceil(PART)
+}
+
+/// Some parts with what they have each.
+type Parts<'a, C, const D: usize> = (Part<'a, D>, &'a mut [C]);
+
+/// Parts in two halves; one cannot be halved.
+fn halves<C, const D: usize>(
+    (mut points, each): Parts<'_, C, D>,
+) -> (Parts<'_, C, D>, Option<Parts<'_, C, D>>) {
+    if each.len() < 2 {
+        return ((points, each), None);
+    }
+    let (first, second) = each.split_at_mut(each.len() / 2);
+    let points_of_first = points.split_off_first(first.len() * PART);
+    ((points_of_first, first), Some((points, second)))
+}
+
+/// Calls `work` with each part of all points and what `each` has for it, in the order of parts. Returns whether all
+/// calls did.
+///
+/// # Panics
+/// When `each` has not one entry a part.
+pub fn walk<'a, C: Send, const D: usize>(
+    all: Part<'a, D>,
+    each: &'a mut [C],
+    work: impl Fn(&mut Part<'_, D>, &mut C) -> bool + Sync,
+) -> bool {
+    assert_eq!(each.len(), parts(all.count()), "one entry a part");
+    split((all, each), halves::<C, D>)
+        .map(|(mut points, each)| {
+            let mut all = true;
+            for own in each {
+                let count = points.count().min(PART);
+                all &= work(&mut points.split_off_first(count), own);
+            }
+            all
+        })
+        .reduce(|| true, |a, b| a & b)
+}

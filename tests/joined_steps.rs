@@ -1,0 +1,96 @@
+//! Steps that run into one another, so that the points are gone over once a step, give the bits of whole ones.
+
+use crate::support::simulate_on;
+use fissure::comm::IdOrder;
+use fissure::solver::Simulation;
+use fissure::solver::motion::Saved;
+use fissure::solver::observers::{HistoryObserver, Snapshot};
+
+/// Two sheets of different density that touch, in lattices with a list between them, or in lists: with more points
+/// than a thread works on at once, and a last part of fewer.
+fn sheets(family: &str, more: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ volume_correction = 'none', spacing = 1, horizon = 3, family = '{family}' }}
+        material.light.pmb = {{ density = 2, youngs_modulus = 5, damping = DAMPING }}
+        material.heavy.pmb = {{ density = 7, youngs_modulus = 9 }}
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.03, alpha = 0.25 }}
+        body.left = {{ material = 'light', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [37, 40] }} }}
+        body.right = {{ material = 'heavy', damage = 'brittle', shape.box = {{ lower = [37, 0], upper = [71, 40] }} }}
+        crack.notch.segment = {{ from = [-1, 20], to = [12, 20] }}
+        initial.shake.velocity = ['0.04*sin(0.2*x + 0.1*y)', '0.06*tanh(y - 20)']
+        {more}
+        "
+    )
+}
+
+/// What acts on the sheets at some of their points, in two stages.
+const CONDITIONS: &str = "
+    set.top.where = 'y > 38'
+    set.bottom.where = 'y < 2'
+    set.edge.where = 'x > 60'
+    set.drop.where = 'hypot(x - 9, y - 9) < 3'
+    condition.up = { set = 'top', velocity = ['free', '0.05*ramp(t, 0, 2)'] }
+    condition.down = { set = 'bottom', displacement = [0, '-0.02*t*x/71'] }
+    condition.push = { set = 'edge', body_force = ['0.01*sin(t)', 0] }
+    condition.weight = { set = 'drop', force = [0, '-3'] }
+    time = { end = 20, step = 0.2 }
+    [[stage]]
+    end = 12
+    off = ['push']
+    [[stage]]
+    ";
+
+/// State, forces and the row of the history.
+type Seen = (Saved, Vec<u64>, Vec<u64>);
+
+/// What is seen after every 25 of 100 steps, whole or run into one another.
+fn run(deck: &str, ranks: usize, whole: bool) -> Vec<Vec<Seen>> {
+    simulate_on(ranks, deck, |mut simulation: Simulation<2>| {
+        let owned = simulation.model.owned();
+        let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
+        let order = IdOrder::new(simulation.comm, ids, total);
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let bits = |values: &[f64]| -> Vec<u64> { values.iter().map(|v| v.to_bits()).collect() };
+        let mut seen = Vec::new();
+        for step in 1..=100 {
+            if whole {
+                simulation.advance();
+                assert!(simulation.is_complete());
+            } else {
+                simulation.advance_halfway();
+                assert!(!simulation.is_complete());
+            }
+            if step % 25 == 0 {
+                let snapshot = Snapshot::new(&mut simulation);
+                let row = observer.row(&mut simulation, &snapshot);
+                seen.push((
+                    simulation.save(&order),
+                    bits(&simulation.fields.internal_force.concat()),
+                    bits(&row.values),
+                ));
+            }
+        }
+        assert_eq!(simulation.clock.number(), 100);
+        simulation.check().unwrap();
+        seen
+    })
+}
+
+#[test]
+fn steps_run_into_one_another() {
+    let end = "time = { end = 20, step = 0.2 }";
+    for family in ["lattice", "list"] {
+        for more in [end, CONDITIONS] {
+            for damping in ["0", "0.05"] {
+                let deck = sheets(family, more).replace("DAMPING", damping);
+                for ranks in [1, 2] {
+                    let wanted = run(&deck, ranks, true);
+                    let broken = |seen: &[Seen]| seen[3].0 != seen[2].0;
+                    assert!(wanted.iter().all(|seen| broken(seen)));
+                    assert!(run(&deck, ranks, false) == wanted, "{ranks} ranks: {deck}");
+                }
+            }
+        }
+    }
+}
