@@ -1,11 +1,11 @@
 """A crack that branches on a grid that is refined where it runs, beside uniform grids (Dipasquale et al. 2014, §4).
 
-Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 of its finer spacings, and with two levels, and
-the same plate on the coarse grid and on grids that are fine everywhere, one after the other on one core. Prints for
-each the points, the time of the run, the fracture energy, the length of the crack and, for a refined grid, the largest
-distance of its crack from that of the uniform fine grid, and from that of a uniform grid whose points lie where the
-refined one has them, on the line of the notch as well: of all branches, and of those that reach the right side; draws
-the cracks into the output folder.
+Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 of its finer spacings, and if asked for with two
+levels, and the same plate on the coarse grid and on grids that are fine everywhere, one after the other on one core.
+Prints for each the points, the time of the run, the fracture energy, the length of the crack and, for a refined grid,
+the largest distance of its crack from that of the uniform fine grid, and from that of a uniform grid whose points lie
+where the refined one has them, on the line of the notch as well, in spacings of the coarse grid: of all branches, and
+of those that reach the right side; draws the cracks into the output folder.
 """
 
 import argparse
@@ -26,7 +26,17 @@ NEAR_THE_SIDE = 0.095  # m
 
 def deck(spacing):
     """The refined plate with a spacing (m) of the coarse grid."""
-    return re.sub(r"(?m)^dx = \S+", f"dx = {spacing}", DECK.read_text(), count=1)
+    return with_value(DECK.read_text(), "dx", spacing)
+
+
+def value(text, key):
+    """The number that a key of a deck has first."""
+    return float(re.search(rf"(?m)^{key} = (\S+)", text)[1])
+
+
+def with_value(text, key, number):
+    """A deck with another number for a key, where that comes first."""
+    return re.sub(rf"(?m)^{key} = \S+", f"{key} = {number}", text, count=1)
 
 
 def uniform(spacing, ratio):
@@ -57,7 +67,7 @@ def same_places(coarse, ratio):
 
 def refined(coarse, ratio):
     """The plate on a grid that is refined once, with so many finer spacings a horizon there."""
-    return re.sub(r"(?m)^m = \S+", f"m = {ratio}", deck(coarse), count=1)
+    return with_value(deck(coarse), "m", ratio)
 
 
 def refined_twice(coarse):
@@ -67,16 +77,24 @@ def refined_twice(coarse):
     return re.sub(r"(?m)^interface_factor = .*\n", "", text)
 
 
-def cases(coarse):
+def cases(arguments):
     """Name, deck, and the uniform grids that it is compared with."""
+    coarse = arguments.dx
+
+    def asked(text):
+        for key, number in (("energy", arguments.energy), ("every_steps", arguments.every)):
+            text = text if number is None else with_value(text, key, number)
+        return text
+
     yield "coarse", uniform(coarse, 3), []
-    for ratio in (3, 4, 5, 6):
+    for ratio in arguments.m:
         fine, same = f"fine, m = {ratio}", f"same places, m = {ratio}"
         yield fine, uniform(coarse / 2, ratio), []
         yield same, same_places(coarse, ratio), [fine]
-        yield f"refined, m = {ratio}", refined(coarse, ratio), [fine, same]
-    yield "finer, m = 3", uniform(coarse / 4, 3), []
-    yield "refined twice, m = 3", refined_twice(coarse), ["finer, m = 3"]
+        yield f"refined, m = {ratio}", asked(refined(coarse, ratio)), [fine, same]
+    if arguments.twice:
+        yield "finer, m = 3", uniform(coarse / 4, 3), []
+        yield "refined twice, m = 3", asked(refined_twice(coarse)), ["finer, m = 3"]
 
 
 def run(arguments, name, text):
@@ -136,13 +154,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fissure", type=pathlib.Path, default=ROOT / "target/release/fissure")
     parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/branching")
-    parser.add_argument("--dx", type=float, default=1e-3, help="spacing of the coarse grid, m [1e-3]")
+    parser.add_argument("--dx", type=float, default=value(DECK.read_text(), "dx"), help="spacing of the coarse grid, m [the deck's]")
+    parser.add_argument("--m", type=int, nargs="+", default=[3, 4, 5, 6], help="finer spacings in a horizon [3 4 5 6]")
+    parser.add_argument("--energy", type=float, help="share of the largest energy density that is refined [the deck's]")
+    parser.add_argument("--every", type=int, help="steps from one look to the next [the deck's]")
+    parser.add_argument("--twice", action="store_true", help="also a grid that is refined twice, beside a uniform one")
     parser.add_argument("--repeat", type=int, default=1, help="runs of each case, of which the fastest counts [1]")
     arguments = parser.parse_args()
-    found = {}
-    print("                                                                                              apart, all / through, mm")
+    found, taken = {}, {}
+    print("                                                                                              apart, all / through, coarse spacings")
     print("grid                   points at start, end    time, s   fracture, mJ   length, mm   branches   from fine    from same places")
-    for name, text, references in cases(arguments.dx):
+    for name, text, references in cases(arguments):
         out, seconds = run(arguments, name, text)
         with h5py.File(out / "result.vtkhdf") as file:
             table = file["history"]
@@ -154,11 +176,15 @@ def main():
         found[name] = branches
         pairs = [(branches, found[other]) for other in references]
         gaps = [[apart(*pair), apart(*map(through, pair))] for pair in pairs]
-        gap = "".join(f"{1e3 * every:8.2f} /{1e3 * main:6.2f}" for every, main in gaps)
+        gap = "".join(f"{every / arguments.dx:8.2f} /{main / arguments.dx:6.2f}" for every, main in gaps)
+        taken[name] = counts[-1], seconds
         print(
             f"{name:20} {counts[0]:8} {counts[-1]:8} {seconds:15.2f} {energy:14.2f} {length:12.1f} {len(branches):10} {gap}",
             flush=True,
         )
+        if references and "refined" in name:
+            points, time_of_fine = taken[references[0]]
+            print(f"    {100 * counts[-1] / points:.0f} % of the points of `{references[0]}`, {100 * seconds / time_of_fine:.0f} % of its time")
         picture = arguments.folder / f"{re.sub(r'[^0-9a-z]+', '_', name)}.png"
         plot = [arguments.fissure, "plot", out / "result.vtkhdf", "--field", "damage", "--output", picture]
         subprocess.run([str(part) for part in [*plot, "--path", out / "crack_notch.csv"]], check=True)

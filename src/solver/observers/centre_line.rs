@@ -124,6 +124,9 @@ impl Ways {
             ways.order.push(point);
             bins.within(places[point], |other, squared| {
                 let other = other as usize;
+                if ways.length[other] <= length {
+                    return;
+                }
                 let through = length + squared.sqrt();
                 if through < ways.length[other] {
                     ways.length[other] = through;
@@ -168,8 +171,8 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
             next += 1;
             bins.within(points[point].place, |other, _| {
                 let other = other as usize;
-                let belongs = ways.length[other].is_finite() && section(other) == section(point);
-                if belongs && part_of[other].is_none() {
+                let is_free = part_of[other].is_none() && ways.length[other].is_finite();
+                if is_free && section(other) == section(point) {
                     part_of[other] = Some(number);
                     members.push(other);
                 }
