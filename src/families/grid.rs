@@ -343,3 +343,44 @@ fn runs(points: &[u32], wanted: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) 
     runs.shrink_to_fit();
     (runs, starts)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::partition::distribute;
+    use crate::points::Point;
+
+    #[test]
+    fn every_point_lies_where_any_range_of_points_says() {
+        let place = |k: u64| [k % 9, k / 9 % 9, k / 81].map(|x| x as f64);
+        // Holes, and two bands.
+        let there = |at: &[f64; 3]| (at[0] - 4.0).abs() > 1.0 && at.iter().sum::<f64>() != 7.0;
+        let places: Vec<[f64; 3]> = (0..729).map(place).filter(there).collect();
+        let points = (0..).zip(&places);
+        let points = points.map(|(k, at)| Point::new(k, *at, 1.0, 0)).collect();
+        let count = places.len();
+        let domain = distribute(&threads::alone(), points, count as u64, 1.5).unwrap();
+        let frame = GridFrame {
+            origin: [0.0; 3],
+            spacing: [1.0; 3],
+            blocks: vec![true],
+        };
+        let grid = Grid::new(frame, &domain, 1.5).unwrap();
+        let mut expected = vec![0; count];
+        grid.owned()
+            .for_each(|(place, point)| expected[point as usize] = place);
+        for step in [1, 7, 100, count] {
+            let mut found = vec![0; count];
+            for first in (0..count).step_by(step) {
+                let points = first..(first + step).min(count);
+                for (place, some) in grid.places_of(points.clone()) {
+                    assert!(points.start <= some.start && some.end <= points.end);
+                    some.clone()
+                        .for_each(|point| found[point] = place + point - some.start);
+                }
+            }
+            assert_eq!(found, expected, "{step}");
+        }
+    }
+}

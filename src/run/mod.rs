@@ -59,7 +59,7 @@ use decisions::decisions;
 use energy_watch::EnergyWatch;
 use recorder::{Recorder, Start, damaged, why_not_continued};
 use restart::{Restart, restart};
-use watch::Watch;
+use watch::{Decision, Watch};
 
 /// How a run ended, and what it did; the same on all ranks.
 #[derive(Debug, Clone)]
@@ -253,9 +253,15 @@ impl<'a> Job<'a> {
             let complete = simulation.is_over();
             let step = simulation.load_step.is_settled.then_some(&clock);
             let due = step.is_some_and(|clock| recorder.is_due(clock));
-            let mut stop = None;
-            let looks = watch.end_turn(step) || due || complete || simulation.load_step.has_failed;
-            if looks || self.observer.looks_at_velocities() {
+            let shows = due || complete || simulation.load_step.has_failed;
+            let looks = watch.end_turn(step) || shows;
+            let decision = if looks {
+                watch.look(self.comm, step)
+            } else {
+                Decision::default()
+            };
+            let saves = complete || decision.checkpoint || decision.stop.is_some();
+            if shows || saves || self.observer.looks_at_velocities() {
                 simulation.complete_step();
             }
             if looks {
@@ -284,14 +290,12 @@ impl<'a> Job<'a> {
                         }
                     }
                 }
-                let decision = watch.look(self.comm, step);
-                if complete || decision.checkpoint || decision.stop.is_some() {
+                if saves {
                     watch.wrote_checkpoint(checkpoints.write(simulation, recorder)?);
                 }
-                stop = decision.stop;
             }
             self.observer.step(simulation);
-            if let (Some(reason), false) = (stop, complete) {
+            if let (Some(reason), false) = (decision.stop, complete) {
                 return Ok(Left::Stopped(reason));
             }
             if !complete && let Some(done) = balance.look(simulation)? {

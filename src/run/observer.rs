@@ -21,7 +21,7 @@ pub trait Observer {
     fn step(&mut self, _now: &dyn View) {}
 
     /// Whether [`Self::step`] looks at velocities. If not, steps may run into one another, which is faster, and
-    /// velocities are known where a row or an output is due.
+    /// velocities are known only where a row, an output or a checkpoint is due, and at the end.
     fn looks_at_velocities(&self) -> bool {
         true
     }

@@ -39,7 +39,7 @@ pub struct Phases {
     pub bonds: f64,
     /// Exchange with other ranks that no work hides.
     pub halo: f64,
-    /// Integration and conditions.
+    /// Integration and conditions, and showing the bonds where points are.
     pub motion: f64,
     /// Refinements of the grid, and points that were dealt out anew.
     pub regridding: f64,

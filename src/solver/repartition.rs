@@ -68,6 +68,7 @@ impl BalanceWatch {
         if most <= rule.imbalance * mean {
             return Ok(None);
         }
+        simulation.complete_step();
         let start = Instant::now();
         let moved = simulation.repartition(own)?;
         simulation.times.regridding += start.elapsed();

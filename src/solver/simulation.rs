@@ -77,7 +77,7 @@ pub struct Simulation<'a, const D: usize> {
     /// Where the time went.
     pub times: Times,
     /// Whether the second half kick of the present step is still to be made.
-    is_halfway: bool,
+    pub(super) is_halfway: bool,
     bad: Option<BadPoint>,
 }
 
@@ -88,7 +88,7 @@ pub struct Times {
     pub set_up: Duration,
     /// Bonds and halo in the time loop.
     pub forces: ForceTimes,
-    /// Integration and conditions.
+    /// Integration and conditions, and showing the bonds where points are.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -96,7 +96,7 @@ pub struct Times {
     pub regridding: Duration,
 }
 
-/// The first point of a rank whose velocity was not finite.
+/// The first point of a rank whose motion, force or reaction was not finite.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
@@ -265,8 +265,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// As [`Self::advance`], but the second half kick may be left to the next step, which then goes over the
-    /// points once. Until it is made velocities are those in the middle of the step, and work and reactions those of
-    /// the step before. Collective.
+    /// points once. Until it is made velocities are those in the middle of the step, and reactions, loads, damping and
+    /// the energies of these those of the step before. Collective.
     pub fn advance_halfway(&mut self) {
         if self.is_stage_over() && self.stage + 1 < self.stages.len() {
             self.begin_stage(self.stage + 1);

@@ -59,7 +59,7 @@ impl ForceTimes {
 pub struct Acting<'a, const D: usize> {
     /// Displacements of the local points, m; those of ghosts are brought up to date.
     pub displacement: &'a mut [Vec<f64>; D],
-    /// Internal force density of the owned points, N/m³; that of bonds is added to it.
+    /// Internal force density of the owned points, N/m³; 0 before, for that of bonds is added to it.
     pub force: &'a mut [Vec<f64>; D],
     /// What plastic flow has left at the owned points; changed in a step.
     pub plastic: PlasticColumns<'a>,

@@ -137,7 +137,7 @@ fields! {
         output: Some(Field::Displacement),
         ..STATE
     };
-    /// u̇ at full steps, m/s.
+    /// u̇ at full steps, m/s; in the middle of a step that is not complete.
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",

@@ -121,6 +121,7 @@ impl<const D: usize> Simulation<'_, D> {
             Err(Error::run("the checkpoint is that of other bonds"))
         };
         agree(self.comm, fits)?;
+        self.is_halfway = false;
         let SavedBonds {
             lengths: all,
             bytes,

@@ -38,6 +38,7 @@ impl<const D: usize> Simulation<'_, D> {
     pub fn undo(&mut self, kept: &Kept) {
         let Some(clock) = kept.clock else { return };
         self.clock = clock;
+        self.is_halfway = false;
         let columns = self.fields.each_mut().filter(|(field, _)| field.undone);
         let columns = columns.flat_map(|(_, columns)| columns);
         for (column, kept) in columns.zip(&kept.fields) {

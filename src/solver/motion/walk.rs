@@ -176,8 +176,8 @@ fn halves<C, const D: usize>(
     ((points_of_first, first), Some((points, second)))
 }
 
-/// Calls `work` with each part of all points and what `each` has for it, in the order of parts. Returns whether all
-/// calls did.
+/// Calls `work` with each part of all points and what `each`, which has one entry a part, has for it. Returns whether
+/// all calls did.
 ///
 /// # Panics
 /// When `each` has not one entry a part.

@@ -18,7 +18,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Looks at a run after a whole step, whose forces are those of the present place.
+    /// Looks at a run, whose forces are those of the present place, after it has completed its step.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         simulation.complete_step();
         let mut stored = simulation.forces.stored(&simulation.model);
