@@ -12,5 +12,6 @@ pub fn print() {
     say!("fissure {}", fissure::version());
     say!("  MPI           {}", mpi::library());
     say!("  HDF5          {}", output::library());
-    say!("  instructions  {}, of {all}", best.name());
+    let best = best.map_or("none", Instructions::name);
+    say!("  instructions  {best}, of {all}");
 }

@@ -1,21 +1,19 @@
-//! Which vector instructions the loops over bonds use: the best that all ranks have, found at run
-//! time.
+//! Vector instructions of the loops over bonds: the best set that all ranks have, found at run time.
 //!
-//! All kinds that round products and sums once give the same bits, see [`super::simd`]. A machine
-//! without them is the exception; between the ranks of a run there is never a difference.
+//! All sets round a product and a sum once and give the same bits, see [`super::simd`].
 
 use crate::comm::{self, Communicator, agree};
 use crate::error::{Error, Result};
 
-use super::simd::FUSED;
 #[cfg(target_arch = "x86_64")]
 use super::simd::{Avx2, Avx512};
 
-/// Sets of vector instructions that this machine has.
+/// A set of vector instructions that this machine has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Instructions {
-    /// Those that the program was built for.
-    Baseline,
+    /// What the program was built for.
+    #[cfg(not(target_arch = "x86_64"))]
+    Portable,
     /// AVX2 with fused multiplication and addition.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
@@ -24,66 +22,64 @@ pub enum Instructions {
     Avx512(Avx512),
 }
 
-/// The environment variable that names the most to use, for tests.
+/// The environment variable that names the largest set to use, for tests.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
-/// Names of the sets in the order of what they can, as [`VARIABLE`] has them on all processors.
-const NAMES: [&str; 3] = ["baseline", "AVX2", "AVX-512"];
-
-/// Names of the sets that the program was built for, in that order.
+/// Names of the sets that the program was built for, the smallest first.
 pub const BUILT: &[&str] = if cfg!(target_arch = "x86_64") {
-    &NAMES
+    &["AVX2", "AVX-512"]
 } else if cfg!(target_arch = "aarch64") {
     &["NEON"]
 } else {
-    &["baseline"]
+    &["portable"]
 };
 
 impl Instructions {
-    /// The best that all ranks have, or the most that [`VARIABLE`] allows; collective.
+    /// The largest set that all ranks have, limited by [`VARIABLE`]; collective.
     ///
     /// # Errors
-    /// When the variable names none; the same on all ranks.
+    /// When the variable names no set, or a rank has none of them; the same on all ranks.
     pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
         let allowed = match std::env::var(VARIABLE) {
             Ok(name) if !name.is_empty() => named(&name),
-            _ => Ok(NAMES.len() - 1),
+            _ => Ok(BUILT.len() - 1),
         };
-        let allowed = agree(comm, allowed)?;
-        let own = Self::up_to(allowed);
+        let own = allowed.and_then(|allowed| Self::up_to(allowed).ok_or_else(unsupported));
+        let own = agree(comm, own)?;
         let mut level = [own.level() as f64];
         comm::min(comm, &mut level);
-        Ok(Self::up_to(level[0] as usize))
+        Self::up_to(level[0] as usize).ok_or_else(unsupported)
     }
 
-    /// The best that this machine has.
-    pub fn of_this_machine() -> Self {
-        Self::up_to(NAMES.len() - 1)
+    /// The largest set that this machine has.
+    pub fn of_this_machine() -> Option<Self> {
+        Self::up_to(BUILT.len() - 1)
     }
 
-    /// The best of this machine up to a level.
+    /// The largest set of this machine up to a level.
     #[cfg(target_arch = "x86_64")]
-    fn up_to(level: usize) -> Self {
-        match (Avx512::detect(), Avx2::detect()) {
-            (Some(avx512), _) if level >= 2 => Self::Avx512(avx512),
-            (_, Some(avx2)) if level >= 1 => Self::Avx2(avx2),
-            _ => Self::Baseline,
+    fn up_to(level: usize) -> Option<Self> {
+        match Avx512::detect() {
+            Some(avx512) if level >= 1 => Some(Self::Avx512(avx512)),
+            _ => Avx2::detect().map(Self::Avx2),
         }
     }
 
-    /// The best of this machine.
+    /// The set of this machine.
     #[cfg(not(target_arch = "x86_64"))]
-    fn up_to(_: usize) -> Self {
-        Self::Baseline
+    fn up_to(_: usize) -> Option<Self> {
+        Some(Self::Portable)
     }
 
+    /// Index in [`BUILT`].
     fn level(self) -> usize {
         match self {
-            Self::Baseline => 0,
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Portable => 0,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => 1,
+            Self::Avx2(_) => 0,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => 2,
+            Self::Avx512(_) => 1,
         }
     }
 
@@ -91,26 +87,24 @@ impl Instructions {
     pub fn name(self) -> &'static str {
         BUILT[self.level()]
     }
+}
 
-    /// How a product and a sum are rounded, in a word: "fused", once, or "unfused", twice.
-    pub fn rounding(self) -> &'static str {
-        if self.are_fused() { "fused" } else { "unfused" }
-    }
-
-    /// Whether products and sums are rounded once, so that results have the bits of all other
-    /// machines that do so.
-    pub fn are_fused(self) -> bool {
-        self.level() > 0 || FUSED
-    }
+fn unsupported() -> Error {
+    Error::run(
+        "this processor has no AVX2 and FMA instructions; Fissure needs them (x86-64 processors since 2015 have them)",
+    )
 }
 
 /// The level of a name.
 fn named(name: &str) -> Result<usize> {
     let short = |name: &str| name.replace('-', "").to_lowercase();
-    let found = NAMES.iter().position(|known| short(known) == short(name));
+    let found = BUILT.iter().position(|known| short(known) == short(name));
     found.ok_or_else(|| {
-        let known = NAMES.map(short).join(", ");
-        Error::input(format!("{VARIABLE}: `{name}` is none of {known}"))
+        let known: Vec<String> = BUILT.iter().map(|name| short(name)).collect();
+        Error::input(format!(
+            "{VARIABLE}: `{name}` is none of {}",
+            known.join(", ")
+        ))
     })
 }
 
@@ -120,10 +114,11 @@ mod tests {
 
     #[test]
     fn names_of_the_variable() {
-        assert_eq!(named("avx512").unwrap(), 2);
-        assert_eq!(named("AVX-512").unwrap(), 2);
-        assert_eq!(named("baseline").unwrap(), 0);
+        for (level, name) in BUILT.iter().enumerate() {
+            assert_eq!(named(name).unwrap(), level);
+            assert_eq!(named(&name.replace('-', "").to_lowercase()).unwrap(), level);
+        }
         let error = named("sse").unwrap_err();
-        assert!(error.message.contains("baseline, avx2, avx512"), "{error}");
+        assert!(error.message.contains("`sse` is none of"), "{error}");
     }
 }

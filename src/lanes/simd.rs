@@ -57,11 +57,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
     }
 }
 
-/// Whether all machines of the kind that the program is built for round a product and a sum once (64-bit ARM).
-pub const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
-
-/// What every machine has. Whether a product and a sum are rounded `ONCE` is to choose; that is slow where the
-/// processors are not all [`FUSED`].
+/// What every machine has. Whether a product and a sum are rounded `ONCE` is to choose; that is slow on processors
+/// without an instruction for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Portable<const ONCE: bool>;
 

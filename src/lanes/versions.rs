@@ -1,14 +1,13 @@
 //! For which vector instructions a loop is compiled.
 
-/// The versions of a loop. AVX-512 and AVX2 give the same bits; the one for any processor does so only where every
-/// processor of the kind fuses multiply-adds.
+/// The versions of a loop on x86-64; other processors have one. All give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Versions {
-    /// AVX-512, AVX2 and any processor.
+    /// AVX-512 and AVX2.
     Each,
-    /// AVX2, which is not much slower, and any processor.
+    /// AVX2, which is not much slower.
     Avx2,
-    /// Any processor, and nowhere fused multiply-adds, so that the bits are the same everywhere.
+    /// No vector instructions and no fused multiply-adds.
     One,
 }
 

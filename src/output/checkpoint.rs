@@ -24,7 +24,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 7;
+const VERSION: i64 = 8;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,8 +47,6 @@ pub struct Header {
     pub start: (f64, u64),
     /// The deck with every default filled in.
     pub deck: String,
-    /// How the run rounded a product and a sum, see [`crate::lanes::Instructions::rounding`].
-    pub rounding: String,
 }
 
 /// The datasets of the state of the grids, which are there where it is not empty.
@@ -174,10 +172,6 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let mut file = CollectiveFile::open(path, comm)?;
     let numbers = file.integers_attribute("/", "numbers")?;
     let deck = file.text_attribute("/", "deck")?;
-    let rounding = match numbers.first() {
-        Some(&VERSION) => file.text_attribute("/", "rounding")?,
-        _ => String::new(),
-    };
     let mut grids = [const { Vec::new() }; 2];
     if let [VERSION, .., refined, parted] = numbers[..] {
         for ((picks, name), count) in grids.iter_mut().zip(GRIDS).zip([refined, parted]) {
@@ -212,7 +206,6 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             rows: rows as u64,
             start: (f64::from_bits(energy as u64), intact as u64),
             deck,
-            rounding,
         }),
         _ => Err(Error::input(format!(
             "{} was written by another version of Fissure",
@@ -285,7 +278,6 @@ fn write_file<const D: usize>(
     let width = [simulation.saved_width() as i64];
     file.set_attribute("/", "columns", Attribute::Integers(&width))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
-    file.set_attribute("/", "rounding", Attribute::Text(&header.rounding))?;
     for (picks, name) in header.grids.iter().zip(GRIDS) {
         if !picks.is_empty() {
             let rows = Rows::Fixed(picks.len() as u64);

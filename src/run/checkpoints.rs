@@ -78,7 +78,6 @@ impl CheckpointWriter {
             rows: recorder.file.history_rows(),
             start: recorder.observer.start().unwrap_or_default(),
             deck: self.physics.clone(),
-            rounding: simulation.forces.instructions().rounding().to_owned(),
         };
         self.checkpoints
             .write(simulation, &recorder.order, &header)?;

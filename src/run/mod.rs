@@ -162,11 +162,6 @@ impl<'a> Job<'a> {
             stable_step: simulation.scaled_stable_step(),
             survey: Survey::new(&mut simulation),
         });
-        if !simulation.forces.instructions().are_fused() {
-            let message = "the vector instructions of this processor do not round a product and a sum once, \
-                           so results differ in the last digits from those of other machines";
-            self.observer.message(&Message::Warning(message.to_owned()));
-        }
         let decided = decisions(&simulation);
         self.observer.message(&Message::Decided(decided));
         self.look_before_the_first_step()?;

@@ -40,14 +40,6 @@ pub fn restart<const D: usize>(
             lines.join("\n  ")
         )));
     }
-    let rounding = simulation.forces.instructions().rounding();
-    if header.rounding != rounding {
-        warn(format!(
-            "the run had {} multiply-adds until now, and goes on with {rounding} ones: it will end \
-             with other last digits than without the stop; see FISSURE_INSTRUCTIONS",
-            header.rounding
-        ));
-    }
     simulation.refine_to(&header.grids)?;
     let fingerprint = fingerprint(simulation);
     if header.points != simulation.model.total || header.fingerprint != fingerprint {

@@ -8,9 +8,9 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
+use crate::lanes::simd::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
-use crate::lanes::simd::{FUSED, Portable};
 use crate::lanes::{Column, Instructions, Lanes, Numbers, Simd, Versions, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
@@ -220,25 +220,25 @@ fn run<P: Part, R: Runner<P>>(
     runner: &R,
     instructions: Instructions,
 ) -> Vec<BrokenSums> {
+    if const { R::VERSIONS.is_one() } {
+        return runner.run(Portable::<false>, part, base, results);
+    }
     match instructions {
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(simd) if const { R::VERSIONS.is_each() } => {
-            // SAFETY: the machine has the instructions, as `simd` shows.
-            unsafe { run_avx512(simd, part, base, results, runner) }
+        Instructions::Avx512(simd) => {
+            if const { R::VERSIONS.is_each() } {
+                // SAFETY: the machine has the instructions, as `simd` shows.
+                unsafe { run_avx512(simd, part, base, results, runner) }
+            } else {
+                // SAFETY: as above; AVX-512 has all of AVX2.
+                unsafe { run_avx2(simd.avx2(), part, base, results, runner) }
+            }
         }
+        // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(simd) if const { !R::VERSIONS.is_one() } => {
-            // SAFETY: as above; AVX-512 has all of AVX2.
-            unsafe { run_avx2(simd.avx2(), part, base, results, runner) }
-        }
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(simd) if const { !R::VERSIONS.is_one() } => {
-            // SAFETY: as above.
-            unsafe { run_avx2(simd, part, base, results, runner) }
-        }
-        // With the same bits everywhere.
-        _ if const { R::VERSIONS.is_one() } => runner.run(Portable::<false>, part, base, results),
-        _ => runner.run(Portable::<FUSED>, part, base, results),
+        Instructions::Avx2(simd) => unsafe { run_avx2(simd, part, base, results, runner) },
+        #[cfg(not(target_arch = "x86_64"))]
+        Instructions::Portable => runner.run(Portable::<true>, part, base, results),
     }
 }
 
