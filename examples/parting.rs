@@ -8,7 +8,8 @@
 use std::process::ExitCode;
 
 use fissure::deck::plan::{
-    Calibration, Damage, DamageRule, Law, Material, Plan, Sense, Shape, Toughness, WorkRule,
+    Calibration, Damage, DamageRule, Law, Material, Plan, Sense, Shape, Toughness, WorkMeasure,
+    WorkRule,
 };
 use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
@@ -59,6 +60,7 @@ fn rules() -> [(&'static str, DamageRule); 3] {
         work: WorkRule {
             sense,
             family_correction: 0.0,
+            measure: WorkMeasure::Objective,
         },
     };
     [

@@ -219,6 +219,41 @@ fn nothing_under_finite_rotation() {
     }
 }
 
+#[test]
+fn no_bond_breaks_under_rigid_rotation_of_any_size() {
+    fn check<const D: usize>(mut simulation: Simulation<D>) {
+        let before = count_intact(&mut simulation);
+        // A twentieth of the strain at which bonds break.
+        let strained = |[x, y, z]: [f64; 3]| [1.001 * x, 0.9995 * y + 5e-4 * x, 0.9997 * z];
+        for angle in [0.0, 0.01, 0.3, 1.0, 2.5, std::f64::consts::PI] {
+            displace(&mut simulation, |x| turn::<D>(angle, strained(x)));
+            let deck = &simulation.plan.source.text;
+            assert_eq!(simulation.forces.broken().len(), 0, "{angle}: {deck}");
+        }
+        assert_eq!(count_intact(&mut simulation), before);
+    }
+    for case in cases().filter(|case| case.can_break() && !case.law.linear) {
+        for damage in case.damages(0.0).iter().chain(&case.damages(0.25)) {
+            let body = |dimension| deck(dimension, &case.table(), "exact", ", damage = 'brittle'");
+            let breakable = |dimension| body(dimension) + damage;
+            simulate(&breakable("plane-stress"), check::<2>);
+            simulate(&breakable("plane-strain"), check::<2>);
+            simulate(&breakable("3d"), check::<3>);
+        }
+    }
+    // Bonds between bodies of laws whose forces act along bonds and of others.
+    let text = "dimension = 'plane-strain'
+        grid = { spacing = 1, horizon = 3 }
+        material.soft.correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
+        material.hard.ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
+        damage.brittle.energy.fracture_energy = 0.004
+        body.left = { material = 'soft', damage = 'brittle', shape.box = { lower = [0, 0], upper = [8, 8] } }
+        body.right = { material = 'hard', damage = 'brittle', shape.box = { lower = [8, 0], upper = [16, 8] } }
+        time = { end = 1 }
+        ";
+    simulate(text, check::<2>);
+}
+
 /// A smooth, uneven map with strains of several per cent.
 fn wave(x: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = x;
@@ -389,6 +424,43 @@ fn the_force_is_the_slope_of_the_energy() {
     for deck in two_blocks() {
         simulate(&deck, check_slope::<2>);
     }
+}
+
+/// Laws that dissipate: at a fixed history of bonds the force is the slope of what they store.
+#[test]
+fn with_a_fixed_history_the_force_is_the_slope_of_the_energy() {
+    let names = [
+        "ordinary_plastic",
+        "ordinary_viscoelastic",
+        "elastic_plastic_pmb",
+    ];
+    for case in cases().filter(|case| names.contains(&case.law.name)) {
+        let cut = "crack.notch.segment = { from = [-1, 9], to = [9, 9] }\n";
+        let whole = deck("plane-strain", &case.table(), "exact", "");
+        simulate(&(whole + cut), check_slope_after_loading::<2>);
+        for damage in case.damages(0.0) {
+            let body = |dimension| deck(dimension, &case.table(), "exact", ", damage = 'brittle'");
+            let breaking = |dimension| body(dimension) + &damage;
+            simulate(
+                &(breaking("plane-strain") + cut),
+                check_slope_after_loading::<2>,
+            );
+            simulate(&breaking("plane-stress"), check_slope_after_loading::<2>);
+            simulate(&breaking("3d"), check_slope_after_loading::<3>);
+        }
+    }
+}
+
+/// As [`check_slope`], after some time at smaller strains, in which bonds flow.
+fn check_slope_after_loading<const D: usize>(mut simulation: Simulation<D>) {
+    for share in [0.25, 0.5, 0.75] {
+        displace(&mut simulation, |x| {
+            let moved = wave(x);
+            std::array::from_fn(|k| x[k] + share * (moved[k] - x[k]))
+        });
+        simulation.evaluate(Evolution::Step(0.05));
+    }
+    check_slope(simulation);
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub enum Calibration {
     /// then. It is measured before a run, by [`crate::survey::calibrated`].
     Opening(Option<f64>),
     /// As Willberg et al. 2022 print it in eq. 16 and 18: their w has no ½, and in the plane their w_c
-    /// is 3G0/(πδ³h).
+    /// is 3G0/(πδ³h). Their w is the work on η, so that it holds for small rotations only.
     Willberg2022,
 }
 
@@ -75,7 +75,7 @@ impl BondEnergy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::damage::Sense;
+    use crate::damage::{Sense, WorkMeasure};
 
     /// All bonds across a unit area, by the midpoint rule, over the fracture energy.
     fn taken(dimension: Dimension) -> f64 {
@@ -134,6 +134,7 @@ mod tests {
             rule: WorkRule {
                 sense: Sense::Pulled,
                 family_correction: 0.0,
+                measure: WorkMeasure::Objective,
             },
         };
         // s0 − α s_min = 0.03 is 1.5 s0.

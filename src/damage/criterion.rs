@@ -15,11 +15,15 @@ pub enum Criterion {
     /// At the smaller of the threshold stretches of the two points; the critical stretches of their
     /// blocks are the part of it that a law may scale, 0 where a block has none.
     Thresholds([f64; 2]),
-    /// When the work of the force states reaches this much, J/m⁶.
-    Work(f64, WorkRule),
-    /// When the work of the force states reaches the smaller of the thresholds of the two points, J/m⁶.
-    WorkThresholds(WorkRule),
+    /// When the work of the acting force states reaches the sum of what each of them takes, J/m⁶.
+    Work([f64; 2], WorkRule),
+    /// As [`Self::Work`], from the work thresholds of the two points.
+    WorkThresholds(HorizonRatios, WorkRule),
 }
+
+/// Factors that convert the work threshold of a point to the horizon of an end of the bond: entry `[e][k]` takes that of
+/// point k to end e; all are 1 between equal horizons.
+pub type HorizonRatios = [[f64; 2]; 2];
 
 /// How the work of bonds is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +33,18 @@ pub struct WorkRule {
     /// The share, from 0 to 1, of what bonds hold [more](Law::overload) where families are not whole that their
     /// threshold grows by.
     pub family_correction: f64,
+    /// Which relative displacement the force states work on.
+    pub measure: WorkMeasure,
+}
+
+/// The relative displacement that the force state of a point works on. Forces along the bond always work on its
+/// extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorkMeasure {
+    /// Y − R ξ with the rotation R of the point's family: rigid rotation does no work.
+    Objective,
+    /// η = Y − ξ, for small rotations (Willberg et al. 2022, eq. 16).
+    Displacement,
 }
 
 /// Which bonds break by their work.
@@ -49,6 +65,8 @@ pub struct Ends<'a, L, P> {
     pub points: [&'a P; 2],
     /// What criteria alone read of them.
     pub limits: &'a [Limits; 2],
+    /// A bit for each bond that is within the horizon of the end, whose force state acts.
+    pub acting: [u8; 2],
 }
 
 /// What criteria read of eight points, where they read it.
@@ -58,6 +76,8 @@ pub struct Limits {
     pub thresholds: Lanes,
     /// Their [`Law::overload`].
     pub overloads: Lanes,
+    /// Their [`Rotation`](crate::material::Rotation); 0 is none.
+    pub rotations: [Lanes; 3],
 }
 
 impl Limits {
@@ -67,6 +87,7 @@ impl Limits {
         Self {
             thresholds: Lanes::splat(0.0),
             overloads: Lanes::splat(1.0),
+            rotations: [Lanes::splat(0.0); 3],
         }
     }
 }
@@ -75,14 +96,25 @@ impl Criterion {
     /// Whether it depends on the thresholds of the ends.
     #[inline(always)]
     pub fn reads_thresholds(self) -> bool {
-        matches!(self, Self::Thresholds(_) | Self::WorkThresholds(_))
+        matches!(self, Self::Thresholds(_) | Self::WorkThresholds(..))
     }
 
     /// Whether it depends on the overloads of the ends.
     #[inline(always)]
     pub fn reads_overloads(self) -> bool {
         match self {
-            Self::Work(_, rule) | Self::WorkThresholds(rule) => rule.corrects(),
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => rule.corrects(),
+            Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
+        }
+    }
+
+    /// Whether it depends on the rotations of the ends.
+    #[inline(always)]
+    pub fn reads_rotations(self) -> bool {
+        match self {
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
+                rule.measure == WorkMeasure::Objective
+            }
             Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
         }
     }
@@ -90,7 +122,7 @@ impl Criterion {
     /// Whether it asks for the work of the force states.
     #[inline(always)]
     pub fn reads_work(self) -> bool {
-        matches!(self, Self::Work(..) | Self::WorkThresholds(_))
+        matches!(self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
     /// The |x| of [`crate::material::bond`] beyond which bonds must be marked; none below breaks by
@@ -110,7 +142,7 @@ impl Criterion {
         match self {
             Self::Never => true,
             Self::Stretch(_) => !scaled,
-            Self::Thresholds(_) | Self::Work(..) | Self::WorkThresholds(_) => false,
+            Self::Thresholds(_) | Self::Work(..) | Self::WorkThresholds(..) => false,
         }
     }
 
@@ -130,15 +162,16 @@ impl Criterion {
             Self::Stretch(critical) if !L::SCALED => {
                 simd.at_least(bond.growth, Lanes::splat(growth_of(critical)))
             }
-            Self::Work(_, rule) | Self::WorkThresholds(rule) => {
-                let spent = simd.at_least(work, self.threshold(ends));
+            Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
+                let [i, j] = ends.acting;
+                let spent = simd.at_least(work, self.threshold(simd, ends)) & (i | j);
                 match rule.sense {
                     Sense::Pulled => spent & bond.growth.above(0.0),
                     Sense::Either => spent,
                 }
             }
             Self::Stretch(_) | Self::Thresholds(_) => {
-                let threshold = self.threshold(ends);
+                let threshold = self.threshold(simd, ends);
                 let threshold = threshold * (Lanes::splat(2.0) + threshold);
                 simd.at_least(bond.growth, threshold)
             }
@@ -147,7 +180,11 @@ impl Criterion {
 
     /// The stretch or work at which each bond breaks.
     #[inline(always)]
-    fn threshold<L: Law<D>, const D: usize>(self, ends: Ends<'_, L, L::Point>) -> Lanes {
+    fn threshold<S: Simd, L: Law<D>, const D: usize>(
+        self,
+        simd: S,
+        ends: Ends<'_, L, L::Point>,
+    ) -> Lanes {
         let scale = || {
             let [here, there] = ends.points;
             ends.laws[0].toughness_scale(here, &ends.laws[1], there)
@@ -156,7 +193,13 @@ impl Criterion {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
             Self::Stretch(critical) => Lanes::splat(critical),
-            Self::Work(critical, rule) => rule.corrected(Lanes::splat(critical), ends.limits),
+            Self::Work(takes, rule) => {
+                let [i, j] = [0, 1].map(|end| {
+                    let takes = rule.corrected(Lanes::splat(takes[end]), ends.limits[end]);
+                    simd.keep(takes, ends.acting[end])
+                });
+                i + j
+            }
             Self::Thresholds(critical) => {
                 let [mut here, mut there] = ends.limits.map(|limits| limits.thresholds);
                 if L::SCALED {
@@ -166,9 +209,14 @@ impl Criterion {
                 }
                 here.min(there)
             }
-            Self::WorkThresholds(rule) => {
-                let [here, there] = ends.limits;
-                rule.corrected(here.thresholds.min(there.thresholds), ends.limits)
+            Self::WorkThresholds(ratios, rule) => {
+                let [i, j] = ends.limits.map(|limits| limits.thresholds);
+                let [i, j] = [0, 1].map(|end| {
+                    let smaller = (i * ratios[end][0]).min(j * ratios[end][1]) * 0.5;
+                    let takes = rule.corrected(smaller, ends.limits[end]);
+                    simd.keep(takes, ends.acting[end])
+                });
+                i + j
             }
         }
     }
@@ -176,13 +224,14 @@ impl Criterion {
     /// The share of the energy of each broken bond that it held above its criterion, because it was
     /// seen late: 1 − (s_c/s)² or 1 − w_c/w. The bond must know its stretch.
     #[inline(always)]
-    pub fn overshoot<L: Law<D>, const D: usize>(
+    pub fn overshoot<S: Simd, L: Law<D>, const D: usize>(
         self,
+        simd: S,
         bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
         work: Lanes,
     ) -> Lanes {
-        let threshold = self.threshold(ends);
+        let threshold = self.threshold(simd, ends);
         let ratio = if self.reads_work() {
             threshold / work
         } else {
@@ -194,8 +243,8 @@ impl Criterion {
 }
 
 impl WorkRule {
-    /// That of bonds between points with this and another one: a pressed bond breaks where both say so, and the smaller
-    /// correction counts.
+    /// That of bonds between points with this and another one: a pressed bond breaks where both say so, the smaller
+    /// correction counts, and work is objective where either is.
     pub fn of_both(self, other: Self) -> Self {
         Self {
             sense: if self.sense == Sense::Either {
@@ -204,6 +253,11 @@ impl WorkRule {
                 Sense::Pulled
             },
             family_correction: self.family_correction.min(other.family_correction),
+            measure: if self.measure == WorkMeasure::Objective {
+                self.measure
+            } else {
+                other.measure
+            },
         }
     }
 
@@ -212,15 +266,14 @@ impl WorkRule {
         self.family_correction > 0.0
     }
 
-    /// The threshold of bonds by that of whole families: half of the work is each end's.
+    /// What the force state of an end takes, by what it takes in a whole family.
     #[inline(always)]
-    fn corrected(self, threshold: Lanes, [here, there]: &[Limits; 2]) -> Lanes {
+    fn corrected(self, takes: Lanes, end: Limits) -> Lanes {
         if !self.corrects() {
-            return threshold;
+            return takes;
         }
         let share = self.family_correction;
-        let mean = (here.overloads + there.overloads) * 0.5;
-        threshold * (mean * share + Lanes::splat(1.0 - share))
+        takes * (end.overloads * share + Lanes::splat(1.0 - share))
     }
 }
 
@@ -233,6 +286,7 @@ mod tests {
         let rule = |sense, family_correction| WorkRule {
             sense,
             family_correction,
+            measure: WorkMeasure::Objective,
         };
         let both = rule(Sense::Either, 1.0).of_both(rule(Sense::Pulled, 0.5));
         assert_eq!(both, rule(Sense::Pulled, 0.5));

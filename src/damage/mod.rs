@@ -6,7 +6,7 @@ mod critical_stretch;
 mod pull_apart;
 
 pub use bond_energy::{BondEnergy, Calibration};
-pub use criterion::{Criterion, Ends, Limits, Sense, WorkRule};
+pub use criterion::{Criterion, Ends, HorizonRatios, Limits, Sense, WorkMeasure, WorkRule};
 pub use critical_stretch::CriticalStretch;
 
 /// The damage law of a block.
@@ -40,6 +40,14 @@ impl DamageLaw {
         match self {
             Self::CriticalStretch(_) => 0.0,
             Self::BondEnergy(law) => law.rule.family_correction,
+        }
+    }
+
+    /// Whether bonds break by the work of their force states on more than the rotation of their points' families.
+    pub fn is_objective_work(&self) -> bool {
+        match self {
+            Self::CriticalStretch(_) => false,
+            Self::BondEnergy(law) => law.rule.measure == WorkMeasure::Objective,
         }
     }
 

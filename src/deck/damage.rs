@@ -4,7 +4,7 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Text};
 use super::number::Number;
-use super::plan::{self, Calibration, DamageRule, Sense, Toughness, WorkRule};
+use super::plan::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
 use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::error::Result;
@@ -56,6 +56,10 @@ pub fn damage(
                     Sense::Either
                 },
                 family_correction: family_correction(scope, &law.family_correction, &key)?,
+                measure: match calibration {
+                    Calibration::Willberg2022 => WorkMeasure::Displacement,
+                    Calibration::Energy | Calibration::Opening(_) => WorkMeasure::Objective,
+                },
             };
             Ok(plan::Damage {
                 rule: DamageRule::Energy { calibration, work },

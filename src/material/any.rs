@@ -1,8 +1,8 @@
 //! Laws that are one of several: for what is done once a point, and for the bonds between blocks of
 //! different laws.
 
-use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, with_law};
-use crate::lanes::{Lanes, Numbers, Versions};
+use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Rotation, with_law};
+use crate::lanes::{Lanes, Numbers, Simd, Versions};
 
 /// How many numbers of each kind the points and bonds of a law have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +21,8 @@ pub struct Counts {
     pub sum: usize,
     /// [`Law::Memory`].
     pub memory: usize,
+    /// [`ForceState::CENTRAL`] of [`Law::Force`].
+    pub central: bool,
 }
 
 impl Counts {
@@ -33,6 +35,7 @@ impl Counts {
             whole_sum: L::WholeSum::COUNT,
             sum: L::Sum::COUNT,
             memory: L::Memory::COUNT,
+            central: L::Force::CENTRAL,
         }
     }
 
@@ -49,6 +52,7 @@ impl Counts {
             whole_sum: more(self.whole_sum, other.whole_sum),
             sum: more(self.sum, other.sum),
             memory: more(self.memory, other.memory),
+            central: self.central && other.central,
         }
     }
 }
@@ -155,12 +159,36 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
+    fn end_work<S: Simd>(
+        &self,
+        simd: S,
+        bond: &Bond<D>,
+        end: &Self::Point,
+        memory: &Self::Memory,
+        rotation: &[Lanes; 3],
+    ) -> Lanes {
+        with_law!(self, law => law.end_work(simd, bond, &first(end), &first(memory), rotation))
+    }
+
+    fn reads_advanced_history(&self, pass: usize) -> bool {
+        with_law!(self, law => Law::<D>::reads_advanced_history(law, pass))
+    }
+
+    fn rotation(&self, sums: &[f64]) -> Rotation {
+        with_law!(self, law => Law::<D>::rotation(law, sums))
+    }
+
+    #[inline(never)]
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Lanes {
         with_law!(self, law => law.bond_energy(bond, &first(end), &first(memory)))
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
         with_law!(self, law => Law::<D>::point_energy(law, numbers))
+    }
+
+    fn weighted_volume(&self, numbers: &[f64]) -> Option<f64> {
+        with_law!(self, law => Law::<D>::weighted_volume(law, numbers))
     }
 
     fn needs_shape(&self) -> bool {

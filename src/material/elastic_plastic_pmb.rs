@@ -10,7 +10,7 @@ use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Pmb,
 };
-use crate::lanes::{Lanes, Simd};
+use crate::lanes::{Lanes, Simd, Versions};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,6 +79,7 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     type WholeSum = [Lanes; 0];
     type Sum = [Lanes; 0];
     type Force = Along;
+    const VERSIONS: Versions = Versions::Avx2;
     const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]

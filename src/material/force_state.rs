@@ -1,11 +1,14 @@
 //! Force states T⟨ξ⟩ of eight bonds: vectors in general, a number for laws whose forces act along the
 //! bond.
 
-use super::Bond;
+use super::{Bond, rotation};
 use crate::lanes::{Lanes, Numbers, Simd};
 
 /// The force state of one end of eight bonds.
 pub trait ForceState<const D: usize>: Copy {
+    /// Whether it always acts along the bond.
+    const CENTRAL: bool;
+
     /// Times a number for each bond.
     fn times(self, factor: Lanes) -> Self;
 
@@ -18,9 +21,9 @@ pub trait ForceState<const D: usize>: Copy {
     /// A component of T⊗Y, of the part that does not turn the bond.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
-    /// The work ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η of the force density of a bond, J/m⁶, that pulls without
-    /// turning; the same to the bit from both ends.
-    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, linear: bool) -> Lanes;
+    /// The work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the [`Rotation`] R of the family; the same to the bit
+    /// from both ends. A central force works on the extension, whatever the rotation.
+    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, linear: bool, rotation: &[Lanes; 3]) -> Lanes;
 
     /// By component.
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
@@ -31,6 +34,8 @@ pub trait ForceState<const D: usize>: Copy {
 pub struct Along(pub Lanes);
 
 impl<const D: usize> ForceState<D> for Along {
+    const CENTRAL: bool = true;
+
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
         Self(self.0 * factor)
@@ -54,9 +59,9 @@ impl<const D: usize> ForceState<D> for Along {
         self.0 * bond.along[a] * bond.along[b]
     }
 
-    /// The force acts on the extension: ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
+    /// ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
     #[inline(always)]
-    fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool) -> Lanes {
+    fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 3]) -> Lanes {
         let share = if linear {
             bond.growth
         } else {
@@ -73,6 +78,8 @@ impl<const D: usize> ForceState<D> for Along {
 
 /// In any direction, N/m⁶.
 impl<const D: usize> ForceState<D> for [Lanes; D] {
+    const CENTRAL: bool = false;
+
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
         Numbers::each(|d| self[d] * factor)
@@ -96,10 +103,11 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
     }
 
     #[inline(always)]
-    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, _: bool) -> Lanes {
-        let mut sum = self[0] * bond.moved[0];
+    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, _: bool, rotation: &[Lanes; 3]) -> Lanes {
+        let turned = rotation::displacement(&bond.reference, rotation);
+        let mut sum = self[0] * (bond.moved[0] - turned[0]);
         for d in 1..D {
-            sum = simd.multiply_add(self[d], bond.moved[d], sum);
+            sum = simd.multiply_add(self[d], bond.moved[d] - turned[d], sum);
         }
         sum * 0.5
     }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::pmb::SURFACE_CORRECTION;
 use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Versions};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +71,7 @@ impl<const D: usize> Law<D> for LinearMicroelastic {
     type WholeSum = [Lanes; 1];
     type Sum = [Lanes; 0];
     type Force = Along;
+    const VERSIONS: Versions = Versions::Avx2;
     const CONSTANTS: usize = 1;
     const FORCE_READS_STRETCH: bool = true;
     const LINEAR: bool = true;

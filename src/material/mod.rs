@@ -21,6 +21,7 @@ mod ordinary_viscoelastic;
 mod plastic_state;
 mod pmb;
 mod registration;
+mod rotation;
 
 pub use any::{Counts, MOST};
 pub use bond::Bond;
@@ -32,6 +33,7 @@ pub use declaration::{
 pub use force_state::{Along, ForceState};
 pub use influence::Influence;
 pub use plastic_state::PlasticState;
+pub use rotation::Rotation;
 
 // Every law, by its file and type, in the order of the table of laws.
 registration::register! {
@@ -61,7 +63,7 @@ pub trait Described {
 /// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
 /// run over bonds in these steps:
 ///
-/// 1. once, over the whole family: [`Self::whole_share`] → sums → [`Self::constants`], and [`Self::overload`] where a
+/// 1. once, over the family without the bonds that pre-cracks cut: [`Self::whole_share`] → sums → [`Self::constants`], and [`Self::overload`] where a
 ///    criterion reads it;
 /// 2. before each sum of forces, over the intact bonds, [`Self::PASSES`] times:
 ///    [`Self::share`] → sums → [`Self::point`]; then the numbers are sent to the ghosts;
@@ -154,6 +156,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
+    /// Whether a pass sums the history of bonds as it is at the end of the step; else as it was at its beginning.
+    fn reads_advanced_history(&self, _pass: usize) -> bool {
+        false
+    }
+
     /// What a bond keeps for an end when it has come to this deformation in a step (s).
     #[inline(always)]
     fn memory(
@@ -189,12 +196,36 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         }
     }
 
+    /// The [work](ForceState::work) of the force state of one end, J/m⁶, with the [`Self::rotation`] of its family.
+    #[inline(always)]
+    fn end_work<S: Simd>(
+        &self,
+        simd: S,
+        bond: &Bond<D>,
+        end: &Self::Point,
+        memory: &Self::Memory,
+        rotation: &[Lanes; 3],
+    ) -> Lanes {
+        let force = self.force(bond, end, memory);
+        force.work(simd, bond, Self::LINEAR, rotation)
+    }
+
+    /// Rotation of a family from the sums of the first pass, for laws whose forces do not act along the bonds.
+    fn rotation(&self, _sums: &[f64]) -> Rotation {
+        [0.0; 3]
+    }
+
     /// What a bond adds to the strain energy density of one end, J/m⁶.
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Lanes;
 
     /// The part of a point's strain energy density (J/m³) that belongs to no single bond.
     fn point_energy(&self, _numbers: &[f64]) -> f64 {
         0.0
+    }
+
+    /// The weighted volume m (m⁵) of a point from its numbers, for laws that keep it.
+    fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
+        None
     }
 
     /// Whether points need enough bonds in all directions.

@@ -96,6 +96,11 @@ impl Ordinary {
         self.whole
     }
 
+    /// m (m⁵) from A/m; `None` where there are no bonds.
+    pub(super) fn weighted_volume_of(&self, pull: f64) -> Option<f64> {
+        (pull > 0.0).then(|| self.extensional / pull)
+    }
+
     /// What a bond holds over what it would if the family were whole, from m.
     pub(super) fn overload_of(&self, sum: f64) -> f64 {
         if sum > 0.0 { self.whole / sum } else { 1.0 }
@@ -188,22 +193,6 @@ pub(super) fn eased_force<const D: usize>(
     Along(push + bond.shortening * (pull - push) - pull * eased)
 }
 
-/// The energy ½ (A/m) (ε² + λ (e² − 2 ε_d e)) of such a bond, J/m⁶, that carries the share λ of its force
-/// by what has taken e; θ/d gives ε_d.
-#[inline(always)]
-pub(super) fn eased_energy<const D: usize>(
-    bond: &Bond<D>,
-    pull: Lanes,
-    even: Lanes,
-    taken: Lanes,
-    share: f64,
-) -> Lanes {
-    let deviatoric = bond.stretch - even;
-    let eased = (taken - deviatoric * 2.0) * taken * share;
-    let square = bond.stretch * bond.stretch + eased;
-    square * (bond.length * bond.length) * pull * 0.5
-}
-
 impl Described for Ordinary {
     fn described(&self) -> Vec<(&'static str, String)> {
         vec![("forces", "ordinary state-based".to_owned())]
@@ -278,6 +267,10 @@ impl<const D: usize> Law<D> for Ordinary {
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
         self.dilatation_energy(numbers[2])
+    }
+
+    fn weighted_volume(&self, numbers: &[f64]) -> Option<f64> {
+        self.weighted_volume_of(numbers[0])
     }
 
     fn overload(&self, sums: &[f64]) -> f64 {

@@ -1,22 +1,30 @@
 //! Ordinary state-based elastic–perfectly plastic solid: the norm of the deviatoric force state cannot
 //! exceed a yield value.
 //!
-//! Mitchell 2011, SAND2011-3166. Each bond keeps a plastic extension e_p with t_d = (A/m) ω (ε_d − e_p);
-//! the yield function of a point is ½‖t_d‖² − ψ₀ ≤ 0 with ‖t_d‖² = Σ t_d² Ṽ, and the return is radial:
-//! t_d shrinks by r = √(2ψ₀)/‖t_d‖ and e_p grows by (1 − r)(ε_d − e_p).
+//! Mitchell 2011, SAND2011-3166. Each bond keeps a plastic extension e_p. The energy and the force are those of
+//! [`Ordinary`] at the elastic extensions ε − e_p:
+//!
+//! W = ½ κθ² + ½ (A/m) Σ ω (ε − e_p)² Ṽ,  θ = (d/m) Σ ω|ξ| (ε − e_p) Ṽ.
+//!
+//! The deviatoric force is t_d = (A/m) ω ε_d, where ε_d is ε − e_p without its mean over the intact bonds,
+//! ε_d = ε − e_p − |ξ| Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ. The yield function of a point is ½‖t_d‖² − ψ₀ ≤ 0 with
+//! ‖t_d‖² = Σ t_d² Ṽ, and the return is radial: t_d shrinks by r = √(2ψ₀)/‖t_d‖ and e_p grows by (1 − r) ε_d. Flow
+//! changes no volume, so that Σ ω|ξ| e_p Ṽ = 0 and all of this is Mitchell's law until bonds of the family break. In a
+//! broken family it keeps the force the slope of the energy: with Mitchell's θ of the whole extension the plastic
+//! extensions that are left would expand the family, and breaking bonds would add energy.
 //!
 //! ψ₀ follows from the yield stress σ_y in pure shear: a deviatoric strain e has
 //! ½‖t_d‖² = 15 G² e:e/m in space and 8 G² e:e/m in the plane, and yields at e:e = σ_y²/(6G²), so that
 //! ψ₀ = (5/2) σ_y²/m and (4/3) σ_y²/m. With the m of a whole ball the first is Mitchell's
 //! 25σ_y²/(8πδ⁵); his plane value 75σ_y²/(8πhδ⁴) belongs to A = 15G, which the plane law does not have.
 
-use super::ordinary::{Ordinary, eased_energy, eased_force};
+use super::ordinary::{Ordinary, eased_force};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind,
     Law, PlasticState, Word,
 };
 use crate::dimension::Dimension;
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Versions};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,15 +98,16 @@ impl Described for OrdinaryPlastic {
 }
 
 impl<const D: usize> Law<D> for OrdinaryPlastic {
-    /// A/m and d κ θ/m (N/m⁷), θ/d, and 1 − r.
+    /// A/m and d κ θ/m (N/m⁷), the mean elastic stretch Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
     type Point = [Lanes; 4];
     /// e_p/|ξ|, and the energy that is dissipated, J/m⁶.
     type Memory = [Lanes; 2];
     type WholeSum = [Lanes; 1];
-    type Sum = [Lanes; 1];
+    type Sum = [Lanes; 2];
     type Force = Along;
+    const VERSIONS: Versions = Versions::Avx2;
     const CONSTANTS: usize = 1;
-    const PASSES: usize = 2;
+    const PASSES: usize = 3;
     /// θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
@@ -113,52 +122,64 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
-    /// Σ ω|ξ|εṼ (m⁵), then Σ (ε_d − e_p)² Ṽ (m⁵).
+    /// Σ ω|ξ| (ε − e_p) Ṽ and Σ ω|ξ|² Ṽ; then Σ ω ε_d² Ṽ; then the first again, after the flow; all m⁵.
     #[inline(always)]
     fn share<const S: usize>(
         &self,
         bond: &Bond<D>,
-        [_, _, even, _]: &[Lanes; 4],
+        [_, _, mean, _]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
-    ) -> [Lanes; 1] {
+    ) -> [Lanes; 2] {
         let square = bond.length * bond.length;
-        if S == 0 {
-            return [square * bond.stretch];
+        let elastic = bond.stretch - *plastic;
+        if S == 1 {
+            let deviatoric = elastic - *mean;
+            [square * deviatoric * deviatoric, Lanes::splat(0.0)]
+        } else {
+            [square * elastic, square]
         }
-        let elastic = bond.stretch - *even - *plastic;
-        [square * elastic * elastic]
     }
 
     #[inline(always)]
     fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let pull = numbers[0];
-        if pass == 0 {
-            let [push, dilatation] = self.elastic.dilated(pull, sums[0]);
-            numbers[1] = push;
-            numbers[2] = dilatation / D as f64;
-            numbers[4] = dilatation;
-            return;
+        match pass {
+            0 => {
+                let [sum, square] = [sums[0], sums[1]];
+                numbers[2] = if square > 0.0 { sum / square } else { 0.0 };
+            }
+            1 => {
+                let mass = self.whole.unwrap_or(self.elastic.extensional() / pull);
+                let limit = 2.0 * self.strength / mass;
+                let square = pull * pull * sums[0];
+                // A point without bonds has no m, and nothing that could yield.
+                numbers[3] = if square > limit {
+                    1.0 - (limit / square).sqrt()
+                } else {
+                    0.0
+                };
+            }
+            _ => {
+                let [push, dilatation] = self.elastic.dilated(pull, sums[0]);
+                numbers[1] = push;
+                numbers[4] = dilatation;
+            }
         }
-        let mass = self.whole.unwrap_or(self.elastic.extensional() / pull);
-        let limit = 2.0 * self.strength / mass;
-        let square = pull * pull * sums[0];
-        // A point without bonds has no m, and nothing that could yield.
-        numbers[3] = if square > limit {
-            1.0 - (limit / square).sqrt()
-        } else {
-            0.0
-        };
+    }
+
+    fn reads_advanced_history(&self, pass: usize) -> bool {
+        pass == 2
     }
 
     #[inline(always)]
     fn memory(
         &self,
         bond: &Bond<D>,
-        [pull, _, even, shrunk]: &[Lanes; 4],
+        [pull, _, mean, shrunk]: &[Lanes; 4],
         [plastic, loss]: &[Lanes; 2],
         _: f64,
     ) -> [Lanes; 2] {
-        let trial = bond.stretch - *even - *plastic;
+        let trial = bond.stretch - *mean - *plastic;
         let change = trial * *shrunk;
         let taken = *pull * (bond.length * bond.length) * (trial - change) * change;
         [*plastic + change, *loss + taken]
@@ -178,10 +199,11 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        [pull, _, even, _]: &[Lanes; 4],
+        [pull, ..]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
     ) -> Lanes {
-        eased_energy(bond, *pull, *even, *plastic, 1.0)
+        let elastic = bond.length * (bond.stretch - *plastic);
+        elastic * elastic * *pull * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -191,6 +213,10 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     #[inline(always)]
     fn dissipated(&self, _: Lanes, [_, loss]: &[Lanes; 2]) -> Lanes {
         *loss
+    }
+
+    fn weighted_volume(&self, numbers: &[f64]) -> Option<f64> {
+        self.elastic.weighted_volume_of(numbers[0])
     }
 
     fn overload(&self, sums: &[f64]) -> f64 {

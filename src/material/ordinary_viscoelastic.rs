@@ -5,16 +5,19 @@
 //!
 //! t = (d k′θ/m) ω|ξ| + (A/m) ω (ε_d − λ e_b),  ė_b = (ε_d − e_b)/τ.
 //!
+//! The energy W = ½ κθ² + ½ (A/m) Σ ω (ε² + λ (e_b² − 2 ε_d e_b)) Ṽ depends on θ through ε_d as well. Its slope, the
+//! force, has the further part λ (A/m²) ω|ξ| Σ ω|ξ| e_b Ṽ, which is 0 until bonds of the family break.
+//!
 //! In a step in which ε_d changes evenly, e_b ← ε_d,n (1 − a) + e_b,n a + β Δε_d with a = exp(−Δt/τ) and
 //! β = 1 − (τ/Δt)(1 − a). The constants are those of the instantaneous response; in the end the shear
 //! modulus is (1 − λ) of it.
 
-use super::ordinary::{INFLUENCE, Ordinary, eased_energy, eased_force, influence};
+use super::ordinary::{INFLUENCE, Ordinary, eased_force, influence};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
     PlasticState,
 };
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, Versions};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,15 +105,16 @@ impl OrdinaryViscoelastic {
 }
 
 impl<const D: usize> Law<D> for OrdinaryViscoelastic {
-    /// A/m and d κ θ/m (N/m⁷), and θ/d.
+    /// A/m and the part of the force per |ξ| that all bonds have (N/m⁷), and θ/d.
     type Point = [Lanes; 3];
     /// e_b/|ξ|, ε_d/|ξ|, and the energy that is dissipated, J/m⁶.
     type Memory = [Lanes; 3];
     type WholeSum = [Lanes; 1];
     type Sum = [Lanes; 1];
     type Force = Along;
+    const VERSIONS: Versions = Versions::Avx2;
     const CONSTANTS: usize = 1;
-    const PASSES: usize = 1;
+    const PASSES: usize = 2;
     /// θ.
     const OWN_NUMBERS: usize = 1;
     const LEAST_DIMENSION: usize = 2;
@@ -125,17 +129,34 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         Law::<D>::constants(&self.elastic, sums, numbers);
     }
 
+    /// Σ ω|ξ|εṼ, then Σ ω|ξ| e_b Ṽ, m⁵.
     #[inline(always)]
-    fn share<const S: usize>(&self, bond: &Bond<D>, _: &[Lanes; 3], _: &[Lanes; 3]) -> [Lanes; 1] {
-        [bond.length * bond.length * bond.stretch]
+    fn share<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        _: &[Lanes; 3],
+        [back, ..]: &[Lanes; 3],
+    ) -> [Lanes; 1] {
+        let extension = if S == 0 { bond.stretch } else { *back };
+        [bond.length * bond.length * extension]
     }
 
     #[inline(always)]
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+        if pass == 1 {
+            let pull = numbers[0];
+            let push = pull * pull / self.elastic.extensional() * sums[0];
+            numbers[1] += self.relaxing_share * push;
+            return;
+        }
         let [push, dilatation] = self.elastic.dilated(numbers[0], sums[0]);
         numbers[1] = push;
         numbers[2] = dilatation / D as f64;
         numbers[3] = dilatation;
+    }
+
+    fn reads_advanced_history(&self, pass: usize) -> bool {
+        pass == 1
     }
 
     #[inline(always)]
@@ -173,7 +194,10 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         [pull, _, even]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
-        eased_energy(bond, *pull, *even, *back, self.relaxing_share)
+        let deviatoric = bond.stretch - *even;
+        let eased = (*back - deviatoric * 2.0) * *back * self.relaxing_share;
+        let square = bond.stretch * bond.stretch + eased;
+        square * (bond.length * bond.length) * *pull * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -183,6 +207,10 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     #[inline(always)]
     fn dissipated(&self, _: Lanes, [.., loss]: &[Lanes; 3]) -> Lanes {
         *loss
+    }
+
+    fn weighted_volume(&self, numbers: &[f64]) -> Option<f64> {
+        self.elastic.weighted_volume_of(numbers[0])
     }
 
     fn overload(&self, sums: &[f64]) -> f64 {

@@ -218,8 +218,14 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
 }
 
 /// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
-/// without damage has none.
-fn criterion(blocks: &[BlockLaws], ends: [usize; 2], per_point: bool) -> Criterion {
+/// without damage has none. `horizons` (m) are those of the ends of the bonds.
+fn criterion(
+    plan: &Plan,
+    blocks: &[BlockLaws],
+    ends: [usize; 2],
+    horizons: [f64; 2],
+    per_point: bool,
+) -> Criterion {
     let laws = ends.map(|block| blocks[block].damage);
     let critical = laws.map(|law| law.map(|law| law.critical()));
     let Some(smallest) = critical.into_iter().flatten().reduce(f64::min) else {
@@ -230,9 +236,19 @@ fn criterion(blocks: &[BlockLaws], ends: [usize; 2], per_point: bool) -> Criteri
         DamageLaw::CriticalStretch(_) => None,
     };
     let rules = laws.into_iter().flatten().filter_map(rule);
+    let work = |horizon: f64| BondEnergy::from_energy(plan.dimension, 1.0, horizon);
+    let of_block = ends.map(|block| work(plan.block(block).horizon));
+    let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
     match (rules.reduce(WorkRule::of_both), per_point) {
-        (Some(rule), true) => Criterion::WorkThresholds(rule),
-        (Some(rule), false) => Criterion::Work(smallest, rule),
+        (Some(rule), true) => Criterion::WorkThresholds(ratios, rule),
+        (Some(rule), false) => {
+            let takes = ratios.map(|of_end| {
+                let all = of_end.into_iter().zip(critical);
+                let converted = all.filter_map(|(ratio, critical)| Some(ratio * critical?));
+                0.5 * converted.fold(f64::INFINITY, f64::min)
+            });
+            Criterion::Work(takes, rule)
+        }
         (None, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
         (None, false) => Criterion::Stretch(smallest),
     }
@@ -249,9 +265,8 @@ pub fn assign<const D: usize>(
         .iter()
         .any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
     let give = |mut bonds: BlockBonds| {
-        let ends = bonds.blocks();
-        let criterion = criterion(blocks, ends, per_point);
-        let [here, there] = ends.map(|block| plan.block(block));
+        let indices = bonds.blocks();
+        let [here, there] = indices.map(|block| plan.block(block));
         let ends = [(here, there), (there, here)].map(|(block, other)| {
             let constants = constants(plan, &block, &other);
             let horizon = constants.horizon;
@@ -262,6 +277,8 @@ pub fn assign<const D: usize>(
             }
         });
         weigh(plan, model, &mut bonds, &ends);
+        let horizons = ends.each_ref().map(|end| end.horizon);
+        let criterion = criterion(plan, blocks, indices, horizons, per_point);
         let [own, far] = ends.map(|end| end.built.law);
         Interaction {
             bonds,

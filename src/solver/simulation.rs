@@ -173,13 +173,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let interactions = assign(plan, &model, &blocks, bonds);
         let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
         between()?;
+        let family_volume = Repeated::new(forces.intact_families(&model).volume);
+        let cut = pre_crack(plan, &model, &mut forces);
+        forces.find_constants(comm, &model);
         let stiffness = forces.stiffness(&model);
         let stable = stable_step(comm, &model, &stiffness);
         let stages = plan.all_stages();
         let steps = choose_steps(plan, stable)?;
         let clock = Clock::new(steps[0].0, stages[0].time.end);
-        let family_volume = Repeated::new(forces.intact_families(&model).volume);
-        let cut = pre_crack(plan, &model, &mut forces);
         protect(plan, &model, comm, &mut forces);
 
         let each = stages.iter().map(|stage| &stage.acting);
@@ -433,7 +434,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn find_anew(&mut self) {
         self.load(self.clock.time(), true);
         self.find_damping();
-        self.evaluate(Evolution::None);
+        self.evaluate(self.standing_evolution());
     }
 
     /// Takes note of a motion that is not finite, at the time of a clock.

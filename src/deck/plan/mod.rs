@@ -15,7 +15,7 @@ use crate::dimension::Dimension;
 
 pub use super::blocks::{Block, Kind};
 pub use super::law::Law;
-pub use crate::damage::{Calibration, Sense, WorkRule};
+pub use crate::damage::{Calibration, Sense, WorkMeasure, WorkRule};
 pub use bodies::*;
 pub use conditions::*;
 pub use outputs::*;

@@ -22,10 +22,11 @@
 
 use super::super::{
     Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Law, PlasticState,
+    Rotation,
 };
 use super::family::{
-    FamilyShare, ShapeTensor, family_share, from_entries, from_rows, shape_share, to_entries,
-    to_rows,
+    FamilyShare, ShapeTensor, family_rotation, family_share, from_entries, from_rows, shape_share,
+    to_entries, to_rows,
 };
 use super::hooke::{self, Hooke};
 use super::stress::{OfBonds, Stress};
@@ -237,6 +238,10 @@ impl<const D: usize> Law<D> for BondAssociated {
             }
             sum
         })
+    }
+
+    fn rotation(&self, sums: &[f64]) -> Rotation {
+        family_rotation::<D>(sums)
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::super::Bond;
+use super::super::{Bond, Rotation, rotation};
 use crate::lanes::{Lanes, Numbers};
 
 /// A shape tensor is singular where its determinant is below this share of that of a family of the same
@@ -139,6 +139,15 @@ impl<const D: usize> ShapeTensor<D> {
     pub fn smallest(&self) -> f64 {
         extremes(&self.0)[0]
     }
+}
+
+/// Rotation of a family whose sums are a [`FamilyShare`]; none where its shape tensor is singular.
+pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
+    let inverse = ShapeTensor::<D>::new(sums).inverse();
+    inverse.map_or([0.0; 3], |inverse| {
+        let gradient = from_rows::<D>(&sums[2 * D..]) * inverse;
+        rotation::of_gradient(&(SMatrix::identity() + gradient))
+    })
 }
 
 /// The smallest and the largest eigenvalue of a symmetric matrix of at most three rows.

@@ -23,14 +23,14 @@ mod tensor;
 
 use super::bond::Weights;
 use super::{
-    Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind, Law,
-    PlasticState, Values, Word,
+    Bond, Built, Declaration, Declared, Described, ForceState, Given, Influence, Invariants, Key,
+    Kind, Law, PlasticState, Rotation, Values, Word,
 };
 use crate::lanes::{Lanes, Numbers, Simd};
 pub use bond_associated::BondAssociated;
 use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
-use family::{extremes, from_rows, shape_share, symmetric, to_entries, to_rows};
+use family::{extremes, family_rotation, from_rows, shape_share, symmetric, to_entries, to_rows};
 use hooke::Hooke;
 use plastic::Plastic;
 use stress::Stress;
@@ -284,6 +284,22 @@ impl<const D: usize> Law<D> for Correspondence {
         let pull = times_bond(simd, here, bond);
         let push = times_bond(simd, there, bond);
         Numbers::each(|d| simd.whole(weights.sum(pull[d], push[d])))
+    }
+
+    #[inline(always)]
+    fn end_work<S: Simd>(
+        &self,
+        simd: S,
+        bond: &Bond<D>,
+        (_, end): &Point<D>,
+        _: &[Lanes; 0],
+        rotation: &[Lanes; 3],
+    ) -> Lanes {
+        times_bond(simd, end, bond).work(simd, bond, false, rotation)
+    }
+
+    fn rotation(&self, sums: &[f64]) -> Rotation {
+        family_rotation::<D>(sums)
     }
 
     #[inline(always)]

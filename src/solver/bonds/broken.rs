@@ -177,12 +177,11 @@ impl<const D: usize> Forces<D> {
         for point in &own {
             flags[*point] = 1.0;
         }
-        let Self { numbers, halo, .. } = self;
-        let changing = numbers.first_changing..numbers.read;
-        let columns = numbers.columns[changing].iter_mut();
-        let columns = columns.map(|column| &mut column[..]);
-        let columns = columns.chain([&mut flags[..]]);
+        let mut halo = std::mem::take(&mut self.halo);
+        let (columns, count) = self.changing_columns();
+        let columns = columns.into_iter().take(count).chain([&mut flags[..]]);
         halo.bring(comm, &mut columns.collect::<Vec<_>>());
+        self.halo = halo;
         times.halo += start.elapsed();
         self.update(News::Numbers, Which::All, model, displacement);
         let mut changed = own.clone();

@@ -10,7 +10,7 @@ use crate::damage::Criterion;
 use crate::families::{BlockBonds, Which};
 use crate::lanes::{Column, Lanes, Numbers};
 use crate::material::bond::stretch_of;
-use crate::material::{Law, with_pair};
+use crate::material::{Law, MOST, with_pair};
 use crate::solver::model::Model;
 
 use super::broken::Broken;
@@ -27,6 +27,9 @@ const CHUNK: usize = 4096;
 /// Interior points for each thread that are worked on before messages are driven on again: some tenths
 /// of a millisecond in space.
 const PIECE: usize = 4096;
+
+/// Columns of [`Forces::changing_columns`] at most.
+const MOST_CHANGING: usize = MOST.point + 3;
 
 /// What a pass reads anew from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,7 +70,7 @@ pub struct Acting<'a, const D: usize> {
 
 impl<const D: usize> Forces<D> {
     /// Brings the ghosts up to date and adds up the internal force densities. The bonds have been
-    /// [shown](Self::with_shown) the owned points. Bonds break and remember, or nothing changes but forces; what
+    /// [shown](Self::with_shown) the owned points. `evolution` says what changes besides the forces; what
     /// comes of bonds that break is in [`Self::broken`]. Collective.
     pub fn evaluate(
         &mut self,
@@ -91,14 +94,12 @@ impl<const D: usize> Forces<D> {
             let pass = self.passes[turn];
             let news = self.news(turn);
             let mut halo = std::mem::take(&mut self.halo);
-            let first = self.numbers.first_changing;
-            let changing = first..self.numbers.read.max(first);
             match news {
                 News::Displacement => halo.pack(displacement.iter().map(Vec::as_slice)),
                 News::Thresholds => halo.pack([&self.limits.thresholds[..]].into_iter()),
                 News::Numbers => {
-                    let columns = &self.numbers.columns[changing.clone()];
-                    halo.pack(columns.iter().map(|column| &column[..]));
+                    let (columns, count) = self.changing_columns();
+                    halo.pack(columns[..count].iter().map(|column| &**column));
                 }
                 News::OwnNumbers | News::Nothing => {}
             }
@@ -131,8 +132,8 @@ impl<const D: usize> Forces<D> {
                 }
                 News::Thresholds => halo.unpack([&mut self.limits.thresholds[..]].into_iter()),
                 News::Numbers => {
-                    let columns = &mut self.numbers.columns[changing];
-                    halo.unpack(columns.iter_mut().map(|column| &mut column[..]));
+                    let (columns, count) = self.changing_columns();
+                    halo.unpack(columns.into_iter().take(count));
                 }
                 News::OwnNumbers | News::Nothing => {}
             }
@@ -146,7 +147,7 @@ impl<const D: usize> Forces<D> {
         }
         times.bonds += in_bonds;
         times.halo += start.elapsed() - in_bonds;
-        if evolution != Evolution::None {
+        if evolution.is_stored() {
             let acting = Acting {
                 displacement,
                 force,
@@ -162,6 +163,22 @@ impl<const D: usize> Forces<D> {
     fn border(&self, from: usize) -> usize {
         let end = self.together(from - 1).end;
         if end == from { from } else { self.border(end) }
+    }
+
+    /// The columns of point numbers and rotations that change before each sum of forces and that both ends read, and how
+    /// many there are.
+    pub(super) fn changing_columns(&mut self) -> ([&mut [f64]; MOST_CHANGING], usize) {
+        let first = self.numbers.first_changing;
+        let changing = first..self.numbers.read.max(first);
+        let numbers = self.numbers.columns[changing].iter_mut();
+        let columns = numbers.chain(self.limits.kept_rotations());
+        let mut all = std::array::from_fn(|_| &mut [][..]);
+        let mut count = 0;
+        for column in columns {
+            all[count] = &mut column[..];
+            count += 1;
+        }
+        (all, count)
     }
 
     /// What a pass reads anew from other ranks.
@@ -195,6 +212,7 @@ impl<const D: usize> Forces<D> {
                 News::Numbers | News::OwnNumbers => {
                     let first = self.numbers.first_changing;
                     grid.update_numbers(which, first, &self.numbers.columns);
+                    grid.update_rotations(which, &self.limits.rotations);
                 }
                 News::Nothing => {}
             }
@@ -249,7 +267,8 @@ impl<const D: usize> Forces<D> {
                 self.for_each_interaction(|interaction, source| {
                     let (bonds, points) = (&mut interaction.bonds, points.clone());
                     with_pair!(interaction.laws, laws => {
-                        sum_pass(number, bonds, points, laws[0], &mut sums, source);
+                        let law = laws[0];
+                        sum_pass(number, bonds, points, law, evolution, &mut sums, source);
                     });
                 });
                 self.numbers.sums = sums;
@@ -257,10 +276,10 @@ impl<const D: usize> Forces<D> {
             Pass::Force => {
                 let mut broken = std::mem::take(&mut self.broken);
                 self.for_each_interaction(|interaction, source| {
-                    let criterion = if evolution == Evolution::None {
-                        Criterion::Never
-                    } else {
+                    let criterion = if evolution.is_stored() {
                         interaction.criterion
+                    } else {
+                        Criterion::Never
                     };
                     let influence = interaction.influence;
                     with_pair!(interaction.laws, laws => {
@@ -303,7 +322,11 @@ impl<const D: usize> Forces<D> {
                     });
             }
             Pass::PointSum(number) => {
-                let keeps = evolution != Evolution::None;
+                let keeps = evolution.is_stored();
+                if number == 0 {
+                    let rotations = &mut self.limits.rotations;
+                    (self.numbers).find_rotations(points.clone(), model, blocks, rotations);
+                }
                 self.numbers
                     .finish(number, points, model, blocks, plastic, keeps);
             }
@@ -318,6 +341,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
     law: L,
+    evolution: Evolution,
     sums: &mut [Column],
     source: Source<'_, D>,
 ) {
@@ -328,10 +352,16 @@ fn sum_pass<L: Law<D>, const D: usize>(
     // No law has more passes, and no loop is compiled for those that a law does not have.
     match number {
         0 if const { L::PASSES > 0 } => {
-            sweep(bonds, points, results, &PassSum::<L, 0> { law }, source);
+            let kernel = PassSum::<L, 0> { law, evolution };
+            sweep(bonds, points, results, &kernel, source);
         }
         1 if const { L::PASSES > 1 } => {
-            sweep(bonds, points, results, &PassSum::<L, 1> { law }, source);
+            let kernel = PassSum::<L, 1> { law, evolution };
+            sweep(bonds, points, results, &kernel, source);
+        }
+        2 if const { L::PASSES > 2 } => {
+            let kernel = PassSum::<L, 2> { law, evolution };
+            sweep(bonds, points, results, &kernel, source);
         }
         _ => unreachable!("a law with more passes than loops"),
     }

@@ -10,10 +10,30 @@ use super::kernel::{Group, Kernel};
 /// What happens to bonds while forces are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Evolution {
-    /// Bonds break and remember, as at the end of a step of this length (s).
+    /// Bonds break and their history advances, as at the end of a step of this length (s).
     Step(f64),
-    /// Nothing: forces are only looked at.
+    /// Forces follow from the history that bonds would have at the end of a step of this length (s). It is not stored,
+    /// and no bond breaks.
+    Trial(f64),
+    /// Neither history nor bonds change.
     None,
+}
+
+impl Evolution {
+    /// The time by which the history of bonds advances, s.
+    #[inline(always)]
+    pub fn history_step(self) -> Option<f64> {
+        match self {
+            Self::Step(step) | Self::Trial(step) => Some(step),
+            Self::None => None,
+        }
+    }
+
+    /// Whether what changes is stored.
+    #[inline(always)]
+    pub fn is_stored(self) -> bool {
+        matches!(self, Self::Step(_))
+    }
 }
 
 /// Sums the forces of the intact bonds: force density by component (N/m³), less those of bonds that
@@ -47,8 +67,8 @@ impl<L> Force<L> {
         L::bond_force(simd, laws, &group.bond, points, &group.memory, weights)
     }
 
-    /// The work ½ (T_i⟨ξ⟩ − T_j⟨−ξ⟩)·η of each bond of whole cells, J/m⁶, from the weighted sum of the
-    /// force states; 0 if the criterion does not read it.
+    /// The work of the acting force states of each bond between whole cells, J/m⁶, from the weighted force density; 0 if
+    /// the criterion does not read it. A force state does not act beyond the horizon of its point.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,
@@ -62,12 +82,29 @@ impl<L> Force<L> {
         if !self.criterion.reads_work() {
             return Lanes::splat(0.0);
         }
-        let whole = match group.weights {
-            Weights::One => total,
-            _ if self.influence => total,
-            _ => self.weighted(simd, group, Weights::One),
+        let weights = match group.weights {
+            weights if self.influence => weights,
+            Weights::One | Weights::Same(_) => Weights::One,
+            Weights::Each(ends) => {
+                Weights::Each(ends.map(|end| simd.keep(Lanes::splat(1.0), end.above(0.0))))
+            }
         };
-        whole.work(simd, &group.bond, L::LINEAR)
+        if L::Force::CENTRAL {
+            let total = if self.influence {
+                total
+            } else {
+                self.weighted(simd, group, weights)
+            };
+            let rotation = &group.limits[0].rotations;
+            return total.work(simd, &group.bond, L::LINEAR, rotation);
+        }
+        let points = group.points();
+        let [i, j] = [0, 1].map(|end| {
+            let (law, memory) = (&self.laws[end], &group.memory[end]);
+            let rotation = &group.limits[end].rotations;
+            law.end_work(simd, &group.bond, points[end], memory, rotation)
+        });
+        weights.sum(i, j)
     }
 
     /// A bit for each bond that breaks.
@@ -95,6 +132,7 @@ impl<L> Force<L> {
             laws: &self.laws,
             points: group.points(),
             limits: &group.limits,
+            acting: group.acting(),
         }
     }
 }
@@ -123,13 +161,13 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
 
     #[inline(always)]
     fn remembers(&self) -> bool {
-        self.evolution != Evolution::None
+        self.evolution.is_stored()
     }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
-        if let Evolution::Step(step) = self.evolution
-            && L::Memory::COUNT > 0
+        if L::Memory::COUNT > 0
+            && let Some(step) = self.evolution.history_step()
         {
             let [own, far] = &self.laws;
             let [here, there] = group.points();
@@ -169,10 +207,17 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         let bond = group.bond.with_stretch(L::LINEAR);
         let share = group.weights.own() * group.own_volume * group.volume;
         let energy = self.laws[0].bond_energy(&bond, group.own, &group.memory[0]) * share;
-        let overshoot = energy
-            * self
-                .criterion
-                .overshoot::<L, D>(&bond, self.ends(group), work);
+        let ends = self.ends(group);
+        let late = self.criterion.overshoot::<S, L, D>(simd, &bond, ends, work);
+        let overshoot = if self.criterion.reads_work() {
+            // The work of a bond belongs to its acting ends in equal parts.
+            let [own, far] = ends.acting;
+            let half = simd.keep(Lanes::splat(0.5), own & far);
+            let part = simd.select(half, own & far, simd.keep(Lanes::splat(1.0), own));
+            work * part * share * late
+        } else {
+            energy * late
+        };
         told[0] += simd.keep(Lanes::splat(1.0), broken);
         told[1] += simd.keep(energy, broken);
         told[2] += simd.keep(overshoot, broken);

@@ -33,7 +33,7 @@ impl<const D: usize> GridValues<D> {
             numbers: (0..numbers)
                 .map(|k| Column::new(D + k, count, 0.0))
                 .collect(),
-            limits: LimitColumns::new(limits, D + numbers, count),
+            limits: LimitColumns::new::<D>(limits, D + numbers, count),
             grid,
         }
     }
@@ -64,6 +64,15 @@ impl<const D: usize> GridValues<D> {
     /// Takes the thresholds of some of the local points.
     pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
         self.grid.update(which, values, &mut self.limits.thresholds);
+    }
+
+    /// Takes the rotations of some of the local points.
+    pub fn update_rotations(&mut self, which: Which, rotations: &[Column; 3]) {
+        for (places, values) in self.limits.rotations.iter_mut().zip(rotations) {
+            if !values.is_empty() {
+                self.grid.update(which, values, places);
+            }
+        }
     }
 
     /// Takes the overloads of the local points.

@@ -50,6 +50,15 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         }
     }
 
+    /// A bit for each bond, intact or not, that is within the horizon of point i, and of point j.
+    #[inline(always)]
+    pub fn acting(&self) -> [u8; 2] {
+        match self.weights {
+            Weights::One | Weights::Same(_) => [u8::MAX; 2],
+            Weights::Each(ends) => ends.map(|end| end.above(0.0)),
+        }
+    }
+
     /// A share in the sums of the own end, by volume.
     #[inline(always)]
     pub fn own_share(&self, share: Lanes) -> Lanes {

@@ -12,11 +12,13 @@ pub struct LimitsRead {
     pub thresholds: bool,
     /// Overloads.
     pub overloads: bool,
+    /// Rotations.
+    pub rotations: bool,
 }
 
 impl LimitsRead {
-    /// By the damage laws of the blocks.
-    pub fn by(blocks: &[BlockLaws]) -> Self {
+    /// By the damage laws of the blocks, in `D` dimensions.
+    pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());
             laws.any(reads)
@@ -24,6 +26,8 @@ impl LimitsRead {
         Self {
             thresholds: any(|law| law.alpha() > 0.0),
             overloads: any(|law| law.family_correction() > 0.0),
+            rotations: any(DamageLaw::is_objective_work)
+                && !blocks.iter().all(|block| block.law.counts::<D>().central),
         }
     }
 }
@@ -34,21 +38,36 @@ pub struct LimitColumns {
     pub thresholds: Column,
     /// As above.
     pub overloads: Column,
+    /// By component; in the plane only the last one is kept.
+    pub rotations: [Column; 3],
 }
 
 impl LimitColumns {
-    /// The columns that are read, for so many points; `number` others are read with them.
-    pub fn new(read: LimitsRead, number: usize, count: usize) -> Self {
+    /// The columns that are read, for so many points in `D` dimensions; `number` others are read with them.
+    pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
+        let first_rotation = if D < 3 { 2 } else { 0 };
         Self {
+            rotations: std::array::from_fn(|k| {
+                let is_read = read.rotations && k >= first_rotation;
+                of(number + 2 + k, is_read, 0.0)
+            }),
             thresholds: of(number, read.thresholds, 0.0),
             overloads: of(number + 1, read.overloads, 1.0),
         }
     }
 
+    /// Those rotations that are kept.
+    pub fn kept_rotations(&mut self) -> impl Iterator<Item = &mut Column> {
+        let columns = self.rotations.iter_mut();
+        columns.filter(|column| !column.is_empty())
+    }
+
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        size_of::<f64>() * (self.thresholds.len() + self.overloads.len())
+        let [x, y, z] = &self.rotations;
+        let columns = [&self.thresholds, &self.overloads, x, y, z];
+        size_of::<f64>() * columns.map(|column| column.len()).iter().sum::<usize>()
     }
 }
 
@@ -57,6 +76,7 @@ impl LimitColumns {
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     overloads: Option<&'a [f64]>,
+    rotations: [Option<&'a [f64]>; 3],
     /// Whether any is read: what loops ask first.
     any: bool,
 }
@@ -76,10 +96,17 @@ impl<'a> ReadLimits<'a> {
         };
         let thresholds = read(criterion.reads_thresholds(), &columns.thresholds);
         let overloads = read(criterion.reads_overloads(), &columns.overloads);
+        let rotations = columns
+            .rotations
+            .each_ref()
+            .map(|column| read(criterion.reads_rotations() && !column.is_empty(), column));
         Self {
             thresholds,
             overloads,
-            any: thresholds.is_some() || overloads.is_some(),
+            rotations,
+            any: thresholds.is_some()
+                || overloads.is_some()
+                || rotations.iter().any(Option::is_some),
         }
     }
 
@@ -93,6 +120,11 @@ impl<'a> ReadLimits<'a> {
             }
             if let Some(column) = self.overloads {
                 limits.overloads = take(column);
+            }
+            for (rotation, column) in limits.rotations.iter_mut().zip(self.rotations) {
+                if let Some(column) = column {
+                    *rotation = take(column);
+                }
             }
         }
         limits

@@ -32,7 +32,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Memory = L::Memory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = L::Memory::COUNT > 0;
-    const VERSIONS: Versions = L::VERSIONS;
+    const VERSIONS: Versions = Versions::Avx2;
     const NEAR: bool = L::VERSIONS.is_each() && !L::LINEAR && L::Memory::COUNT == 0;
     const WANTED: Wanted = Wanted {
         shortening: false,

@@ -38,7 +38,7 @@ use grid_points::GridValues;
 use limit_columns::{LimitColumns, LimitsRead};
 use list_points::Node;
 use point_numbers::PointNumbers;
-use point_sums::WholeSum;
+use point_sums::FamilySum;
 use seen::sweep_all;
 use sweep::Source;
 
@@ -87,8 +87,8 @@ pub struct Forces<const D: usize> {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Puts together the bonds, the halo plan and the blocks' laws, and finds the points' constants
-    /// from their whole families; collective.
+    /// Puts together the bonds, the halo plan and the blocks' laws. The constants of the points are still to be
+    /// [found](Self::find_constants). Collective.
     ///
     /// # Errors
     /// When the wish for [instructions](Instructions::of_all) is none; the same on all ranks.
@@ -107,8 +107,8 @@ impl<const D: usize> Forces<D> {
             .windows(2)
             .any(|pair| kind(&pair[0]) != kind(&pair[1]));
         let numbers = PointNumbers::new(&blocks, mixed, model);
-        let read = LimitsRead::by(&blocks);
-        let limits = LimitColumns::new(read, numbers.read, model.volume.len());
+        let read = LimitsRead::by::<D>(&blocks);
+        let limits = LimitColumns::new::<D>(read, numbers.read, model.volume.len());
         let breaks = blocks.iter().any(|block| block.damage.is_some());
         let remembers = (blocks.iter()).any(|block| block.law.counts::<D>().memory > 0);
         for interaction in &mut interactions {
@@ -126,7 +126,7 @@ impl<const D: usize> Forces<D> {
         let force = passes.len() - 1;
         passes.splice(force..force, (0..numbers.passes).map(Pass::PointSum));
         let lists = |i: &Interaction| matches!(i.bonds, BlockBonds::List(_));
-        let mut forces = Self {
+        Ok(Self {
             nodes: if interactions.iter().any(lists) {
                 list_points::nodes(model)
             } else {
@@ -146,14 +146,16 @@ impl<const D: usize> Forces<D> {
             remembers,
             breaks,
             broken: Vec::new(),
-        };
-        if forces.numbers.with_constants || read.overloads {
-            forces.find_constants(comm, model, read);
-        }
-        Ok(forces)
+        })
     }
 
-    fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>, read: LimitsRead) {
+    /// Finds the constants of the points from the intact bonds of their families: pre-cracks are cut before, and nothing
+    /// else is broken yet. Collective.
+    pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
+        let read = LimitsRead::by::<D>(&self.blocks);
+        if !self.numbers.with_constants && !read.overloads {
+            return;
+        }
         let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.whole_sum];
         self.for_each_interaction(|interaction, source| {
             with_pair!(interaction.laws, laws => {
@@ -321,6 +323,6 @@ fn whole_sums<L: Law<D>, const D: usize>(
     source: Source<'_, D>,
 ) {
     if const { L::WholeSum::COUNT > 0 } {
-        sweep_all(bonds, sums, &WholeSum { law }, source);
+        sweep_all(bonds, sums, &FamilySum { law }, source);
     }
 }

@@ -97,6 +97,39 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
+    /// Finds the rotations of some owned points from the sums of the first pass, by component; those of empty columns
+    /// are not wanted.
+    pub fn find_rotations<const D: usize>(
+        &self,
+        points: Range<usize>,
+        model: &Model<D>,
+        blocks: &[BlockLaws],
+        rotations: &mut [Column; 3],
+    ) {
+        let columns = rotations.each_mut().map(|column| {
+            let own = column.get_mut(points.clone());
+            own.unwrap_or_default()
+        });
+        if columns.iter().all(|column| column.is_empty()) {
+            return;
+        }
+        over_points(points, columns, &|points, columns| {
+            for (k, point) in points.enumerate() {
+                let law = &blocks[usize::from(model.block[point])].law;
+                let mut sums = [0.0; MOST.sum];
+                for (sum, column) in sums.iter_mut().zip(&self.sums) {
+                    *sum = column[point];
+                }
+                let rotation = Law::<D>::rotation(law, &sums);
+                for (column, component) in columns.iter_mut().zip(rotation) {
+                    if let Some(entry) = column.get_mut(k) {
+                        *entry = component;
+                    }
+                }
+            }
+        });
+    }
+
     /// Finds the numbers of some owned points that follow from the sums of a pass. `keeps` says whether
     /// plastic flow is for good.
     pub fn finish<const D: usize>(

@@ -4,6 +4,7 @@ use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use crate::material::Law;
 use crate::material::bond::Wanted;
 
+use super::force::Evolution;
 use super::kernel::{Combine, Group, Kernel};
 
 /// Neither stretches nor forces.
@@ -20,6 +21,8 @@ const fn growth_only(linear: bool) -> Wanted {
 pub struct PassSum<L, const N: usize> {
     /// The law of the own end.
     pub law: L,
+    /// Whether the history of bonds advances, as in the sum of the forces that follows.
+    pub evolution: Evolution,
 }
 
 impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
@@ -40,7 +43,14 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::Sum) {
-        let share = (self.law).share::<N>(&group.bond, group.own, &group.memory[0]);
+        let mut history = group.memory[0];
+        if L::Memory::COUNT > 0
+            && self.law.reads_advanced_history(N)
+            && let Some(step) = self.evolution.history_step()
+        {
+            history = (self.law).memory(&group.bond, group.own, &history, step);
+        }
+        let share = self.law.share::<N>(&group.bond, group.own, &history);
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
             // Length, stretch and direction of a bond that only fills up a group are not numbers.
@@ -55,20 +65,20 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Sums over the whole family, broken bonds included, what gives a point's constants.
+/// Sums over the intact bonds of the undeformed body what gives a point's constants.
 #[derive(Clone, Copy)]
-pub struct WholeSum<L> {
+pub struct FamilySum<L> {
     /// The law of the own end.
     pub law: L,
 }
 
-impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
+impl<L: Law<D>, const D: usize> Kernel<D> for FamilySum<L> {
     type Sums = L::WholeSum;
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const WHOLE: bool = true;
+    const UNDEFORMED: bool = true;
     const VERSIONS: Versions = Versions::Avx2;
     const WANTED: Wanted = growth_only(L::LINEAR);
 
@@ -77,7 +87,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for WholeSum<L> {
         let share = self.law.whole_share(&group.bond);
         for k in 0..L::WholeSum::COUNT {
             let share = share.get(k) * group.volume * group.weights.own();
-            *sums.get_mut(k) += simd.keep(share, group.whole);
+            *sums.get_mut(k) += simd.keep(share, group.intact);
         }
     }
 }

@@ -178,7 +178,13 @@ impl<const D: usize> Forces<D> {
                 sweep_all(bonds, sums, &measures::Dilatation::<false>, source);
             }
         });
-        let [weighted_volume, mut growth] = columns.try_into().expect("two columns");
+        let [mut weighted_volume, mut growth] = columns.try_into().expect("two columns");
+        for (point, volume) in weighted_volume.iter_mut().enumerate() {
+            let law = &self.blocks[usize::from(model.block[point])].law;
+            if let Some(of_law) = Law::<D>::weighted_volume(law, &self.numbers.of(point)) {
+                *volume = of_law;
+            }
+        }
         for (growth, volume) in growth.iter_mut().zip(&weighted_volume) {
             *growth = if *volume > 0.0 {
                 D as f64 * *growth / volume

@@ -16,8 +16,10 @@
 //! secants is known exactly, rather than along u. All sums are exact, so that neither ranks nor threads
 //! change a bit.
 //!
-//! Bonds break, and remember, between equilibria only: in equilibrium those that must break do, and
-//! the next equilibrium is looked for at the same load, until nothing breaks.
+//! Bonds break at equilibria only: in equilibrium those that must break do, and the next equilibrium is looked for at
+//! the same load, until nothing breaks. The history of bonds and points is part of the equilibrium. Each iteration takes
+//! the forces from the history that a step from the last equilibrium to the present place would leave, and stores it
+//! when the equilibrium is found.
 
 use std::time::Instant;
 
@@ -59,6 +61,8 @@ pub struct LoadStep {
     /// The largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N: a body that is unloaded, or broken
     /// in two, is not looked at more closely than when it was loaded.
     scale: f64,
+    /// Whether the history of bonds has advanced by the time of this load step, at an equilibrium in which bonds broke.
+    has_advanced: bool,
     /// Whether the equilibrium has been found, and nothing more breaks.
     pub is_settled: bool,
     /// Whether it has not been found in as many iterations as there may be.
@@ -73,6 +77,7 @@ impl Default for LoadStep {
             residual: f64::NAN,
             damping: f64::NAN,
             scale: 0.0,
+            has_advanced: false,
             is_settled: true,
             has_failed: false,
         }
@@ -97,24 +102,26 @@ impl LoadStep {
     }
 
     /// All of it, as a checkpoint holds it.
-    pub fn words(&self) -> [u64; 7] {
+    pub fn words(&self) -> [u64; 8] {
         let [residual, damping, scale] =
             [self.residual, self.damping, self.scale].map(f64::to_bits);
-        let [settled, failed] = [self.is_settled, self.has_failed].map(u64::from);
+        let flags = [self.has_advanced, self.is_settled, self.has_failed];
+        let [advanced, settled, failed] = flags.map(u64::from);
         let counts = [self.iterations, self.since_breaking];
         [
-            counts[0], counts[1], residual, damping, scale, settled, failed,
+            counts[0], counts[1], residual, damping, scale, advanced, settled, failed,
         ]
     }
 
     /// What [`Self::words`] gave.
-    pub fn of_words(words: [u64; 7]) -> Self {
+    pub fn of_words(words: [u64; 8]) -> Self {
         let [
             iterations,
             since_breaking,
             residual,
             damping,
             scale,
+            advanced,
             settled,
             failed,
         ] = words;
@@ -125,6 +132,7 @@ impl LoadStep {
             residual,
             damping,
             scale,
+            has_advanced: advanced == 1,
             is_settled: settled == 1,
             has_failed: failed == 1,
         }
@@ -161,7 +169,7 @@ impl<const D: usize> Simulation<'_, D> {
         } else {
             Some(self.drift())
         };
-        self.evaluate(Evolution::None);
+        self.evaluate(self.standing_evolution());
         self.guide();
         self.look(before);
         let forces = self.times.forces.whole() - forces;
@@ -312,17 +320,35 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
+    /// The time by which the history of bonds advances at the next equilibrium (s): once in a load step, however often
+    /// bonds break.
+    fn time_to_advance(&self) -> f64 {
+        if self.load_step.has_advanced {
+            0.0
+        } else {
+            self.clock.step()
+        }
+    }
+
+    /// How forces follow from the present place without a change of the state: during a load step from the history that
+    /// bonds would have if this were its equilibrium.
+    pub(in crate::solver) fn standing_evolution(&self) -> Evolution {
+        if self.load_step.is_settled {
+            Evolution::None
+        } else {
+            Evolution::Trial(self.time_to_advance())
+        }
+    }
+
     /// In equilibrium: breaks the bonds that must, and lets the points start anew; where none does, the
     /// load step is over.
     fn break_or_settle(&mut self) {
-        // Time moves once in a load step, however often bonds break.
-        let is_first = self.load_step.since_breaking == self.load_step.iterations;
-        let step = if is_first { self.clock.step() } else { 0.0 };
-        self.evaluate(Evolution::Step(step));
+        self.evaluate(Evolution::Step(self.time_to_advance()));
+        self.load_step.has_advanced = true;
         if total(self.comm, self.forces.broken().len() as u64) > 0 {
             self.load_step.since_breaking = 0;
             self.stop();
-            self.evaluate(Evolution::None);
+            self.evaluate(self.standing_evolution());
             self.guide();
             self.look(None);
             return;
