@@ -424,24 +424,24 @@ fn cost_at(height: f64, law: &str, rule: &str) -> f64 {
         grid = {{ spacing = 1, horizon = 3 }}
         material.rubber.{law}
         damage.brittle.{rule} = {{ fracture_energy = {FRACTURE_ENERGY}, {more} }}
-        body.coarse = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [24, 7] }} }}
+        body.coarse = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [16, 7] }} }}
         [body.fine]
         material = 'rubber'
         damage = 'brittle'
         spacing = 0.5
         horizon = 1.5
-        shape.box = {{ lower = [0, 7], upper = [24, 14] }}
+        shape.box = {{ lower = [0, 7], upper = [16, 14] }}
         [time]
         end = 1
         "
     );
     simulate::<2, _>(&text, |mut simulation| {
-        let mut opening = 4e-3;
-        while opening < 0.5 {
+        let mut opening = 1e-2;
+        while opening < 0.4 {
             displace(&mut simulation, |[x, y, z]| {
                 [x, if y > height { y + opening } else { y }, z]
             });
-            opening *= 1.01;
+            opening *= 1.03;
         }
         let fields = &simulation.fields;
         let [freed, late] =
@@ -451,25 +451,24 @@ fn cost_at(height: f64, law: &str, rule: &str) -> f64 {
             .zip(late)
             .map(|(freed, late)| freed - late)
             .sum();
-        cost / (24.0 * FRACTURE_ENERGY)
+        cost / (16.0 * FRACTURE_ENERGY)
     })
 }
 
 #[test]
 fn between_bodies_of_different_horizons_by_energy() {
-    for law in [
-        ordinary(0.3, "constant"),
-        "ordinary_viscoelastic = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3, relaxation_time = 1, relaxing_share = 0.5 }".to_owned(),
-        "correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }".to_owned(),
-        "bond_associated_correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }".to_owned(),
+    for (law, rule) in [
+        (ordinary(0.3, "constant"), "energy alpha = 0.25"),
+        (ordinary(0.3, "constant"), "energy"),
+        ("ordinary_viscoelastic = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3, relaxation_time = 1, relaxing_share = 0.5 }".to_owned(), "energy"),
+        ("correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }".to_owned(), "energy"),
+        ("bond_associated_correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }".to_owned(), "energy"),
     ] {
-        for rule in ["energy", "energy alpha = 0.25"] {
-            let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule));
-            let inside = 0.5 * (coarse + fine);
-            let case = format!("{law} {rule}: {coarse} {border} {fine}");
-            assert!((0.8..1.2).contains(&inside), "{case}");
-            // Beyond a border of lattices the points do not lie where the midpoint rule has them.
-            assert!((border / inside - 1.0).abs() < 0.08, "{case}");
-        }
+        let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule));
+        let inside = 0.5 * (coarse + fine);
+        let case = format!("{law} {rule}: {coarse} {border} {fine}");
+        assert!((0.8..1.2).contains(&inside), "{case}");
+        // Across the border the points do not lie where the midpoint rule has them.
+        assert!((border / inside - 1.0).abs() < 0.08, "{case}");
     }
 }
