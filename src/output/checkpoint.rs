@@ -24,7 +24,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Changes with the layout.
-const VERSION: i64 = 7;
+const VERSION: i64 = 8;
 
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
