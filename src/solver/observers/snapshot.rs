@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix};
 
 use crate::deck::plan::Field;
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
 use crate::material::{PlasticState, determinant};
 use crate::solver::Simulation;
@@ -134,7 +134,7 @@ impl Snapshot {
 
 /// Cauchy's stress from Kirchhoff's, row by row: over the volume that the deformed body has for one of
 /// the undeformed. In plane stress the plate thins by its law; by default as Hooke's law has it,
-/// ε_zz = −ν/(1 − ν) (ε_xx + ε_yy) with logarithmic strains.
+/// ε_zz = −ν/(1 − ν) (ε_xx + ε_yy) with logarithmic strains. Under uniaxial stress a bar has ε_yy = ε_zz = −ν ε_xx.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
@@ -152,6 +152,10 @@ fn cauchy_stress<const D: usize>(
                     None => libm::pow(in_plane, (1.0 - 2.0 * ratio) / (1.0 - ratio)),
                 }
             }
+            Dimension::Line {
+                constraint: Constraint::UniaxialStress,
+                ..
+            } => libm::pow(in_plane, 1.0 - 2.0 * ratio),
             _ => in_plane,
         };
         // A body turned inside out has no volume to speak of.
@@ -177,13 +181,17 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
 }
 
 /// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
-/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy).
+/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar by ε_yy = ε_zz = −ν ε_xx.
 fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match simulation.plan.dimension {
         Dimension::PlaneStress { .. } => {
             let ratio = elastic(simulation, point).poisson_ratio;
             (1.0 - 2.0 * ratio) / (1.0 - ratio)
         }
+        Dimension::Line {
+            constraint: Constraint::UniaxialStress,
+            ..
+        } => 1.0 - 2.0 * elastic(simulation, point).poisson_ratio,
         Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => 1.0,
     }
 }
@@ -200,7 +208,7 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
 }
 
 /// Find the stress across the directions of the setting where there is no strain: zz by the law in plane strain,
-/// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx in 1-D.
+/// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx under uniaxial strain.
 fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
     let by_law = match simulation.plan.dimension {
@@ -218,11 +226,14 @@ fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<
                 let linear = ratio * (xx[point] + yy[point]);
                 zz[point] = by_law[point].unwrap_or(linear);
             }
-            Dimension::Line { .. } => {
+            Dimension::Line {
+                constraint: Constraint::UniaxialStrain,
+                ..
+            } => {
                 zz[point] = ratio / (1.0 - ratio) * xx[point];
                 yy[point] = zz[point];
             }
-            Dimension::PlaneStress { .. } | Dimension::Space => {}
+            Dimension::PlaneStress { .. } | Dimension::Line { .. } | Dimension::Space => {}
         }
     }
 }
