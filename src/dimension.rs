@@ -7,6 +7,8 @@ pub enum Dimension {
     Line {
         /// m².
         cross_section: f64,
+        /// Condition across the bar.
+        constraint: Constraint,
     },
     /// A thin plate.
     PlaneStress {
@@ -22,6 +24,15 @@ pub enum Dimension {
     Space,
 }
 
+/// Condition across a bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Constraint {
+    /// No stress across the bar: its stiffness is E.
+    UniaxialStress,
+    /// No strain across the bar: its stiffness is λ + 2G.
+    UniaxialStrain,
+}
+
 impl Dimension {
     /// 1, 2 or 3.
     pub fn count(self) -> usize {
@@ -35,7 +46,7 @@ impl Dimension {
     /// What a length, area or volume is multiplied by to be a volume: m², m or 1.
     pub fn section(self) -> f64 {
         match self {
-            Self::Line { cross_section } => cross_section,
+            Self::Line { cross_section, .. } => cross_section,
             Self::PlaneStress { thickness } | Self::PlaneStrain { thickness } => thickness,
             Self::Space => 1.0,
         }
@@ -49,13 +60,43 @@ impl Dimension {
         }
     }
 
+    /// Whether bond-based laws can have any Poisson ratio: a bar that contracts freely across has stiffness E alone.
+    pub fn allows_any_poisson_ratio(self) -> bool {
+        matches!(
+            self,
+            Self::Line {
+                constraint: Constraint::UniaxialStress,
+                ..
+            }
+        )
+    }
+
     /// For messages.
     pub fn name(self) -> &'static str {
+        use Constraint::{UniaxialStrain, UniaxialStress};
         match self {
-            Self::Line { .. } => "1-D",
+            Self::Line { constraint, .. } => match constraint {
+                UniaxialStress => "1-D under uniaxial stress",
+                UniaxialStrain => "1-D under uniaxial strain",
+            },
             Self::PlaneStress { .. } => "plane stress",
             Self::PlaneStrain { .. } => "plane strain",
             Self::Space => "3-D",
+        }
+    }
+
+    /// The condition across a bar, for people to read.
+    pub fn constraint(self) -> Option<&'static str> {
+        match self {
+            Self::Line { constraint, .. } => Some(match constraint {
+                Constraint::UniaxialStress => {
+                    "uniaxial stress: the bar contracts freely across, stiffness E"
+                }
+                Constraint::UniaxialStrain => {
+                    "uniaxial strain: no strain across the bar, stiffness λ + 2G (1.2 E for ν = 1/4)"
+                }
+            }),
+            _ => None,
         }
     }
 }

@@ -198,6 +198,108 @@ fn homogeneous_strains_are_exact_at_every_point() {
     }
 }
 
+/// Kirchhoff and Cauchy stress (xx, yy, zz, xy, yz, xz) and von Mises stress of a point under a homogeneous motion,
+/// which all points have.
+fn stresses<const D: usize>(text: &str, motion: &Matrix3<f64>) -> [Vec<f64>; 3] {
+    simulate::<D, _>(text, |mut simulation| {
+        displace(&mut simulation, |x| (motion * Vector3::from(x)).into());
+        let snapshot = Snapshot::new(&mut simulation);
+        let fields = [Field::Stress, Field::CauchyStress, Field::VonMisesStress];
+        fields.map(|field| {
+            let all = snapshot.field(&mut simulation, field);
+            let (first, scale) = (&all[..field.components()], all[0].abs());
+            for (k, entry) in all.iter().enumerate() {
+                let same = (entry - first[k % first.len()]).abs() < 1e-10 * scale;
+                assert!(same, "{text} {field:?} {k}: {entry} {first:?}");
+            }
+            first.to_vec()
+        })
+    })
+}
+
+fn assert_close(case: &str, found: &[Vec<f64>; 3], wanted: &[Vec<f64>; 3], bound: f64) {
+    let scale = wanted[0]
+        .iter()
+        .fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    for (found, wanted) in found.iter().flatten().zip(wanted.iter().flatten()) {
+        let close = (found - wanted).abs() < bound * scale;
+        assert!(close, "{case}: {found} for {wanted}");
+    }
+}
+
+const ISOTROPIC: &str = "youngs_modulus = 5, poisson_ratio = 0.3";
+
+#[test]
+fn the_stress_across_a_slice_is_that_of_the_solid_without_strain_there() {
+    let mut motion = Matrix3::identity();
+    for (place, value) in [((0, 0), 1.3), ((0, 1), 0.15), ((1, 1), 0.925)] {
+        motion[place] = value;
+    }
+    let orthotropic = "youngs_modulus_x = 5, youngs_modulus_y = 9, youngs_modulus_z = 3, poisson_ratio_xy = 0.2, \
+        poisson_ratio_yz = 0.3, poisson_ratio_xz = 0.1, shear_modulus_xy = 2, shear_modulus_yz = 1, \
+        shear_modulus_xz = 3, angle_1 = 25";
+    for name in LAWS {
+        let yields =
+            (name == "correspondence").then_some(", yield_stress = 0.5, hardening_modulus = 0.3");
+        let words = ["", ", stress = 'neo-hooke'", ", stress = 'willberg2022'"];
+        let isotropic = words
+            .into_iter()
+            .chain(yields)
+            .map(|more| format!("{ISOTROPIC}{more}"));
+        let orthotropic =
+            ["", ", stress = 'willberg2022'"].map(|word| format!("{orthotropic}{word}"));
+        for law in isotropic.chain(orthotropic) {
+            let found = stresses::<2>(&deck_of(name, "plane-strain", &law, 6, 2.5), &motion);
+            let wanted = stresses::<3>(&deck_of(name, "3d", &law, 6, 2.5), &motion);
+            assert_close(&format!("{name} {law}"), &found, &wanted, 1e-11);
+        }
+    }
+    // The closed form for neo-Hooke: λ ln J.
+    let law = format!("{ISOTROPIC}, stress = 'neo-hooke'");
+    let [kirchhoff, ..] = stresses::<2>(&deck("plane-strain", &law, 6, 2.5), &motion);
+    let lambda = 5.0 * 0.3 / (1.3 * 0.4);
+    let wanted = lambda * libm::log(1.3 * 0.925);
+    assert!(
+        (kirchhoff[2] / wanted - 1.0).abs() < 1e-12,
+        "{kirchhoff:?} {wanted}"
+    );
+    // Entries of Hooke's matrix in the plane do not contain it: that of an isotropic solid with the same moduli.
+    let law = "c11 = 6, c22 = 8, c12 = 2, c66 = 3";
+    let [kirchhoff, ..] = stresses::<2>(&deck("plane-strain", law, 6, 2.5), &motion);
+    assert!(
+        kirchhoff[2] > 0.0 && kirchhoff[2] < kirchhoff[0],
+        "{kirchhoff:?}"
+    );
+}
+
+#[test]
+fn a_sheet_has_the_cauchy_stress_of_the_solid_that_thins_freely() {
+    let mut motion = Matrix3::identity();
+    for (place, value) in [((0, 0), 1.3), ((0, 1), 0.15), ((1, 1), 0.95)] {
+        motion[place] = value;
+    }
+    for name in LAWS {
+        for word in ["st-venant-kirchhoff", "neo-hooke"] {
+            let law = format!("{ISOTROPIC}, stress = '{word}'");
+            let solid = deck_of(name, "3d", &law, 6, 2.5);
+            // The stretch across at which the stress across is 0, between two that are too small and too large.
+            let mut thinned = motion;
+            let [mut low, mut high] = [0.7, 1.0];
+            while high - low > 1e-14 {
+                thinned[(2, 2)] = 0.5 * (low + high);
+                if stresses::<3>(&solid, &thinned)[0][2] > 0.0 {
+                    high = thinned[(2, 2)];
+                } else {
+                    low = thinned[(2, 2)];
+                }
+            }
+            let wanted = stresses::<3>(&solid, &thinned);
+            let found = stresses::<2>(&deck_of(name, "plane-stress", &law, 6, 2.5), &motion);
+            assert_close(&format!("{name} {word}"), &found, &wanted, 1e-10);
+        }
+    }
+}
+
 #[test]
 fn an_orthotropic_sheet_has_its_own_moduli() {
     // Pulled along its own first axis, which is turned by 90 degrees: E_x of the sheet along y.

@@ -44,7 +44,7 @@ fn right_decks() -> Vec<Source> {
 fn prepare(plan: &Plan) -> Result<(u64, f64, u64)> {
     fn of<const D: usize>(plan: &Plan) -> Result<(u64, f64, u64)> {
         let comm = threads::alone();
-        let simulation = Simulation::<D>::new(plan, &comm)?;
+        let mut simulation = Simulation::<D>::new(plan, &comm)?;
         simulation.check()?;
         HistoryObserver::new(&simulation)?;
         Ok((

@@ -186,11 +186,12 @@ fn the_error_of_the_motion_falls_by_four_when_the_step_halves() {
 
 #[test]
 fn a_pulse_moves_at_the_lattice_speed() {
-    // c_L² = (c/2ρ) Σ ξ⁴/|ξ|³ V: with m = 3 in 1-D, c = 12E/(5·9dx²A) and Σ = 12 dx² A, so
+    // c_L² = (c/2ρ) Σ ξ⁴/|ξ|³ V: with m = 3 under uniaxial strain, c = 12E/(5·9dx²A) and Σ = 12 dx² A, so
     // c_L² = 1.6 E/ρ. A bump at rest falls apart into two halves; the centroid of the one that goes
     // right moves at the speed of long waves once they have parted.
     let speed = (1.6_f64 * 5.0 / 2.0).sqrt();
     let text = "dimension = '1d'
+        constraint = 'uniaxial-strain'
         grid = { volume_correction = 'none', spacing = 1, horizon = 3 }
         material.rubber.pmb = { density = 2, youngs_modulus = 5 }
         body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [900] } }
@@ -524,6 +525,7 @@ fn two_points_that_are_thrown_apart_lose_the_energy_of_their_bond() {
     let thrown = |step: f64| {
         let text = format!(
             "dimension = '1d'
+            constraint = 'uniaxial-strain'
             cross_section = {section}
             grid = {{ volume_correction = 'none', spacing = 1, horizon = {horizon} }}
             material.rubber.pmb = {{ density = 2, youngs_modulus = {modulus} }}

@@ -9,6 +9,10 @@ use fissure::solver::observers::Snapshot;
 /// A body of unit spacing, `half` points to each side of a central one at the origin.
 fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -> String {
     let (lower, upper) = (-f64::from(half) - 0.5, f64::from(half) + 0.5);
+    let (dimension, constraint) = match dimension {
+        "uniaxial-stress" | "uniaxial-strain" => ("1d", format!("constraint = '{dimension}'")),
+        _ => (dimension, String::new()),
+    };
     let corner = |value: f64| match dimension {
         "1d" => format!("[{value}]"),
         "3d" => format!("[{value}, {value}, {value}]"),
@@ -16,6 +20,7 @@ fn deck(dimension: &str, horizon: f64, half: u32, correction: &str, law: &str) -
     };
     format!(
         "dimension = '{dimension}'
+        {constraint}
         title = 'calibration'
         [grid]
         spacing = 1
@@ -251,7 +256,7 @@ fn the_ordinary_law_under_every_strain() {
 fn a_bar_without_strain_across_has_stress_there() {
     let law = "pmb = { density = 1, youngs_modulus = 5 }";
     let map = |[x, y, z]: [f64; 3]| [1.001 * x, y, z];
-    let deck = deck("1d", 3.0, 6, "exact", law);
+    let deck = deck("uniaxial-strain", 3.0, 6, "exact", law);
     let (_, stress, dilatation) = simulate::<1, _>(&deck, |mut s| response(&mut s, map));
     // σ = (λ + 2μ) ε with λ = μ = 2 Pa, along and λ ε across.
     for (entry, modulus) in [(0, 6.0), (1, 2.0), (2, 2.0)] {
@@ -263,6 +268,56 @@ fn a_bar_without_strain_across_has_stress_there() {
         "{stress:?}"
     );
     assert!((dilatation / 1e-3 - 1.0).abs() < 1e-9, "{dilatation}");
+}
+
+#[test]
+fn a_bar_that_contracts_freely_has_youngs_modulus_and_no_stress_across() {
+    for (law, ratio) in [
+        ("pmb = { density = 1, youngs_modulus = 5 }", 0.25),
+        (
+            "pmb = { density = 1, youngs_modulus = 5, poisson_ratio = 0.4 }",
+            0.4,
+        ),
+        (
+            "normalised_pmb = { density = 1, shear_modulus = 2, poisson_ratio = 0.25 }",
+            0.25,
+        ),
+    ] {
+        let stretch: f64 = 1.001;
+        let deck = deck("1d", 30.0, 60, "exact", law);
+        let (energy, stress, dilatation, cauchy, mises) =
+            simulate::<1, _>(&deck, |mut simulation| {
+                let map = |[x, y, z]: [f64; 3]| [stretch * x, y, z];
+                let (energy, stress, dilatation) = response(&mut simulation, map);
+                let snapshot = Snapshot::new(&mut simulation);
+                let centre = centre(&simulation);
+                let cauchy = snapshot.field(&mut simulation, Field::CauchyStress)[6 * centre];
+                let mises = snapshot.field(&mut simulation, Field::VonMisesStress)[centre];
+                (energy, stress, dilatation, cauchy, mises)
+            });
+        let strain = stretch - 1.0;
+        assert!(
+            (energy / (2.5 * strain * strain) - 1.0).abs() < 2e-3,
+            "{law}: {energy}"
+        );
+        assert!(
+            (stress[0] / (5.0 * strain * stretch) - 1.0).abs() < 2e-3,
+            "{law}: {stress:?}"
+        );
+        assert_eq!(stress[1..], [0.0; 5]);
+        let wanted = (1.0 - 2.0 * ratio) * strain;
+        assert!(
+            (dilatation / wanted - 1.0).abs() < 1e-9,
+            "{law}: {dilatation}"
+        );
+        // The cross-section is smaller by the square of F^(−ν).
+        let volume = libm::pow(stretch, 1.0 - 2.0 * ratio);
+        assert!(
+            (cauchy * volume / stress[0] - 1.0).abs() < 1e-12,
+            "{law}: {cauchy}"
+        );
+        assert!((mises / cauchy - 1.0).abs() < 1e-12, "{law}: {mises}");
+    }
 }
 
 /// Energy density and stress (xx, yy, zz, xy, yz, xz) of a bond-based law at a small strain, from the sum
@@ -312,7 +367,9 @@ fn bond_based_laws_under_every_strain() {
     let pi = std::f64::consts::PI;
     for (dimension, count, section, c, energy, bulk_energy) in [
         // E as c, classical energy at unit isotropic stretch, and 9K/4 for the printed form.
-        ("1d", 1, 1.0, 12.0 / (5.0 * 9.0), 0.6, 0.0),
+        ("uniaxial-strain", 1, 1.0, 12.0 / (5.0 * 9.0), 0.6, 0.0),
+        ("uniaxial-stress", 1, 1.0, 2.0 / 9.0, 0.5, 0.0),
+        ("1d", 1, 1.0, 2.0 / 9.0, 0.5, 0.0),
         (
             "plane-stress",
             2,
@@ -468,7 +525,7 @@ fn waves_in_a_bar_disperse_as_the_integral_says() {
     ] {
         let law = "proportional = { density = 3, youngs_modulus = 5 }";
         for correction in ["linear", "exact"] {
-            let deck = deck("1d", 60.0, 70, correction, law);
+            let deck = deck("uniaxial-strain", 60.0, 70, correction, law);
             let found = phase_speed::<1>(&deck, number / 60.0, 3.0) / (modulus / 3.0).sqrt();
             assert!((found / expected - 1.0).abs() < 0.005, "{number}: {found}");
         }

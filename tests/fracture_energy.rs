@@ -20,6 +20,10 @@ const FRACTURE_ENERGY: f64 = 2.0;
 /// of the points above and below the middle of the cut, and of their neighbours, are whole.
 fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     let (rule, more) = rule.split_once(' ').unwrap_or((rule, ""));
+    let (dimension, constraint) = match dimension {
+        "uniaxial-stress" | "uniaxial-strain" => ("1d", format!("constraint = '{dimension}'")),
+        _ => (dimension, String::new()),
+    };
     // Only the ends of bonds that cross matter, and where laws sum over families, those families.
     let reach = f64::from(ratio);
     let alone = ["pmb", "elastic_plastic_pmb"];
@@ -41,6 +45,7 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     };
     format!(
         "dimension = '{dimension}'
+        {constraint}
         [grid]
         spacing = 1
         horizon = {ratio}
@@ -163,8 +168,10 @@ fn compare(case: &str, costs: [f64; 2], expected: f64, [coarse, fine]: [f64; 2])
 }
 
 fn in_a_bar(law: &str) {
-    let costs = [3, 6].map(|ratio| cost::<1>("1d", ratio, law, STRETCH, 0.001));
-    compare(&format!("1d {law}"), costs, 1.0, [0.06, 0.018]);
+    for constraint in ["uniaxial-stress", "uniaxial-strain"] {
+        let costs = [3, 6].map(|ratio| cost::<1>(constraint, ratio, law, STRETCH, 0.001));
+        compare(&format!("{constraint} {law}"), costs, 1.0, [0.06, 0.018]);
+    }
 }
 
 fn in_the_plane(law: &str, expected: f64) {

@@ -4,7 +4,7 @@
 use crate::support::{displace, largest_force, simulate, simulate_on};
 use fissure::solver::Simulation;
 
-/// The micromodulus of a bar, 12E/(5δ²A) (N/m⁶).
+/// The micromodulus of a bar under uniaxial strain, 12E/(5δ²A) (N/m⁶).
 fn micromodulus(modulus: f64, horizon: f64) -> f64 {
     12.0 * modulus / (5.0 * horizon * horizon)
 }
@@ -15,6 +15,7 @@ fn each_pair_has_its_rule() {
     let text = |interface: &str| {
         format!(
             "dimension = '1d'
+            constraint = 'uniaxial-strain'
             grid = {{ volume_correction = 'none', spacing = 1, horizon = 1.5 }}
             {interface}
             material.soft.pmb = {{ density = 1, youngs_modulus = 2 }}

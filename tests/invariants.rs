@@ -4,7 +4,7 @@
 
 use crate::support::saved::{state, whole};
 use crate::support::{displace, force, forces, largest_force, plan, simulate, simulate_on};
-use fissure::dimension::Dimension;
+use fissure::dimension::{Constraint, Dimension};
 use fissure::material::{Declaration, Invariants, declarations};
 use fissure::solver::Simulation;
 use fissure::solver::bonds::Evolution;
@@ -39,7 +39,10 @@ impl Case {
     /// Whether the law has a 1-D form.
     fn has_line(self) -> bool {
         let plan = plan(&deck("plane-stress", &self.table(), "none", ""));
-        let line = Dimension::Line { cross_section: 1.0 };
+        let line = Dimension::Line {
+            cross_section: 1.0,
+            constraint: Constraint::UniaxialStress,
+        };
         plan.bodies[0].material.law.fault(line).is_none()
     }
 

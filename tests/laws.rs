@@ -5,7 +5,7 @@ use fissure::deck::expression::Expression;
 use fissure::deck::plan::{
     Damage, DamageRule, Law, Material, Plan, Shape, StepRule, Toughness, VolumeCorrection,
 };
-use fissure::dimension::Dimension;
+use fissure::dimension::{Constraint, Dimension};
 use fissure::elastic::Isotropic;
 use fissure::material::{Declaration, Key, Kind, declarations};
 use fissure::solver::Simulation;
@@ -105,7 +105,10 @@ fn fault<const D: usize>(plan: &Plan) -> Option<String> {
 #[test]
 fn a_law_of_a_plan_in_rust_is_checked_before_the_run() {
     let law = |name| Law::named(name).unwrap();
-    let line = Dimension::Line { cross_section: 1.0 };
+    let line = Dimension::Line {
+        cross_section: 1.0,
+        constraint: Constraint::UniaxialStress,
+    };
     let space = Dimension::Space;
     let brittle = Damage::new(DamageRule::CriticalStretch, Toughness::FractureEnergy(1.0));
     let found = fault::<3>(&body(space, law("elastic_plastic_pmb"), None));

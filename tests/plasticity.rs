@@ -21,13 +21,14 @@ const SECTION: f64 = 0.5;
 /// Horizon of that bar, m.
 const HORIZON: f64 = 1.5;
 
-/// c of the bar, 12E/(5δ²A), N/m⁶.
+/// c of the bar under uniaxial strain, 12E/(5δ²A), N/m⁶.
 const MICROMODULUS: f64 = 12.0 * MODULUS / (5.0 * HORIZON * HORIZON * SECTION);
 
 /// Two points 1 m apart with one bond, which breaks at this stretch.
 fn pair(critical: f64) -> String {
     format!(
         "dimension = '1d'
+        constraint = 'uniaxial-strain'
         cross_section = {SECTION}
         grid = {{ volume_correction = 'none', spacing = 1, horizon = {HORIZON} }}
         material.metal.{}

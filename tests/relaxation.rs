@@ -8,7 +8,7 @@ use fissure::comm::{Communicator, threads};
 use fissure::deck::Plan;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::Evolution;
-use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
 
 /// Makes all load steps.
 fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) {
@@ -197,6 +197,17 @@ fn load_steps_do_not_change_the_equilibrium_of_an_elastic_body() {
     assert!(error < 1e-6, "{error:e}");
 }
 
+/// The message with which a run fails.
+fn failure<const D: usize>(mut simulation: Simulation<D>) -> String {
+    loop {
+        simulation.advance();
+        if let Err(error) = simulation.check() {
+            return error.message;
+        }
+        assert!(!simulation.is_over());
+    }
+}
+
 #[test]
 fn a_body_that_nothing_holds_says_so() {
     let deck = plate_with_hole("load_steps = 1, iterations = 300")
@@ -208,20 +219,324 @@ fn a_body_that_nothing_holds_says_so() {
             "set = 'bottom', displacement = [0, 0]",
             "set = 'bottom', displacement = ['free', 0]",
         );
-    simulate(&deck, |mut simulation: Simulation<2>| {
-        let error = loop {
-            simulation.advance();
-            if let Err(error) = simulation.check() {
-                break error;
-            }
-        };
-        let text = error.message;
-        assert!(
-            text.contains("no equilibrium within 300 iterations"),
-            "{text}"
-        );
-        assert!(text.contains("a part that nothing holds?"), "{text}");
+    simulate(&deck, |simulation: Simulation<2>| {
+        let text = failure(simulation);
+        let wanted = "no equilibrium within 300 iterations: loads of 1.500e-3 N act along x on a piece of body \
+                      `plate` that no support holds along x";
+        assert!(text.contains(wanted), "{text}");
     });
+}
+
+/// A plate in three strips that bonds do not connect; the left one is held.
+fn strips(conditions: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.sheet.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.left = {{ material = 'sheet', shape.box = {{ lower = [0, 0], upper = [12, 6] }} }}
+        body.right = {{ material = 'sheet', shape.box = {{ lower = [12, 0], upper = [30, 6] }} }}
+        crack.first.segment = {{ from = [8, -1], to = [8, 7] }}
+        crack.second.segment = {{ from = [18, -1], to = [18, 7] }}
+        set.hold.where = 'x < 2'
+        set.middle.where = 'x > 9 && x < 10'
+        set.last.where = 'x > 28'
+        condition.hold = {{ set = 'hold', displacement = [0, '1e-3*t'] }}
+        {conditions}
+        time = {{ end = 1, method = 'relaxation', relaxation = {{ load_steps = 1, iterations = 2000 }} }}
+        "
+    )
+}
+
+#[test]
+fn a_loaded_piece_that_nothing_holds_is_named() {
+    // 10 columns of 6 points; the one with the smallest id is the first of the left body behind the crack.
+    let push = "condition.push = { set = 'middle', force = [0, 0.25] }";
+    let wanted = "loads of 2.500e-1 N act along y on a piece of body `left` that no support holds along y. The \
+                  piece has 60 points; point 8 at [8.5, 0.5] m is one of them";
+    for ranks in [1, 2, 3] {
+        let texts = simulate_on::<2, _>(ranks, &strips(push), failure);
+        for text in texts {
+            assert!(text.contains(wanted), "{ranks}: {text}");
+        }
+    }
+    // A support along x does not hold along y, one along y does.
+    let guided = "condition.guide = { set = 'last', displacement = [0, 'free'] }
+                  condition.push = { set = 'last', force = [0.25, 0.5] }";
+    let text = simulate(&strips(guided), failure::<2>);
+    let wanted = "loads of 5.000e-1 N act along y on a piece of body `right` that no support holds along y. The \
+                  piece has 72 points";
+    assert!(text.contains(wanted), "{text}");
+}
+
+#[test]
+fn pieces_at_rest_and_pieces_whose_loads_cancel_need_no_support() {
+    let pull = "set.two.where = 'x > 16 && x < 18'
+                condition.pull = { set = 'two', force = [0.02, 0] }
+                condition.back = { set = 'middle', force = [-0.02, 0] }";
+    // With loads the tolerance refers to them.
+    for (conditions, bound) in [("", 1e-12), (pull, 1e-5)] {
+        simulate(&strips(conditions), |mut simulation: Simulation<2>| {
+            to_the_end(&mut simulation);
+            let u = &simulation.fields.displacement;
+            for point in 0..simulation.model.owned() {
+                let x = simulation.model.position(point)[0];
+                if x < 8.0 {
+                    assert!((u[1][point] - 1e-3).abs() < bound, "{}", u[1][point]);
+                } else if x > 18.0 || conditions.is_empty() {
+                    assert_eq!([u[0][point], u[1][point]], [0.0; 2]);
+                } else if x > 17.0 {
+                    assert!(u[0][point] > 1e-3, "{}", u[0][point]);
+                }
+            }
+        });
+    }
+}
+
+/// A block whose left column is moved, without any load.
+fn carried(motion: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        thickness = 1e-3
+        grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+        material.m.ordinary = {{ density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3 }}
+        body.b = {{ material = 'm', shape.box = {{ lower = [0, 0], upper = [0.01, 0.004] }} }}
+        set.left.where = 'x < 1e-3'
+        condition.move = {{ set = 'left', {motion} }}
+        time = {{ end = 1, method = 'relaxation', relaxation = {{ load_steps = 2, iterations = 5000 }} }}
+        history.reactions = ['left']
+        "
+    )
+}
+
+#[test]
+fn a_body_that_is_carried_without_loads_comes_to_rest() {
+    // The last motion turns the body by 0.3 rad about the lower left corner.
+    let turned =
+        "displacement = ['x*(cos(0.3*t) - 1) - y*sin(0.3*t)', 'x*sin(0.3*t) + y*(cos(0.3*t) - 1)']";
+    let far = "initial.far.displacement = [100, 0]";
+    for (motion, initial, size, wanted) in [
+        ("displacement = ['1e-3*t', 0]", "", 1e-3, Some(1e-3)),
+        // Energies of 1e-38 J.
+        ("displacement = ['1e-22*t', 0]", "", 1e-22, Some(1e-22)),
+        (
+            "displacement = ['100 + 1e-3*t', 0]",
+            far,
+            100.0,
+            Some(100.001),
+        ),
+        (turned, "", 3e-3, None),
+    ] {
+        let deck = format!("{initial}\n{}", carried(motion));
+        let rows = simulate_on::<2, _>(2, &deck, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            to_the_end(&mut simulation);
+            let snapshot = Snapshot::new(&mut simulation);
+            let row = observer.row(&mut simulation, &snapshot);
+            let [sin, cos] = [libm::sin(0.3), libm::cos(0.3)];
+            for point in 0..simulation.model.owned() {
+                let [x, y, _] = simulation.model.position(point);
+                let turned = [x * (cos - 1.0) - y * sin, x * sin + y * (cos - 1.0)];
+                let wanted = wanted.map_or(turned, |along| [along, 0.0]);
+                for d in 0..2 {
+                    let error = (simulation.fields.displacement[d][point] - wanted[d]).abs();
+                    assert!(error < 1e-10 * size, "{motion} {error:e}");
+                }
+            }
+            row
+        });
+        let row = &rows[0];
+        // To move one column alone by as much takes about E h u.
+        let reaction = row.values[row.values.len() - 2..].iter();
+        let largest = reaction.fold(0.0_f64, |most, force| most.max(force.abs()));
+        assert!(largest < 1e-12 * 1e6 * size, "{motion} {largest:e}");
+        assert!(
+            row.energies.strain < 1e-20 * 1e6 * size * size,
+            "{motion} {row:?}"
+        );
+    }
+}
+
+#[test]
+fn a_free_body_that_begins_deformed_relaxes() {
+    let bent = "initial.bent.displacement = ['0.01*x + 0.002*y', '-0.003*y + 1e-5*sin(500*x)']";
+    let is_held = |line: &&str| line.contains("condition.") || line.contains("history.");
+    let deck = carried("displacement = [0, 0]");
+    let deck = deck
+        .lines()
+        .filter(|line| !is_held(line))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let deck = deck.replace("time =", &format!("{bent}\ntime ="));
+    simulate(&deck, |mut simulation: Simulation<2>| {
+        let before = Snapshot::new(&mut simulation).stored.energy;
+        to_the_end(&mut simulation);
+        let energy = Snapshot::new(&mut simulation).stored.energy;
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(*value));
+        assert!(largest(&before) > 1e4, "{before:?}");
+        assert!(largest(&energy) < 1e-15, "{energy:?}");
+    });
+}
+
+/// A notched strip that parts within its first load step.
+const PARTS_AT_ONCE: &str = "
+    dimension = 'plane-stress'
+    thickness = 1e-3
+    grid = { spacing = 1e-3, horizon = 3e-3 }
+    material.m.pmb = { density = 1000, youngs_modulus = 1e9 }
+    damage.brittle.critical_stretch = { critical_stretch = 1e-4 }
+    body.strip = { material = 'm', damage = 'brittle', shape.box = { lower = [0, 0], upper = [0.016, 8e-3] } }
+    crack.notch.segment = { from = [8e-3, 0], to = [8e-3, 6e-3] }
+    set.left.where = 'x < 3e-3'
+    set.right.where = 'x > 13e-3'
+    condition.left = { set = 'left', displacement = [0, 0] }
+    condition.right = { set = 'right', displacement = ['3e-6*t', 0] }
+    time = { end = 1, method = 'relaxation', relaxation = { load_steps = 1, tolerance = 1e-4, iterations = 5000 } }
+    history.reactions = ['right']
+    ";
+
+#[test]
+fn a_strip_that_parts_in_its_first_load_step_carries_nothing_then() {
+    let [first, second] = [1, 2].map(|ranks| {
+        let rows = simulate_on::<2, _>(ranks, PARTS_AT_ONCE, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            to_the_end(&mut simulation);
+            let snapshot = Snapshot::new(&mut simulation);
+            let row = observer.row(&mut simulation, &snapshot);
+            let reaction = row.values[row.values.len() - 2];
+            // Without the notch E h b ε = 1e9 · 1e-3 · 8e-3 · 3e-4 N.
+            assert!(reaction.abs() < 1e-3 * 2.4, "{reaction}");
+            assert!(row.broken > 0);
+            for point in 0..simulation.model.owned() {
+                if simulation.model.position(point)[0] > 0.011 {
+                    let u = simulation.fields.displacement[0][point];
+                    assert!((u - 3e-6).abs() < 0.01 * 3e-6, "{u}");
+                }
+            }
+            row.values
+        });
+        rows[0]
+            .iter()
+            .map(|value| value.to_bits())
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(first, second);
+}
+
+/// The energies at the end of each load step.
+fn energies_of_load_steps(deck: &str) -> Vec<Energies> {
+    simulate(deck, |mut simulation: Simulation<1>| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let mut rows = Vec::new();
+        while !simulation.is_over() {
+            load_step(&mut simulation);
+            let snapshot = Snapshot::new(&mut simulation);
+            rows.push(observer.row(&mut simulation, &snapshot).energies);
+        }
+        rows
+    })
+}
+
+#[test]
+fn supports_put_in_what_breaking_frees_and_loses() {
+    for steps in [1, 2, 15] {
+        let deck = BAR.replace("load_steps = 15", &format!("load_steps = {steps}"));
+        let rows = energies_of_load_steps(&deck);
+        let last = rows.last().unwrap();
+        assert!(
+            last.fracture > 0.0 && last.strain < 1e-6 * last.work,
+            "{last:?}"
+        );
+        let mut lost = 0.0;
+        for row in &rows {
+            let now = row.work - row.strain - row.fracture;
+            assert!(
+                now >= lost - 1e-7 * last.work,
+                "{steps}: {now} after {lost} of {row:?}"
+            );
+            lost = now;
+        }
+        if steps == 1 {
+            // ½ E ε² A L between the innermost supports.
+            let strain: f64 = 0.38 * 1.5 / 35.0;
+            let energy = 0.5 * 5.0 * strain * strain * 35.0;
+            assert!(
+                (0.9..1.1).contains(&(last.work / energy)),
+                "{last:?} {energy}"
+            );
+        }
+    }
+}
+
+#[test]
+fn loads_do_work_on_what_breaking_lets_them_move() {
+    // Bonds between four points in the middle can break; those that lead past them bear the load then.
+    let deck = |critical: f64| {
+        format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            damage.brittle.critical_stretch = {{ critical_stretch = {critical}, alpha = 0, no_failure = ['safe'] }}
+            body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [40] }} }}
+            set.hold.where = 'x < 3'
+            set.pull.where = 'x > 36'
+            set.safe.where = 'x < 18 || x > 22'
+            condition.hold = {{ set = 'hold', displacement = [0] }}
+            condition.pull = {{ set = 'pull', force = ['0.05*t'] }}
+            time = {{ end = 1, method = 'relaxation', relaxation = {{ load_steps = 2, tolerance = 1e-10 }} }}
+            "
+        )
+    };
+    // The mean displacement of the loaded points at the end, with the energies of both load steps.
+    let run = |critical: f64| {
+        let mean = simulate(&deck(critical), |mut simulation: Simulation<1>| {
+            to_the_end(&mut simulation);
+            let is_loaded = |point: &usize| simulation.model.position(*point)[0] > 36.0;
+            let loaded = (0..simulation.model.owned()).filter(is_loaded);
+            loaded
+                .map(|point| simulation.fields.displacement[0][point])
+                .sum::<f64>()
+                / 4.0
+        });
+        (mean, energies_of_load_steps(&deck(critical)))
+    };
+    // The load gives a stretch of 0.01.
+    let (whole, elastic) = run(1.0);
+    let (torn, rows) = run(0.008);
+    let [half, last] = rows[..] else {
+        panic!("{rows:?}")
+    };
+    assert_eq!(half.work, elastic[0].work);
+    assert!(
+        (elastic[1].work / (0.5 * 0.05 * whole) - 1.0).abs() < 1e-7,
+        "{elastic:?}"
+    );
+    assert!(
+        last.fracture > 0.0 && torn > 1.01 * whole,
+        "{last:?} {torn} {whole}"
+    );
+    let work = 0.5 * 0.05 * whole + 0.05 * (torn - whole);
+    assert!((last.work / work - 1.0).abs() < 1e-7, "{last:?} {work}");
+    let lost = last.work - last.strain - last.fracture;
+    assert!(lost > 1e-3 * last.fracture, "{last:?}");
+}
+
+#[test]
+fn a_load_step_that_breaks_before_its_first_iteration_is_counted_once() {
+    // All points are moved, so that every place is an equilibrium.
+    let deck = "dimension = '1d'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        damage.brittle.critical_stretch = { critical_stretch = 0.1, alpha = 0 }
+        body.bar = { material = 'rubber', damage = 'brittle', shape.box = { lower = [0], upper = [40] } }
+        condition.pull = { set = 'all', displacement = ['t*(0.01*x + if(x > 20, 1, 0))'] }
+        time = { end = 1, method = 'relaxation', relaxation = { load_steps = 1 } }
+        ";
+    let rows = energies_of_load_steps(deck);
+    let [row] = rows[..] else { panic!("{rows:?}") };
+    assert!(row.fracture > 0.0 && row.strain > 0.0, "{row:?}");
+    // The bonds of a bar are linear, and nothing moves when they break.
+    let lost = row.work - row.strain - row.fracture;
+    assert!(lost.abs() < 1e-9 * row.work, "{row:?}");
 }
 
 /// A bar of brittle bonds that is pulled apart at its ends.

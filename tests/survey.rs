@@ -360,6 +360,10 @@ fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
     }
     for (dimension, corners) in [
         ("1d", "lower = [0], upper = [1]"),
+        (
+            "1d'\nconstraint = 'uniaxial-strain",
+            "lower = [0], upper = [1]",
+        ),
         ("plane-stress", "lower = [0, 0], upper = [1, 1]"),
         ("plane-strain", "lower = [0, 0], upper = [1, 1]"),
         ("3d", space),

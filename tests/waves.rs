@@ -196,6 +196,7 @@ fn standing_waves_in_a_bar_disperse_as_the_integral_says() {
         let quarter = 0.5 * std::f64::consts::PI / (wave_number * speed);
         let text = format!(
             "dimension = '1d'
+            constraint = 'uniaxial-strain'
             [grid]
             spacing = 1
             horizon = {horizon}

@@ -22,6 +22,9 @@ pub fn heading(report: &mut Report, plan: &Plan, deck: &Path) {
         plan.title
     ));
     report.line("dimension", plan.dimension.name());
+    if let Some(constraint) = plan.dimension.constraint() {
+        report.line("constraint", constraint);
+    }
     report.line("horizon", si(plan.horizon, "m"));
 }
 

@@ -71,12 +71,14 @@ fn run_deck(
         ],
         ..Options::new(folder.unwrap_or_else(|| Path::new("out").join(stem)))
     };
+    let constraint = plan.dimension.constraint();
+    let constraint = constraint.map_or(String::new(), |words| format!("1-D, {words}\n"));
     let mut log = Log {
         rank: world.rank(),
         speaks,
         verbose: verbosity == Verbosity::Verbose,
         title: format!(
-            "{}\n{} ranks × {threads} threads on {hosts} host(s)",
+            "{}\n{constraint}{} ranks × {threads} threads on {hosts} host(s)",
             plan.title,
             world.size()
         ),

@@ -59,7 +59,7 @@ impl BondEnergy {
                 PlaneStress { thickness } | PlaneStrain { thickness } => {
                     1.5 / (horizon.powi(3) * thickness)
                 }
-                Line { cross_section } => 2.0 / (horizon.powi(2) * cross_section),
+                Line { cross_section, .. } => 2.0 / (horizon.powi(2) * cross_section),
             }
     }
 
@@ -76,6 +76,7 @@ impl BondEnergy {
 mod tests {
     use super::*;
     use crate::damage::{Sense, WorkMeasure};
+    use crate::dimension::Constraint;
 
     /// All bonds across a unit area, by the midpoint rule, over the fracture energy.
     fn taken(dimension: Dimension) -> f64 {
@@ -94,7 +95,7 @@ mod tests {
                     Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
                         2.0 * libm::acos(z / r) * r * thickness
                     }
-                    Dimension::Line { cross_section } => cross_section,
+                    Dimension::Line { cross_section, .. } => cross_section,
                 };
             }
         }
@@ -107,7 +108,10 @@ mod tests {
             Dimension::Space,
             Dimension::PlaneStress { thickness: 0.01 },
             Dimension::PlaneStrain { thickness: 0.2 },
-            Dimension::Line { cross_section: 0.3 },
+            Dimension::Line {
+                cross_section: 0.3,
+                constraint: Constraint::UniaxialStress,
+            },
         ] {
             let taken = taken(dimension);
             assert!((taken - 1.0).abs() < 2e-3, "{dimension:?}: {taken}");

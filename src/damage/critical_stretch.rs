@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
 use crate::material::{Influence, Ordinary};
 
@@ -27,13 +27,17 @@ impl CriticalStretch {
     /// bond-based law has.
     ///
     /// 3-D: √(5G0/(9Kδ)). Plane stress: √(4πG0/(9Eδ)), Dipasquale et al. eq. 5. Plane strain:
-    /// √(5πG0/(12Eδ)). 1-D: √(5G0/(2Eδ)).
+    /// √(5πG0/(12Eδ)). 1-D, from G0 = A ∫₀^δ ∫_z^δ ½ c s0² r dr dz = c A s0² δ³/6: √(3G0/(Eδ)) under uniaxial stress,
+    /// √(5G0/(2Eδ)) under uniaxial strain.
     pub fn from_energy(dimension: Dimension, elastic: Isotropic, energy: f64, horizon: f64) -> f64 {
         let factor = match dimension {
             Dimension::Space => 5.0 / (9.0 * elastic.bulk_modulus()),
             Dimension::PlaneStress { .. } => 4.0 * PI / (9.0 * elastic.youngs_modulus),
             Dimension::PlaneStrain { .. } => 5.0 * PI / (12.0 * elastic.youngs_modulus),
-            Dimension::Line { .. } => 5.0 / (2.0 * elastic.youngs_modulus),
+            Dimension::Line { constraint, .. } => match constraint {
+                Constraint::UniaxialStress => 3.0 / elastic.youngs_modulus,
+                Constraint::UniaxialStrain => 5.0 / (2.0 * elastic.youngs_modulus),
+            },
         };
         (factor * energy / horizon).sqrt()
     }
@@ -53,10 +57,14 @@ impl CriticalStretch {
     }
 
     /// The fracture energy G0 = K_Ic²/E′ (J/m²) of a fracture toughness (Pa·√m), where E′ is E in
-    /// plane stress and E/(1−ν²) otherwise (Irwin).
+    /// plane stress and uniaxial stress, and E/(1−ν²) otherwise (Irwin).
     pub fn energy_from_toughness(dimension: Dimension, elastic: Isotropic, toughness: f64) -> f64 {
         let effective = match dimension {
-            Dimension::PlaneStress { .. } => elastic.youngs_modulus,
+            Dimension::PlaneStress { .. }
+            | Dimension::Line {
+                constraint: Constraint::UniaxialStress,
+                ..
+            } => elastic.youngs_modulus,
             _ => elastic.youngs_modulus / (1.0 - elastic.poisson_ratio.powi(2)),
         };
         toughness * toughness / effective

@@ -1,12 +1,12 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, VolumeCorrection,
-    common_keys,
+    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation,
+    VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
 use super::plan::{self, CheckpointRule, HorizonRule, Interval, Plan};
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
 use serde_spanned::Spanned;
@@ -25,7 +25,15 @@ pub fn explain(deck: &Deck, plan: &Plan) -> Result<String> {
 fn fill(deck: &mut Deck, plan: &Plan) {
     let number = |value| Some(default_number(value));
     match plan.dimension {
-        Dimension::Line { cross_section } => {
+        Dimension::Line {
+            cross_section,
+            constraint,
+        } => {
+            let name = match constraint {
+                Constraint::UniaxialStress => ConstraintName::UniaxialStress,
+                Constraint::UniaxialStrain => ConstraintName::UniaxialStrain,
+            };
+            (deck.constraint).get_or_insert(Spanned::new(0..0, name));
             deck.cross_section = deck.cross_section.take().or(number(cross_section));
         }
         Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {

@@ -208,6 +208,7 @@ impl From<Expression> for Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dimension::Constraint;
 
     #[test]
     fn a_law_takes_its_own_keys_only() {
@@ -236,7 +237,11 @@ mod tests {
 
     #[test]
     fn a_law_is_at_fault_without_its_keys_and_in_a_dimension_that_it_has_not() {
-        let (line, space) = (Dimension::Line { cross_section: 1.0 }, Dimension::Space);
+        let line = Dimension::Line {
+            cross_section: 1.0,
+            constraint: Constraint::UniaxialStress,
+        };
+        let space = Dimension::Space;
         let law = Law::named("elastic_plastic_pmb").unwrap();
         assert!(law.fault(space).is_some());
         let law = law.with("yield_stretch", 0.1).unwrap();

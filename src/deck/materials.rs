@@ -133,7 +133,8 @@ impl Section<'_> {
         Ok(value)
     }
 
-    /// The elastic constants; those of a bond-based law have its own Poisson ratio, and a law may have
+    /// The elastic constants; those of a bond-based law have its own Poisson ratio, but for a bar under uniaxial
+    /// stress, and a law may have
     /// keys that stand for them.
     fn elastic(&self, law: &plan::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
@@ -184,7 +185,7 @@ impl Section<'_> {
                 names.join(" and ")
             )));
         };
-        if !bond_based {
+        if !bond_based || dimension.allows_any_poisson_ratio() {
             return Ok(found);
         }
         // A ratio given as 0.33 or 0.333 means 1/3.

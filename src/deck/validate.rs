@@ -2,7 +2,9 @@
 
 use serde_spanned::Spanned;
 
-use super::grammar::{Deck, DimensionName, Family, Grid, Quadrature, VolumeCorrection};
+use super::grammar::{
+    ConstraintName, Deck, DimensionName, Family, Grid, Quadrature, VolumeCorrection,
+};
 use super::number::{Edges, Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
@@ -11,7 +13,7 @@ use super::{
     bodies, conditions, damage, history, interface, materials, names, outputs, refinement, sets,
     shapes, time,
 };
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::error::Result;
 
 /// Validates a parsed deck.
@@ -96,6 +98,11 @@ fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
         let message = "cross_section: only 1d has a cross-section";
         return Err(scope.error(section.span(), message));
     }
+    if let (Some(constraint), false) = (&deck.constraint, name == DimensionName::Line) {
+        let message = "constraint: only 1d has a constraint; in the plane the dimension is \"plane-stress\" or \
+                       \"plane-strain\"";
+        return Err(scope.error(constraint.span(), message));
+    }
     let positive_or_one = |number: &Option<Number>, key| match number {
         Some(number) => scope.positive(number, key),
         None => Ok(1.0),
@@ -104,6 +111,10 @@ fn dimension(scope: &Scope, deck: &Deck) -> Result<Dimension> {
     Ok(match name {
         DimensionName::Line => Dimension::Line {
             cross_section: positive_or_one(&deck.cross_section, "cross_section")?,
+            constraint: match deck.constraint.as_ref().map(|name| *name.get_ref()) {
+                Some(ConstraintName::UniaxialStrain) => Constraint::UniaxialStrain,
+                Some(ConstraintName::UniaxialStress) | None => Constraint::UniaxialStress,
+            },
         },
         DimensionName::PlaneStress => Dimension::PlaneStress { thickness },
         DimensionName::PlaneStrain => Dimension::PlaneStrain { thickness },

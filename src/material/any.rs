@@ -1,6 +1,8 @@
 //! Laws that are one of several: for what is done once a point, and for the bonds between blocks of
 //! different laws.
 
+use nalgebra::SMatrix;
+
 use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Rotation, with_law};
 use crate::lanes::{Lanes, Numbers, Simd, Versions};
 
@@ -113,6 +115,7 @@ impl<const D: usize> Law<D> for AnyLaw {
     const PASSES: usize = MOST.passes;
     const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;
+    const HAS_BOND_STRESS_ACROSS: bool = true;
 
     #[inline(never)]
     fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
@@ -189,6 +192,19 @@ impl<const D: usize> Law<D> for AnyLaw {
 
     fn weighted_volume(&self, numbers: &[f64]) -> Option<f64> {
         with_law!(self, law => Law::<D>::weighted_volume(law, numbers))
+    }
+
+    fn stress_across(&self, gradient: &SMatrix<f64, D, D>, plastic: &PlasticState) -> Option<f64> {
+        with_law!(self, law => Law::<D>::stress_across(law, gradient, plastic))
+    }
+
+    #[inline(never)]
+    fn bond_stress_across(&self, bond: &Bond<D>, end: &Self::Point) -> Lanes {
+        with_law!(self, law => law.bond_stress_across(bond, &first(end)))
+    }
+
+    fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, plastic: &PlasticState) -> Option<f64> {
+        with_law!(self, law => Law::<D>::stretch_across(law, gradient, plastic))
     }
 
     fn needs_shape(&self) -> bool {

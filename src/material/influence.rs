@@ -27,7 +27,7 @@ impl Influence {
             Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
                 2.0 * PI * thickness * horizon.powi(4) * self.moment(3)
             }
-            Dimension::Line { cross_section } => {
+            Dimension::Line { cross_section, .. } => {
                 2.0 * cross_section * horizon.powi(3) * self.moment(2)
             }
         }
@@ -66,6 +66,7 @@ impl Influence {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dimension::Constraint;
 
     #[test]
     fn moments_in_closed_form() {
@@ -107,6 +108,7 @@ mod tests {
                 Influence::Inverse,
                 Dimension::Line {
                     cross_section: 2e-4,
+                    constraint: Constraint::UniaxialStress,
                 },
                 2e-4 * horizon.powi(3),
             ),

@@ -49,6 +49,8 @@ registration::register! {
     correspondence::BondAssociated,
 }
 
+use nalgebra::SMatrix;
+
 use crate::lanes::{Lanes, Numbers, Simd, Versions};
 use bond::Weights;
 
@@ -118,6 +120,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Whether [`Self::toughness_scale`] is not 1.
     const SCALED: bool = false;
+
+    /// Whether the stress of a point is the mean of stresses of its bonds, and so is [`Self::stress_across`].
+    const HAS_BOND_STRESS_ACROSS: bool = false;
 
     /// What a bond of the undeformed body adds to the sums over the whole family.
     #[inline(always)]
@@ -225,6 +230,32 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// The weighted volume m (m⁵) of a point from its numbers, for laws that keep it.
     fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// Kirchhoff stress across the plane (Pa) in plane strain, at a displacement gradient of the plane. `None` for
+    /// ν (τ_xx + τ_yy), which holds for laws that are linear in the strain.
+    fn stress_across(
+        &self,
+        _gradient: &SMatrix<f64, D, D>,
+        _plastic: &PlasticState,
+    ) -> Option<f64> {
+        None
+    }
+
+    /// What a bond adds to the stress of [`Self::stress_across`], where [`Self::HAS_BOND_STRESS_ACROSS`], Pa/m³.
+    #[inline(always)]
+    fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
+        Lanes::splat(0.0)
+    }
+
+    /// Stretch F_zz across the plane in plane stress, at a displacement gradient of the plane. `None` for Hooke's
+    /// law with logarithmic strains.
+    fn stretch_across(
+        &self,
+        _gradient: &SMatrix<f64, D, D>,
+        _plastic: &PlasticState,
+    ) -> Option<f64> {
         None
     }
 

@@ -11,7 +11,7 @@ use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised, Word,
 };
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::lanes::{Lanes, Simd};
 
 /// The law with its only constant.
@@ -25,13 +25,20 @@ impl Pmb {
     /// From Young's modulus E (Pa) and the horizon δ (m).
     ///
     /// 3-D: 12E/(πδ⁴) = 18K/(πδ⁴). Plane stress, ν = 1/3: 6E/(πδ³(1−ν)h) = 9E/(πδ³h), Dipasquale
-    /// et al. eq. 4. Plane strain: 48E/(5πδ³h), Emmrich & Weckner 2006, eq. 10. 1-D: 12E/(5δ²A).
+    /// et al. eq. 4. Plane strain: 48E/(5πδ³h), Emmrich & Weckner 2006, eq. 10. 1-D: 2E/(δ²A) under uniaxial stress,
+    /// 2(λ + 2G)/(δ²A) = 12E/(5δ²A) under uniaxial strain.
     pub fn new(dimension: Dimension, youngs_modulus: f64, horizon: f64) -> Self {
         let factor = match dimension {
             Dimension::Space => 12.0 / (PI * horizon.powi(4)),
             Dimension::PlaneStress { thickness } => 9.0 / (PI * horizon.powi(3) * thickness),
             Dimension::PlaneStrain { thickness } => 48.0 / (5.0 * PI * horizon.powi(3) * thickness),
-            Dimension::Line { cross_section } => 12.0 / (5.0 * horizon.powi(2) * cross_section),
+            Dimension::Line {
+                cross_section,
+                constraint,
+            } => match constraint {
+                Constraint::UniaxialStress => 2.0 / (horizon.powi(2) * cross_section),
+                Constraint::UniaxialStrain => 12.0 / (5.0 * horizon.powi(2) * cross_section),
+            },
         };
         Self {
             micromodulus: factor * youngs_modulus,
@@ -44,14 +51,18 @@ impl Pmb {
     }
 
     /// Classical energy density at unit isotropic stretch W₁ (J/m³) of the solid that the law can be:
-    /// 3-D 9K/2 = 3E, plane stress E/(1−ν), plane strain E/((1+ν)(1−2ν)), 1-D (λ + 2G)/2.
+    /// 3-D 9K/2 = 3E, plane stress E/(1−ν), plane strain E/((1+ν)(1−2ν)), uniaxial stress E/2, uniaxial strain
+    /// (λ + 2G)/2.
     pub fn isotropic_energy(dimension: Dimension, youngs_modulus: f64) -> f64 {
         youngs_modulus
             * match dimension {
                 Dimension::Space => 3.0,
                 Dimension::PlaneStress { .. } => 1.5,
                 Dimension::PlaneStrain { .. } => 1.6,
-                Dimension::Line { .. } => 0.6,
+                Dimension::Line { constraint, .. } => match constraint {
+                    Constraint::UniaxialStress => 0.5,
+                    Constraint::UniaxialStrain => 0.6,
+                },
             }
     }
 }
@@ -141,7 +152,7 @@ mod tests {
             Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
                 2.0 / 3.0 * PI * horizon.powi(3) * thickness
             }
-            Dimension::Line { cross_section } => horizon.powi(2) * cross_section,
+            Dimension::Line { cross_section, .. } => horizon.powi(2) * cross_section,
         };
         c * strain * strain * moment / 4.0
     }
@@ -153,7 +164,14 @@ mod tests {
             Dimension::PlaneStress { thickness: 0.1 },
             Dimension::PlaneStrain { thickness: 0.1 },
             Dimension::Space,
-            Dimension::Line { cross_section: 0.2 },
+            Dimension::Line {
+                cross_section: 0.2,
+                constraint: Constraint::UniaxialStress,
+            },
+            Dimension::Line {
+                cross_section: 0.2,
+                constraint: Constraint::UniaxialStrain,
+            },
         ] {
             let expected = Pmb::isotropic_energy(dimension, 1.0) * strain * strain;
             let found = energy_density(dimension, 0.03, strain);

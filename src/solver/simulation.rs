@@ -13,7 +13,7 @@ use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, Evolution, ForceTimes, Forces};
-use super::conditions::{Conditions, Here, apply_initials, are_finite, members};
+use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
@@ -473,15 +473,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ///
     /// # Errors
     /// Names the first point (earliest step, then smallest id) that was not; or no equilibrium has been
-    /// found.
-    pub fn check(&self) -> Result<()> {
+    /// found, then names a piece that nothing holds if there is one.
+    pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
             .map_or([f64::MAX; 2], |bad| [bad.step as f64, bad.time]);
         comm::min(self.comm, &mut earliest);
         let [step, time] = earliest;
         if step == f64::MAX {
-            return self.load_step.outcome(self.clock.time());
+            return self.check_equilibrium();
         }
         let valued = are_finite(self.plan, self.comm, &self.model, time);
         valued.map_err(|error| Error::run(error.message))?;
@@ -527,7 +527,7 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
     here.load(part);
     let finite = verlet::second_half_kick(part, step);
     let finite = here.guide(part) && finite;
-    here.add_work(part);
+    here.add_work(part, Work::Trapezoid);
     part.add_damped_energy(step);
     finite
 }

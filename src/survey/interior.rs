@@ -2,7 +2,7 @@
 
 use crate::comm::threads;
 use crate::deck::plan::{Plan, PointSource, Shape};
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
@@ -125,7 +125,10 @@ fn stored<const D: usize>(
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
     let (bulk, shear) = (elastic.bulk_modulus(), elastic.shear_modulus());
     match dimension {
-        Dimension::Line { .. } => bulk + 4.0 / 3.0 * shear,
+        Dimension::Line { constraint, .. } => match constraint {
+            Constraint::UniaxialStress => elastic.youngs_modulus,
+            Constraint::UniaxialStrain => bulk + 4.0 / 3.0 * shear,
+        },
         Dimension::PlaneStress { .. } => {
             elastic.youngs_modulus / (2.0 * (1.0 - elastic.poisson_ratio))
         }

@@ -104,7 +104,7 @@ fn from_file(plan: &Plan, body: usize) -> (f64, f64) {
         Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
             std::f64::consts::PI * horizon * horizon * thickness
         }
-        Dimension::Line { cross_section } => 2.0 * horizon * cross_section,
+        Dimension::Line { cross_section, .. } => 2.0 * horizon * cross_section,
     };
     (rows, (ball / volume).min(rows))
 }

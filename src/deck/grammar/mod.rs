@@ -48,6 +48,9 @@ pub struct Deck {
     /// Cross-section of a 1-D body in m²; 1 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_section: Option<Number>,
+    /// Condition across a 1-D body: `"uniaxial-stress"` (if not given) or `"uniaxial-strain"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub constraint: Option<Spanned<ConstraintName>>,
     /// Named numbers for use in expressions; may build on one another.
     #[serde(default)]
     pub parameters: IndexMap<Text, Number>,
@@ -104,7 +107,7 @@ fn nowhere<T: Default>() -> Spanned<T> {
 /// The setting of the problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 pub enum DimensionName {
-    /// A bar under uniaxial strain.
+    /// A bar.
     #[serde(rename = "1d")]
     Line,
     /// A thin plate, free of stress across its thickness.
@@ -116,6 +119,17 @@ pub enum DimensionName {
     /// A solid.
     #[serde(rename = "3d")]
     Space,
+}
+
+/// Condition across a bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+pub enum ConstraintName {
+    /// No stress across the bar.
+    #[serde(rename = "uniaxial-stress")]
+    UniaxialStress,
+    /// No strain across the bar.
+    #[serde(rename = "uniaxial-strain")]
+    UniaxialStrain,
 }
 
 fn all_points() -> Text {

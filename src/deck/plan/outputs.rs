@@ -178,12 +178,13 @@ pub enum Field {
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
-    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane.
+    /// θ, the trace of the strain in space: in plane stress (1 − 2ν)/(1 − ν) of that in the plane, under uniaxial
+    /// stress (1 − 2ν) of that along the bar.
     Dilatation,
     /// m = Σ ω|ξ|²Ṽ, m⁵.
     WeightedVolume,
-    /// Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz = ν (xx + yy), in 1-D
-    /// yy = zz = ν/(1 − ν) xx.
+    /// Kirchhoff stress Σ T⊗Y Ṽ, Pa: xx, yy, zz, xy, yz, xz, of the body in space: in plane strain zz by the stress of
+    /// correspondence laws, ν (xx + yy) otherwise; under uniaxial strain yy = zz = ν/(1 − ν) xx.
     Stress,
     /// Σ T⊗Y Ṽ over the volume that the deformed body has for one of the undeformed: Cauchy's stress,
     /// Pa, in the same order.

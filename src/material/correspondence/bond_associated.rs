@@ -20,6 +20,8 @@
 //! largest modulus and λ the smallest eigenvalue of K: a spring constant of c (1/λ + 1/(|ξ|² Σ ω Ṽ)) holds
 //! as much at least.
 
+use nalgebra::SMatrix;
+
 use super::super::{
     Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Law, PlasticState,
     Rotation,
@@ -115,18 +117,23 @@ impl BondAssociated {
     /// What follows from the gradients H_ξ of the bonds.
     #[inline(always)]
     fn stresses<const D: usize>(&self, bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
-        let xi = &bond.reference;
-        let share = bond.inverse * bond.inverse;
-        let rest: [Lanes; D] = Numbers::each(|a| {
-            let mut seen = gradient[a][0] * xi[0];
-            for b in 1..D {
-                seen += gradient[a][b] * xi[b];
-            }
-            (bond.moved[a] - seen) * share
-        });
-        let own = tensor(|a, b| gradient[a][b] + rest[a] * xi[b]);
-        self.stress.of_bonds(&own)
+        self.stress.of_bonds(&own_gradient(bond, gradient))
     }
+}
+
+/// H_ξ of the bonds.
+#[inline(always)]
+fn own_gradient<const D: usize>(bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> Tensor<Lanes, D> {
+    let xi = &bond.reference;
+    let share = bond.inverse * bond.inverse;
+    let rest: [Lanes; D] = Numbers::each(|a| {
+        let mut seen = gradient[a][0] * xi[0];
+        for b in 1..D {
+            seen += gradient[a][b] * xi[b];
+        }
+        (bond.moved[a] - seen) * share
+    });
+    tensor(|a, b| gradient[a][b] + rest[a] * xi[b])
 }
 
 impl<const D: usize> Law<D> for BondAssociated {
@@ -144,6 +151,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     const SUM_READS_STRETCH: bool = false;
     const SUM_READS_DIRECTION: bool = true;
     const FORCE_READS_SHORTENING: bool = false;
+    const HAS_BOND_STRESS_ACROSS: bool = true;
     // The stresses, in a loop of their own, take most of the time.
     const VERSIONS: Versions = Versions::Avx2;
 
@@ -252,6 +260,23 @@ impl<const D: usize> Law<D> for BondAssociated {
         _: &[Lanes; 0],
     ) -> Lanes {
         self.stresses(bond, gradient).energy * *weight
+    }
+
+    fn stress_across(&self, gradient: &SMatrix<f64, D, D>, _: &PlasticState) -> Option<f64> {
+        self.stress.across(gradient)
+    }
+
+    #[inline(always)]
+    fn bond_stress_across(
+        &self,
+        bond: &Bond<D>,
+        ([.., weight], (gradient, _)): &Point<D>,
+    ) -> Lanes {
+        self.stress.across_of_bonds(&own_gradient(bond, gradient)) * *weight
+    }
+
+    fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, _: &PlasticState) -> Option<f64> {
+        self.stress.stretch_across(gradient)
     }
 
     fn needs_shape(&self) -> bool {

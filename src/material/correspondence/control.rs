@@ -63,7 +63,7 @@ impl Control {
                     Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
                         PI * horizon.powi(2) * thickness
                     }
-                    Dimension::Line { cross_section } => 2.0 * horizon * cross_section,
+                    Dimension::Line { cross_section, .. } => 2.0 * horizon * cross_section,
                 };
                 Self::Silling2017 {
                     coefficient,

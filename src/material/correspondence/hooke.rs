@@ -19,7 +19,12 @@ const PLANE: [usize; 3] = [0, 1, 5];
 
 /// C, Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hooke(Matrix6<f64>);
+pub struct Hooke {
+    matrix: Matrix6<f64>,
+    /// Factors of the strains xx, yy and 2 xy in what follows across a plane body: the stress zz (Pa) in plane strain,
+    /// the strain zz in plane stress. `None` in space, and where the constants of the deck do not contain it.
+    across: Option<[f64; 3]>,
+}
 
 /// The full matrix: its upper triangle.
 const FULL: [[&str; 6]; 6] = [
@@ -319,7 +324,14 @@ impl Hooke {
     /// Of a body; none where the constants are of no solid.
     pub fn of(given: &Given) -> Option<Self> {
         let Some(own) = unturned(given.values, given.dimension) else {
-            return Some(Self(isotropic(given)));
+            let matrix = isotropic(given);
+            let ratio = given.elastic.poisson_ratio;
+            let thinning = -ratio / (1.0 - ratio);
+            let across = match given.dimension {
+                Dimension::PlaneStress { .. } => Some([thinning, thinning, 0.0]),
+                dimension => row_across(&matrix, dimension),
+            };
+            return Some(Self { matrix, across });
         };
         let degrees = ANGLES.map(|key| given.values.number(key));
         let turned = if degrees == [0.0; 3] {
@@ -327,10 +339,22 @@ impl Hooke {
         } else {
             turned(&own, degrees.map(f64::to_radians))
         };
+        let is_full = given_of(given.values, full_entries()).is_some();
+        let across = row_across(&turned, given.dimension).filter(|_| !is_full);
         turned
             .iter()
             .all(|entry| entry.is_finite())
-            .then_some(Self(turned))
+            .then_some(Self {
+                matrix: turned,
+                across,
+            })
+    }
+
+    /// The stress zz (Pa) in plane strain or the strain zz in plane stress, from the strain in the plane; `None` where
+    /// the constants do not contain it.
+    pub fn across<const D: usize>(&self, strain: &Tensor<f64, D>) -> Option<f64> {
+        let [xx, yy, xy] = self.across?;
+        Some(xx * strain[0][0] + yy * strain[1][1] + xy * (strain[0][1] + strain[1][0]))
     }
 
     /// S = C : E, Pa.
@@ -343,7 +367,7 @@ impl Hooke {
             for j in components::<D>() {
                 let (c, d) = VOIGT[j];
                 let factor = if c == d { 1.0 } else { 2.0 };
-                sum = sum + strain[c][d] * (self.0[(i, j)] * factor);
+                sum = sum + strain[c][d] * (self.matrix[(i, j)] * factor);
             }
             stress[a][b] = sum;
             stress[b][a] = sum;
@@ -357,7 +381,7 @@ impl Hooke {
             let mut sum = 0.0;
             for j in 0..D {
                 for l in 0..D {
-                    sum += self.0[(voigt(i, j), voigt(k, l))] * m[(j, l)];
+                    sum += self.matrix[(voigt(i, j), voigt(k, l))] * m[(j, l)];
                 }
             }
             sum
@@ -368,7 +392,7 @@ impl Hooke {
     pub fn largest(&self) -> f64 {
         // Kelvin's notation, in which the length of a tensor is that of its vector.
         let factor = |k: usize| if k < 3 { 1.0 } else { 2_f64.sqrt() };
-        let kelvin = Matrix6::from_fn(|a, b| self.0[(a, b)] * factor(a) * factor(b));
+        let kelvin = Matrix6::from_fn(|a, b| self.matrix[(a, b)] * factor(a) * factor(b));
         kelvin
             .symmetric_eigenvalues()
             .iter()
@@ -391,6 +415,12 @@ fn components<const D: usize>() -> impl Iterator<Item = usize> {
 /// The place of a component in Voigt's order.
 fn voigt(a: usize, b: usize) -> usize {
     if a == b { a } else { 6 - a - b }
+}
+
+/// The row of the stress zz in plane strain.
+fn row_across(matrix: &Matrix6<f64>, dimension: Dimension) -> Option<[f64; 3]> {
+    let is_plane_strain = matches!(dimension, Dimension::PlaneStrain { .. });
+    is_plane_strain.then(|| PLANE.map(|k| matrix[(2, k)]))
 }
 
 fn isotropic(given: &Given) -> Matrix6<f64> {

@@ -21,6 +21,8 @@ mod plastic;
 mod stress;
 mod tensor;
 
+use nalgebra::SMatrix;
+
 use super::bond::Weights;
 use super::{
     Bond, Built, Declaration, Declared, Described, ForceState, Given, Influence, Invariants, Key,
@@ -327,6 +329,20 @@ impl<const D: usize> Law<D> for Correspondence {
     #[inline(always)]
     fn stiffness(&self, _: Lanes, end: &Point<D>) -> Lanes {
         end.0[0]
+    }
+
+    fn stress_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
+        match &self.plastic {
+            Some(plastic) => Some(plastic.across(gradient, state)),
+            None => self.stress.across(gradient),
+        }
+    }
+
+    fn stretch_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
+        match &self.plastic {
+            Some(plastic) => plastic.stretch_across(gradient, state),
+            None => self.stress.stretch_across(gradient),
+        }
     }
 
     fn needs_shape(&self) -> bool {

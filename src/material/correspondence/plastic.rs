@@ -12,11 +12,13 @@
 //!
 //! What flow dissipates is all of the plastic work ∫ q dε̄.
 
+use std::ops::AddAssign;
+
 use nalgebra::{Matrix3, SMatrix};
 
 use super::super::{Given, Key, Kind, LawFault, PlasticState, Values};
 use super::hooke;
-use super::stress::green_strain;
+use super::stress::{green_strain, stretch_of};
 use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
 
@@ -136,6 +138,30 @@ impl Plastic {
         let stress = self.stress(&elastic);
         let second: SMatrix<f64, D, D> = stress.fixed_view::<D, D>(0, 0).into_owned();
         (second + gradient * second, 0.5 * stress.dot(&elastic))
+    }
+
+    /// Kirchhoff stress across the plane in plane strain, Pa.
+    pub fn across<const D: usize>(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        state: &PlasticState,
+    ) -> f64 {
+        let mut elastic = -tensor_of(&state.strain);
+        let in_plane = matrix(&green_strain(&rows(gradient)));
+        elastic.view_mut((0, 0), (D, D)).add_assign(&in_plane);
+        self.stress(&elastic)[(2, 2)]
+    }
+
+    /// Stretch F_zz across the plane in plane stress.
+    pub fn stretch_across<const D: usize>(
+        &self,
+        gradient: &SMatrix<f64, D, D>,
+        state: &PlasticState,
+    ) -> Option<f64> {
+        let strain = matrix(&green_strain(&rows(gradient)));
+        let [xx, yy, zz, ..] = state.strain;
+        let elastic = strain.trace() - xx - yy;
+        stretch_of(zz - 0.5 * self.lambda / self.shear * elastic)
     }
 
     /// S of an elastic strain, Pa.

@@ -111,6 +111,45 @@ impl Stress {
         }
     }
 
+    /// Kirchhoff stress across the plane (Pa) in plane strain; `None` where the constants do not contain it.
+    pub fn across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
+        let strain = green_strain(&rows(gradient));
+        let volume = determinant(&(SMatrix::identity() + gradient));
+        match self {
+            Self::StVenantKirchhoff(hooke) => hooke.across(&strain),
+            Self::Willberg2022(hooke) => Some(hooke.across(&strain)? * volume),
+            // The law has no stress where the body is turned inside out.
+            Self::NeoHooke(_) if volume <= 0.0 => Some(0.0),
+            Self::NeoHooke(law) => {
+                let log = libm::log1p(growth(&(matrix(&strain) * 2.0)));
+                Some(0.5 * law.lambda * log)
+            }
+        }
+    }
+
+    /// As [`Self::across`], of eight bonds; 0 where the constants do not contain it.
+    #[inline(never)]
+    pub fn across_of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> Lanes {
+        Lanes(std::array::from_fn(|lane| {
+            let own = SMatrix::<f64, D, D>::from_fn(|a, b| gradient[a][b].0[lane]);
+            self.across(&own).unwrap_or(0.0)
+        }))
+    }
+
+    /// Stretch F_zz across the plane in plane stress; `None` where the constants do not contain it.
+    pub fn stretch_across<const D: usize>(&self, gradient: &SMatrix<f64, D, D>) -> Option<f64> {
+        let strain = green_strain(&rows(gradient));
+        match self {
+            Self::StVenantKirchhoff(hooke) => stretch_of(hooke.across(&strain)?),
+            // The J of the law is that of the plane.
+            Self::Willberg2022(_) => Some(1.0),
+            Self::NeoHooke(law) => {
+                let growth = growth(&(matrix(&strain) * 2.0));
+                (growth > -1.0).then(|| libm::exp(0.5 * law.across(libm::log1p(growth))))
+            }
+        }
+    }
+
     /// As [`Self::at`], of eight bonds; compiled once, and not into every loop over bonds.
     #[inline(never)]
     pub fn of_bonds<const D: usize>(&self, gradient: &Tensor<Lanes, D>) -> OfBonds<D> {
@@ -155,6 +194,12 @@ pub fn green_strain<T: Number, const D: usize>(gradient: &Tensor<T, D>) -> Tenso
         }
         sum * 0.5
     })
+}
+
+/// The stretch along an axis with this Green strain.
+pub fn stretch_of(strain: f64) -> Option<f64> {
+    let square = 1.0 + 2.0 * strain;
+    (square > 0.0).then(|| square.sqrt())
 }
 
 /// P = F (C : E) and W = ½ E : C : E.

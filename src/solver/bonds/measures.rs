@@ -166,6 +166,28 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     }
 }
 
+/// Sum of [`Law::bond_stress_across`] over the intact bonds, Pa.
+#[derive(Clone, Copy)]
+pub struct StressAcross<L> {
+    /// Law of the own end.
+    pub law: L,
+}
+
+impl<L: Law<D>, const D: usize> Kernel<D> for StressAcross<L> {
+    type Sums = [Lanes; 1];
+    type Broken = [Lanes; 0];
+    type Point = L::Point;
+    type Memory = [Lanes; 0];
+    const EXISTS: bool = D == 2 && L::HAS_BOND_STRESS_ACROSS;
+    const WANTED: Wanted = wanted(L::LINEAR);
+
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
+        let stress = self.law.bond_stress_across(&group.bond, group.own);
+        sums[0] += simd.keep(group.own_share(stress), group.intact);
+    }
+}
+
 /// Sums the tensors of the intact bonds of a point: the shape tensor Σ ω ξ⊗ξ Ṽ by diagonal and mixed
 /// entries, and Σ ω η⊗ξ Ṽ row by row, m⁵.
 #[derive(Clone, Copy)]

@@ -289,6 +289,11 @@ impl<const D: usize> Forces<D> {
         self.halo.bring(comm, &mut [values]);
     }
 
+    /// Exchange the ghost values of several columns over the local points. Collective.
+    pub fn bring_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
+        self.halo.bring(comm, columns);
+    }
+
     /// Brings the ghosts' displacements up to date.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         let mut components = displacement.each_mut().map(Vec::as_mut_slice);

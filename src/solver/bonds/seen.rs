@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 
 use crate::families::BlockBonds;
 use crate::lanes::{Lanes, Numbers};
-use crate::material::{Law, ShapeTensor, with_pair};
+use crate::material::{Law, PlasticState, ShapeTensor, with_law, with_pair};
 use crate::solver::model::Model;
 
 use super::Forces;
@@ -120,6 +120,50 @@ impl<const D: usize> Forces<D> {
         columns.try_into().expect("six columns")
     }
 
+    /// Kirchhoff stress across the plane of each owned point (Pa) in plane strain, at the displacements of the last
+    /// [evaluation](Self::evaluate) and the plastic state of each point; see [`Law::stress_across`].
+    pub fn stress_across(
+        &mut self,
+        model: &Model<D>,
+        plastic: impl Fn(usize) -> PlasticState,
+    ) -> Vec<Option<f64>> {
+        fn is_of_bonds<L: Law<D>, const D: usize>(_: &L) -> bool {
+            L::HAS_BOND_STRESS_ACROSS
+        }
+        let gradients = self.deformation_gradient(model);
+        let columns = self.measure(model.owned(), 1, |interaction, sums, source| {
+            with_pair!(interaction.laws, laws => {
+                stress_across_of_bonds(laws[0], &mut interaction.bonds, sums, source);
+            });
+        });
+        let across = |point: usize| {
+            let law = &self.blocks[usize::from(model.block[point])].law;
+            let gradient = gradients[point] - SMatrix::identity();
+            let of_point = Law::<D>::stress_across(law, &gradient, &plastic(point))?;
+            let is_of_bonds = with_law!(law, law => is_of_bonds::<_, D>(law));
+            Some(if is_of_bonds {
+                columns[0][point]
+            } else {
+                of_point
+            })
+        };
+        (0..model.owned()).map(across).collect()
+    }
+
+    /// Stretch F_zz across the plane of an owned point in plane stress, at its deformation gradient and plastic state;
+    /// see [`Law::stretch_across`].
+    pub fn stretch_across(
+        &self,
+        model: &Model<D>,
+        point: usize,
+        deformation: &SMatrix<f64, D, D>,
+        plastic: &PlasticState,
+    ) -> Option<f64> {
+        let law = &self.blocks[usize::from(model.block[point])].law;
+        let gradient = deformation - SMatrix::identity();
+        Law::<D>::stretch_across(law, &gradient, plastic)
+    }
+
     /// The deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
     /// displacements of the last [evaluation](Self::evaluate); I where too few are left.
     pub fn deformation_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
@@ -193,6 +237,18 @@ impl<const D: usize> Forces<D> {
             };
         }
         [weighted_volume, growth]
+    }
+}
+
+/// Sum [`Law::bond_stress_across`] over all bonds between two blocks, if the law has it.
+fn stress_across_of_bonds<L: Law<D>, const D: usize>(
+    law: L,
+    bonds: &mut BlockBonds,
+    sums: &mut [Vec<f64>],
+    source: Source<'_, D>,
+) {
+    if const { <measures::StressAcross<L> as Kernel<D>>::EXISTS } {
+        sweep_all(bonds, sums, &measures::StressAcross { law }, source);
     }
 }
 

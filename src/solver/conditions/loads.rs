@@ -3,6 +3,7 @@
 use crate::deck::expression::Expression;
 use crate::solver::motion::walk::Part;
 
+use super::Work;
 use super::values::{At, Values};
 
 /// A body force density.
@@ -117,16 +118,21 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Adds the work of the step (J), by the trapezoid rule.
-    pub fn add_work(&self, part: &mut Part<'_, D>) {
+    /// Add the work (J) of the loads.
+    pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {
             return;
+        };
+        let mean = |before: f64, now: f64| match kind {
+            Work::Trapezoid => 0.5 * (before + now),
+            Work::FirstEquilibrium => 0.5 * (before - now),
+            Work::LastEquilibrium => now,
         };
         for (k, point) in self.points.iter().enumerate() {
             let point = usize::from(*point);
             for d in 0..D {
                 let moved = part.displacement[d][point] - self.moved_from[k][d];
-                let force = 0.5 * (self.before[k][d] + self.force[k][d]);
+                let force = mean(self.before[k][d], self.force[k][d]);
                 work[point] += force * moved * part.model.volume[part.first + point];
             }
         }

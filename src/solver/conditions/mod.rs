@@ -38,6 +38,22 @@ pub struct OnPart<const D: usize> {
     supports: Vec<Supported>,
 }
 
+/// Work of loads and supports from a state 0, which they remember, to the present state.
+///
+/// f is the force density of a load or a reaction, V the volume of a point. A load step in which bonds break has a first
+/// equilibrium 1 and a last equilibrium 2. From 0 to 1 the work is ½ (f₀ + f₁)·(u₁ − u₀) V. From 1 to 2 supports do not
+/// move, and loads keep f₁. Only u₀ is stored, so the work of loads is written as
+/// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// ½ (f₀ + f)·(u − u₀) V.
+    Trapezoid,
+    /// At the first of several equilibria: ½ (f₀ + f₁)·(u₁ − u₀) V of supports, the first term of loads.
+    FirstEquilibrium,
+    /// At the last of several equilibria: the second term of loads.
+    LastEquilibrium,
+}
+
 /// Loads and supports on a part of the points.
 pub struct Here<'a, const D: usize> {
     all: All<'a, D>,
@@ -239,6 +255,19 @@ impl<const D: usize> Conditions<D> {
         (all, &mut self.on_parts)
     }
 
+    /// A column for each component over so many local points: 0 at owned points whose component a support
+    /// prescribes, else 1.
+    pub fn free_components(&self, local: usize) -> [Vec<f64>; D] {
+        let mut free = std::array::from_fn(|_| vec![1.0; local]);
+        for (number, part) in self.on_parts.iter().enumerate() {
+            for supported in &part.supports {
+                let (component, points) = supported.points(&self.supports);
+                points.for_each(|point| free[component][number * PART + point] = 0.0);
+            }
+        }
+        free
+    }
+
     /// Sums the force of the supports on a set's points by component, N. `members` is sorted.
     pub fn reaction(&self, model: &Model<D>, fields: &Fields<D>, members: &[u32]) -> [ExactSum; D] {
         let mut sums = [const { ExactSum::ZERO }; D];
@@ -349,14 +378,14 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// After forces and reactions are known at the new place: adds up the work of the step, by the
-    /// trapezoid rule.
-    pub fn add_work(&self, part: &mut Part<'_, D>) {
+    /// Add the work of loads and supports since they were remembered, when forces and reactions are known at the
+    /// new place.
+    pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
-            load.add_work(part);
+            load.add_work(part, work);
         }
         for support in &self.on.supports {
-            support.add_work(self.all.supports, part);
+            support.add_work(self.all.supports, part, work);
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::deck::expression::Expression;
 use crate::solver::motion::walk::Part;
 
+use super::Work;
 use super::values::{At, Values};
 
 /// What a support prescribes.
@@ -222,8 +223,16 @@ impl Supported {
         finite
     }
 
-    /// Adds the work of the step (J), by the trapezoid rule.
-    pub fn add_work<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) {
+    /// Add the work (J) of the support.
+    pub fn add_work<const D: usize>(
+        &self,
+        supports: &[Support],
+        part: &mut Part<'_, D>,
+        work: Work,
+    ) {
+        if work == Work::LastEquilibrium {
+            return;
+        }
         let component = supports[self.support].component;
         let (Some(reaction), Some([work])) = (&part.reaction, &mut part.external_work) else {
             return;

@@ -3,6 +3,7 @@
 pub mod adaptive;
 pub mod clock;
 pub mod fields;
+mod pieces;
 pub mod relaxation;
 pub mod saved;
 pub mod stable_step;

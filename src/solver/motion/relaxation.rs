@@ -20,6 +20,10 @@
 //! the same load, until nothing breaks. The history of bonds and points is part of the equilibrium. Each iteration takes
 //! the forces from the history that a step from the last equilibrium to the present place would leave, and stores it
 //! when the equilibrium is found.
+//!
+//! The equilibrium is found when ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). Without loads and reactions, as in a
+//! free body that is moved, both sides are round-off; so ‖f‖ ≤ [`ROUND_OFF`] ‖V ρ u‖ is an equilibrium, too. ρ bounds
+//! the stiffness of a point, hence ε ‖V ρ u‖ the forces that come from rounding u.
 
 use std::time::Instant;
 
@@ -32,6 +36,7 @@ use crate::deck::plan::Relaxation;
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
 use crate::solver::bonds::Evolution;
+use crate::solver::conditions::Work;
 use crate::solver::model::Model;
 
 use super::Fields;
@@ -46,6 +51,9 @@ const MARGIN: f64 = 1.2;
 /// The largest damping c; from 2 on the velocity would change its sign.
 const MOST_DAMPING: f64 = 1.9;
 
+/// Forces on the points are round-off below this share of ‖V ρ u‖.
+const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
+
 /// How far a load step has come; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadStep {
@@ -53,16 +61,16 @@ pub struct LoadStep {
     pub iterations: u64,
     /// Those of them since bonds broke.
     pub since_breaking: u64,
-    /// ‖f‖/(‖loads‖ + ‖reactions‖), norms of the forces on the points; not a number before the first load
-    /// step.
+    /// ‖f‖/(‖loads‖ + ‖reactions‖), norms of the forces on the points; 0 where f is round-off, not a number before
+    /// the first load step.
     pub residual: f64,
     /// c; not a number from rest.
     damping: f64,
     /// The largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N: a body that is unloaded, or broken
     /// in two, is not looked at more closely than when it was loaded.
     scale: f64,
-    /// Whether the history of bonds has advanced by the time of this load step, at an equilibrium in which bonds broke.
-    has_advanced: bool,
+    /// Bonds have broken in an equilibrium of this load step.
+    has_broken: bool,
     /// Whether the equilibrium has been found, and nothing more breaks.
     pub is_settled: bool,
     /// Whether it has not been found in as many iterations as there may be.
@@ -77,7 +85,7 @@ impl Default for LoadStep {
             residual: f64::NAN,
             damping: f64::NAN,
             scale: 0.0,
-            has_advanced: false,
+            has_broken: false,
             is_settled: true,
             has_failed: false,
         }
@@ -93,23 +101,36 @@ impl LoadStep {
         if !self.has_failed {
             return Ok(());
         }
+        let balance = if self.residual.is_finite() {
+            let residual = self.residual;
+            format!(
+                "are still {residual:.1e} of loads and reactions. More load than the body bears?"
+            )
+        } else {
+            "are more than round-off, without loads and reactions.".to_owned()
+        };
         Err(Error::run(format!(
-            "t = {time:.6e} s: no equilibrium within {} iterations; the forces out of balance are still \
-             {:.1e} of loads and reactions. More load than the body bears, or a part that nothing holds? \
-             Else [time.relaxation] takes more `iterations` or a larger `tolerance`",
-            self.since_breaking, self.residual
+            "{}; the forces out of balance {balance} Otherwise give [time.relaxation] more `iterations` or a \
+             larger `tolerance`",
+            self.failure(time)
         )))
+    }
+
+    /// What has failed at a time (s).
+    fn failure(&self, time: f64) -> String {
+        let iterations = self.since_breaking;
+        format!("t = {time:.6e} s: no equilibrium within {iterations} iterations")
     }
 
     /// All of it, as a checkpoint holds it.
     pub fn words(&self) -> [u64; 8] {
         let [residual, damping, scale] =
             [self.residual, self.damping, self.scale].map(f64::to_bits);
-        let flags = [self.has_advanced, self.is_settled, self.has_failed];
-        let [advanced, settled, failed] = flags.map(u64::from);
+        let [broken, settled, failed] =
+            [self.has_broken, self.is_settled, self.has_failed].map(u64::from);
         let counts = [self.iterations, self.since_breaking];
         [
-            counts[0], counts[1], residual, damping, scale, advanced, settled, failed,
+            counts[0], counts[1], residual, damping, scale, broken, settled, failed,
         ]
     }
 
@@ -121,7 +142,7 @@ impl LoadStep {
             residual,
             damping,
             scale,
-            advanced,
+            broken,
             settled,
             failed,
         ] = words;
@@ -132,7 +153,7 @@ impl LoadStep {
             residual,
             damping,
             scale,
-            has_advanced: advanced == 1,
+            has_broken: broken == 1,
             is_settled: settled == 1,
             has_failed: failed == 1,
         }
@@ -285,9 +306,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// Finds damping and residual from the forces at the new place.
     fn look(&mut self, before: Option<Before>) {
         let (model, fields) = (&self.model, &self.fields);
-        let [power, free, loads, reactions] = sums(model, fields, |point, _| {
+        let [power, free, loads, reactions, stiffness] = sums(model, fields, |point, density| {
             let volume = model.volume[point];
-            let mut terms = [0.0; 4];
+            let mut terms = [0.0; 5];
             for d in 0..D {
                 let force = fields.total_force(model, d, point);
                 let of =
@@ -296,6 +317,7 @@ impl<const D: usize> Simulation<'_, D> {
                 terms[1] += (volume * force).powi(2);
                 terms[2] += (volume * of(&fields.external_force)).powi(2);
                 terms[3] += (volume * of(&fields.reaction)).powi(2);
+                terms[4] += (volume * density * fields.displacement[d][point]).powi(2);
             }
             terms[0] *= volume;
             terms
@@ -307,13 +329,13 @@ impl<const D: usize> Simulation<'_, D> {
             power: ExactSum::ZERO,
             inertia: ExactSum::ZERO,
         });
-        let mut all = [power, old, inertia, free, loads, reactions];
+        let mut all = [power, old, inertia, free, loads, reactions, stiffness];
         let all = reduce(self.comm, &mut all);
         let [power, old, inertia] = [all[0], all[1], all[2]];
-        let [free, loads, reactions] = [all[3], all[4], all[5]].map(f64::sqrt);
+        let [free, loads, reactions, stiffness] = [all[3], all[4], all[5], all[6]].map(f64::sqrt);
         let scale = (loads + reactions).max(self.load_step.scale);
-        // Without any force there is nothing to be out of balance.
-        self.load_step.residual = if free == 0.0 { 0.0 } else { free / scale };
+        let is_round_off = free <= ROUND_OFF * stiffness;
+        self.load_step.residual = if is_round_off { 0.0 } else { free / scale };
         if inertia > 0.0 {
             let quotient = ((old - power) / inertia).max(0.0);
             self.load_step.damping = (2.0 * quotient.sqrt()).min(MOST_DAMPING);
@@ -323,7 +345,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// The time by which the history of bonds advances at the next equilibrium (s): once in a load step, however often
     /// bonds break.
     fn time_to_advance(&self) -> f64 {
-        if self.load_step.has_advanced {
+        if self.load_step.has_broken {
             0.0
         } else {
             self.clock.step()
@@ -343,9 +365,18 @@ impl<const D: usize> Simulation<'_, D> {
     /// In equilibrium: breaks the bonds that must, and lets the points start anew; where none does, the
     /// load step is over.
     fn break_or_settle(&mut self) {
+        self.raise_scale();
+        let is_first = !self.load_step.has_broken;
         self.evaluate(Evolution::Step(self.time_to_advance()));
-        self.load_step.has_advanced = true;
-        if total(self.comm, self.forces.broken().len() as u64) > 0 {
+        let breaks = total(self.comm, self.forces.broken().len() as u64) > 0;
+        match (is_first, breaks) {
+            (true, true) => self.add_work_since_equilibrium(Work::FirstEquilibrium),
+            (true, false) => self.add_work_since_equilibrium(Work::Trapezoid),
+            (false, true) => {}
+            (false, false) => self.add_work_since_equilibrium(Work::LastEquilibrium),
+        }
+        if breaks {
+            self.load_step.has_broken = true;
             self.load_step.since_breaking = 0;
             self.stop();
             self.evaluate(self.standing_evolution());
@@ -354,6 +385,10 @@ impl<const D: usize> Simulation<'_, D> {
             return;
         }
         self.load_step.is_settled = true;
+    }
+
+    /// Raise the scale to the loads and reactions of the present equilibrium.
+    fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, reactions] = sums(model, fields, |point, _| {
             let of = |field: &Option<[Vec<f64>; D]>| {
@@ -365,11 +400,23 @@ impl<const D: usize> Simulation<'_, D> {
         let norms = reduce(self.comm, &mut [loads, reactions]);
         let scale = norms.into_iter().map(f64::sqrt).sum();
         self.load_step.scale = self.load_step.scale.max(scale);
-        self.add_work_since_equilibrium();
     }
 
-    /// Adds up the work of loads and supports from the last equilibrium to this one.
-    fn add_work_since_equilibrium(&mut self) {
+    /// An error if the present load step has failed. Collective.
+    ///
+    /// # Errors
+    /// Names a piece that loads act on and nothing holds, if there is one, else says how near it came.
+    pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
+        let time = self.clock.time();
+        if self.load_step.has_failed {
+            let failure = self.load_step.failure(time);
+            self.check_pieces_are_held(&failure)?;
+        }
+        self.load_step.outcome(time)
+    }
+
+    /// Add the work of loads and supports since the last load step, which ended in equilibrium.
+    fn add_work_since_equilibrium(&mut self, work: Work) {
         let (then, now) = (self.clock.time_before(), self.clock.time());
         // Taken out while they are read.
         let displacement = self.fields.equilibrium_displacement.take();
@@ -386,7 +433,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.walk(|part, mut here| {
             here.find_loads();
-            here.add_work(part);
+            here.add_work(part, work);
             true
         });
         self.fields.equilibrium_displacement = displacement;

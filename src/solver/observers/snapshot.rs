@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, SMatrix};
 
 use crate::deck::plan::Field;
-use crate::dimension::Dimension;
+use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
-use crate::material::determinant;
+use crate::material::{PlasticState, determinant};
 use crate::solver::Simulation;
 use crate::solver::bonds::Stored;
 use crate::solver::motion::Fields;
@@ -133,8 +133,8 @@ impl Snapshot {
 }
 
 /// Cauchy's stress from Kirchhoff's, row by row: over the volume that the deformed body has for one of
-/// the undeformed. In plane stress the plate thins as Hooke's law has it, ε_zz = −ν/(1 − ν) (ε_xx + ε_yy)
-/// with logarithmic strains, and by its plastic strain; that takes no volume.
+/// the undeformed. In plane stress the plate thins by its law; by default as Hooke's law has it,
+/// ε_zz = −ν/(1 − ν) (ε_xx + ε_yy) with logarithmic strains. Under uniaxial stress a bar has ε_yy = ε_zz = −ν ε_xx.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
@@ -145,10 +145,17 @@ fn cauchy_stress<const D: usize>(
         let in_plane = determinant(gradient);
         let growth = match simulation.plan.dimension {
             Dimension::PlaneStress { .. } => {
-                let elastic =
-                    in_plane * libm::exp(plastic_strain_across(&simulation.fields, point));
-                libm::pow(elastic, (1.0 - 2.0 * ratio) / (1.0 - ratio))
+                let plastic = plastic_state(&simulation.fields, point);
+                let (forces, model) = (&simulation.forces, &simulation.model);
+                match forces.stretch_across(model, point, gradient, &plastic) {
+                    Some(stretch) => in_plane * stretch,
+                    None => libm::pow(in_plane, (1.0 - 2.0 * ratio) / (1.0 - ratio)),
+                }
             }
+            Dimension::Line {
+                constraint: Constraint::UniaxialStress,
+                ..
+            } => libm::pow(in_plane, 1.0 - 2.0 * ratio),
             _ => in_plane,
         };
         // A body turned inside out has no volume to speak of.
@@ -174,45 +181,59 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
 }
 
 /// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
-/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy).
+/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar by ε_yy = ε_zz = −ν ε_xx.
 fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match simulation.plan.dimension {
         Dimension::PlaneStress { .. } => {
             let ratio = elastic(simulation, point).poisson_ratio;
             (1.0 - 2.0 * ratio) / (1.0 - ratio)
         }
+        Dimension::Line {
+            constraint: Constraint::UniaxialStress,
+            ..
+        } => 1.0 - 2.0 * elastic(simulation, point).poisson_ratio,
         Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => 1.0,
     }
 }
 
-/// The plastic strain zz of an owned point.
-fn plastic_strain_across<const D: usize>(fields: &Fields<D>, point: usize) -> f64 {
-    let [_, _, zz, ..] = match &fields.plastic_strain {
-        Some(strain) => strain,
-        None => return 0.0,
-    };
-    zz[point]
+/// The plastic strain of an owned point; 0 where no points flow.
+fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticState {
+    let strain = fields.plastic_strain.as_ref();
+    PlasticState {
+        strain: strain.map_or([0.0; 6], |strain| {
+            strain.each_ref().map(|column| column[point])
+        }),
+        ..PlasticState::default()
+    }
 }
 
-/// The stress across the directions of the setting where there is no strain, by Hooke's law: zz = ν (xx +
-/// yy) − E e_zz in plane strain with a plastic strain e, yy = zz = ν/(1 − ν) xx in 1-D.
-fn across<const D: usize>(simulation: &Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
+/// Find the stress across the directions of the setting where there is no strain: zz by the law in plane strain,
+/// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx under uniaxial strain.
+fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
+    let by_law = match simulation.plan.dimension {
+        Dimension::PlaneStrain { .. } => {
+            let fields = &simulation.fields;
+            let plastic = |point| plastic_state(fields, point);
+            (simulation.forces).stress_across(&simulation.model, plastic)
+        }
+        _ => Vec::new(),
+    };
     for point in 0..zz.len() {
-        let Isotropic {
-            youngs_modulus: young,
-            poisson_ratio: ratio,
-        } = elastic(simulation, point);
+        let ratio = elastic(simulation, point).poisson_ratio;
         match simulation.plan.dimension {
             Dimension::PlaneStrain { .. } => {
-                let plastic = plastic_strain_across(&simulation.fields, point);
-                zz[point] = ratio * (xx[point] + yy[point]) - young * plastic;
+                let linear = ratio * (xx[point] + yy[point]);
+                zz[point] = by_law[point].unwrap_or(linear);
             }
-            Dimension::Line { .. } => {
+            Dimension::Line {
+                constraint: Constraint::UniaxialStrain,
+                ..
+            } => {
                 zz[point] = ratio / (1.0 - ratio) * xx[point];
                 yy[point] = zz[point];
             }
-            Dimension::PlaneStress { .. } | Dimension::Space => {}
+            Dimension::PlaneStress { .. } | Dimension::Line { .. } | Dimension::Space => {}
         }
     }
 }

@@ -1,0 +1,163 @@
+//! Pieces of the bodies: points that intact bonds connect, and whether supports hold them.
+
+use std::collections::BTreeMap;
+
+use crate::comm::sum::{ExactSum, reduce};
+use crate::comm::{agree, min, total};
+use crate::error::{Error, Result};
+use crate::solver::Simulation;
+
+/// Names of the components.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The share of the sum of the magnitudes of loads below which their sum is round-off.
+const ROUND_OFF: f64 = 1e-9;
+
+/// What is known of the piece of each local point; the same at all points of a piece.
+struct Pieces<const D: usize> {
+    /// Smallest point id of the piece.
+    first: Vec<f64>,
+    /// 1 for each component that no support prescribes at any point of the piece, else 0.
+    is_free: [Vec<f64>; D],
+    /// 0 for each component in which a load acts on a point of the piece, else 1.
+    is_unloaded: [Vec<f64>; D],
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Search for a piece that no support holds along an axis in which loads act on it. Collective.
+    ///
+    /// # Errors
+    /// Names the piece whose smallest point id is the smallest.
+    pub(in crate::solver) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
+        let pieces = self.find_pieces();
+        let mut suspects: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for point in 0..self.model.owned() {
+            let suspect =
+                |d: usize| pieces.is_free[d][point] == 1.0 && pieces.is_unloaded[d][point] == 0.0;
+            if (0..D).any(suspect) {
+                let points = suspects.entry(pieces.first[point] as u64).or_default();
+                points.push(point);
+            }
+        }
+        let mut from = 0;
+        loop {
+            let own = suspects.range(from..).next();
+            let mut first = [own.map_or(f64::MAX, |(first, _)| *first as f64)];
+            min(self.comm, &mut first);
+            if first[0] == f64::MAX {
+                return Ok(());
+            }
+            let first = first[0] as u64;
+            let points = suspects.get(&first).map_or(&[][..], |points| &points[..]);
+            let count = total(self.comm, points.len() as u64);
+            if let Some((component, force)) = self.unbalanced_load(&pieces, points) {
+                let named = points.iter().find(|point| self.model.ids[**point] == first);
+                let named = named.map(|point| {
+                    let axis = AXES[component];
+                    let block = usize::from(self.model.block[*point]);
+                    Error::run(format!(
+                        "{failure}: loads of {force:.3e} N act along {axis} on a piece of body `{}` that no \
+                         support holds along {axis}. The piece has {count} points; point {first} at {:?} m is \
+                         one of them. Prescribe its displacement along {axis} at some points, or remove its \
+                         loads",
+                        self.plan.block(block).body.name,
+                        &self.model.position(*point)[..D],
+                    ))
+                });
+                agree(self.comm, named.map_or(Ok(()), Err))?;
+            }
+            from = first + 1;
+        }
+    }
+
+    /// The first free component in which the loads on the points of a piece do not cancel, and their sum (N).
+    /// Collective.
+    fn unbalanced_load(&self, pieces: &Pieces<D>, points: &[usize]) -> Option<(usize, f64)> {
+        let mut is_held = [0.0; D];
+        let mut sums = [const { ExactSum::ZERO }; 6];
+        for point in points {
+            for d in 0..D {
+                let force = self.fields.external_force.as_ref();
+                let force = force.map_or(0.0, |force| force[d][*point]);
+                let force = force * self.model.volume[*point];
+                sums[d].add(force);
+                sums[3 + d].add(force.abs());
+                is_held[d] = 1.0 - pieces.is_free[d][*point];
+            }
+        }
+        self.comm.max(&mut is_held);
+        let sums = reduce(self.comm, &mut sums);
+        let unbalanced = |d: &usize| is_held[*d] == 0.0 && sums[*d].abs() > ROUND_OFF * sums[3 + d];
+        (0..D).find(unbalanced).map(|d| (d, sums[d]))
+    }
+
+    /// Find the pieces of all bodies. Collective.
+    fn find_pieces(&mut self) -> Pieces<D> {
+        let (model, local) = (&self.model, self.model.volume.len());
+        let mut roots: Vec<usize> = (0..local).collect();
+        self.forces.for_each_intact(|i, j| {
+            let (i, j) = (root(&mut roots, i), root(&mut roots, j));
+            roots[i.max(j)] = i.min(j);
+        });
+        let mut pieces = Pieces {
+            first: model.ids.iter().map(|id| *id as f64).collect(),
+            is_free: self.conditions.free_components(local),
+            is_unloaded: std::array::from_fn(|_| vec![1.0; local]),
+        };
+        // A point without bonds in its reference family does not take part in a relaxation.
+        let density = self.fields.fictitious_density.as_deref();
+        if let (Some(force), Some(density)) = (&self.fields.external_force, density) {
+            for (is_unloaded, force) in pieces.is_unloaded.iter_mut().zip(force) {
+                for (point, force) in force.iter().enumerate() {
+                    if *force != 0.0 && density[point].is_finite() {
+                        is_unloaded[point] = 0.0;
+                    }
+                }
+            }
+        }
+        loop {
+            // The minimum over the points of a piece on this rank, then those of the other ranks.
+            self.forces.bring_all(self.comm, &mut pieces.columns());
+            let mut changed = 0;
+            for column in pieces.columns() {
+                for point in 0..local {
+                    let root = root(&mut roots, point);
+                    column[root] = column[root].min(column[point]);
+                }
+                for point in 0..local {
+                    let least = column[root(&mut roots, point)];
+                    changed += u64::from(column[point] > least);
+                    column[point] = least;
+                }
+            }
+            if total(self.comm, changed) == 0 {
+                return pieces;
+            }
+        }
+    }
+}
+
+impl<const D: usize> Pieces<D> {
+    fn columns(&mut self) -> Vec<&mut [f64]> {
+        let Self {
+            first,
+            is_free,
+            is_unloaded,
+        } = self;
+        let flags = is_free.iter_mut().chain(is_unloaded);
+        [first]
+            .into_iter()
+            .chain(flags)
+            .map(|column| &mut column[..])
+            .collect()
+    }
+}
+
+/// The root of a point's tree; shortens the path to it.
+fn root(parents: &mut [usize], mut point: usize) -> usize {
+    while parents[point] != point {
+        parents[point] = parents[parents[point]];
+        point = parents[point];
+    }
+    point
+}
