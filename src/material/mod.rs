@@ -65,7 +65,7 @@ pub trait Described {
 /// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
 /// run over bonds in these steps:
 ///
-/// 1. once, over the family without the bonds that pre-cracks cut: [`Self::whole_share`] → sums → [`Self::constants`], and [`Self::overload`] where a
+/// 1. once, over the family without the bonds that pre-cracks cut (see [`Self::needs_shape`]): [`Self::whole_share`] → sums → [`Self::constants`], and [`Self::overload`] where a
 ///    criterion reads it;
 /// 2. before each sum of forces, over the intact bonds, [`Self::PASSES`] times:
 ///    [`Self::share`] → sums → [`Self::point`]; then the numbers are sent to the ghosts;
@@ -259,7 +259,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// Whether points need enough bonds in all directions.
+    /// Whether points need enough bonds in all directions, compared with a family that pre-cracks do not cut.
     fn needs_shape(&self) -> bool {
         false
     }

@@ -20,6 +20,9 @@ const FATAL: f64 = 100.0;
 /// A gain that is seen once and ends the run.
 const BEYOND_DOUBT: f64 = 1e9;
 
+/// The share of the energy put in that breaking bonds may add without a warning.
+const ADDED_SHARE: f64 = 0.01;
+
 /// The strain below which an energy may be rounding: with it, solids in bulk are at rest.
 const STRAIN_AT_REST: f64 = 1e-9;
 
@@ -30,6 +33,10 @@ pub struct EnergyWatch {
     /// The most that has been put in so far, at the start and by loads and supports, J.
     put_in: f64,
     told: bool,
+    /// The largest energy that breaking bonds had freed at any row, J.
+    most_freed: f64,
+    /// Whether it was said that breaking bonds add energy.
+    told_of_breaking: bool,
     /// Whether the gain was fatal when it was last looked at.
     suspected: bool,
     steps: String,
@@ -50,6 +57,8 @@ impl EnergyWatch {
             floor: STRAIN_AT_REST * STRAIN_AT_REST * reduce(comm, &mut stiffness)[0],
             put_in: 0.0,
             told: false,
+            most_freed: 0.0,
+            told_of_breaking: false,
             suspected: false,
             steps: format!("time step {step:.3e} s, stable {stable:.3e} s"),
         }
@@ -87,5 +96,23 @@ impl EnergyWatch {
         }
         self.told = true;
         Ok(Some(format!("{} ({})", text(), self.steps)))
+    }
+
+    /// Looks at a row of the history; returns a warning the first time that breaking bonds have added more than a share
+    /// of the energy put in. A point whose law depends on the mean motion of its family can store more with fewer bonds.
+    pub fn look_at_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
+        let freed = row.energies.fracture;
+        self.most_freed = self.most_freed.max(freed);
+        let added = self.most_freed - freed;
+        if self.told_of_breaking || added <= ADDED_SHARE * self.put_in {
+            return None;
+        }
+        self.told_of_breaking = true;
+        Some(format!(
+            "t = {:.4e} s: breaking bonds have added {added:.3e} J to the body, {:.0} % of the energy put in. Families of \
+             correspondence laws can store more with fewer bonds; compare with a smaller step, a finer grid, or `ordinary`",
+            clock.time(),
+            100.0 * added / self.put_in,
+        ))
     }
 }

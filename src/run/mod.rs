@@ -276,9 +276,14 @@ impl<'a> Job<'a> {
                     slow = slow && !self.warn_of_inertia(simulation, recorder);
                 }
                 if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
-                    match energy.look(row, &clock) {
-                        Ok(None) => {}
-                        Ok(Some(text)) => self.observer.message(&Message::Warning(text)),
+                    let growth = energy.look(row, &clock);
+                    let of_breaking = energy.look_at_breaking(row, &clock);
+                    match growth {
+                        Ok(text) => {
+                            for text in text.into_iter().chain(of_breaking) {
+                                self.observer.message(&Message::Warning(text));
+                            }
+                        }
                         Err(error) => {
                             recorder.write_failure(simulation)?;
                             return Ok(Left::Failed(error));

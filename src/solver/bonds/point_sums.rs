@@ -65,7 +65,9 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Sums over the intact bonds of the undeformed body what gives a point's constants.
+/// Sums over the bonds of the undeformed body what gives a point's constants: over the intact ones, without those that
+/// pre-cracks cut. A law that needs a shape tensor compares what is left of a family with all of it, so for such laws
+/// the cut bonds count, too.
 #[derive(Clone, Copy)]
 pub struct FamilySum<L> {
     /// The law of the own end.
@@ -78,16 +80,21 @@ impl<L: Law<D>, const D: usize> Kernel<D> for FamilySum<L> {
     type Point = [Lanes; 0];
     type Memory = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const UNDEFORMED: bool = true;
+    const WHOLE: bool = true;
     const VERSIONS: Versions = Versions::Avx2;
     const WANTED: Wanted = growth_only(L::LINEAR);
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::WholeSum) {
+        let counted = if self.law.needs_shape() {
+            group.whole
+        } else {
+            group.intact
+        };
         let share = self.law.whole_share(&group.bond);
         for k in 0..L::WholeSum::COUNT {
             let share = share.get(k) * group.volume * group.weights.own();
-            *sums.get_mut(k) += simd.keep(share, group.intact);
+            *sums.get_mut(k) += simd.keep(share, counted);
         }
     }
 }
