@@ -75,6 +75,8 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Energy at the start, which the error of the balance refers to, J.
     pub first_energy: f64,
+    /// Kinetic energy, J, that loads and prescribed motions can give within a step before they do work.
+    pub step_energy: f64,
     /// Bonds broken since the start.
     pub broken: u64,
 }
@@ -260,12 +262,13 @@ impl HistoryObserver {
         let directed = self.support_forces.iter().map(|(members, _)| members);
         for members in self.reactions.iter().chain(directed) {
             sums.extend(simulation.conditions.reaction(model, fields, members));
+        let step = simulation.clock.step();
+        sums.push(simulation.conditions.step_energy(model, fields, step));
         }
         let sums = reduce(comm, &mut sums);
         let (own, rest) = sums.split_at(3 + D);
-        let ([work, dissipated, overshoot], reactions) =
-            rest.split_first_chunk().expect("three sums");
-        let (work, dissipated, overshoot) = (*work, *dissipated, *overshoot);
+        let (&[work, dissipated, overshoot, step_energy], reactions) =
+            rest.split_first_chunk().expect("four sums");
 
         let cracked = Cracked::new(simulation, snapshot);
         let intact = snapshot.intact();
@@ -360,6 +363,7 @@ impl HistoryObserver {
         let fields = &simulation.fields;
         let mut bits: Vec<u64> = self
             .probes
+            step_energy,
             .iter()
             .flat_map(|probe| {
                 let at = |field: &[Vec<f64>; D], d: usize| {
