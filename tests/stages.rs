@@ -160,3 +160,44 @@ fn a_body_of_nine_times_the_density_moves_a_third_as_fast() {
     assert_eq!(none, None);
     assert_eq!(ratio, Some(scaled.kinetic / scaled.strain));
 }
+
+#[test]
+fn a_stage_may_be_one_step_long_up_to_rounding() {
+    let deck = |stages: &str| {
+        format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [10] }} }}
+            {stages}
+            "
+        )
+    };
+    // 1.2e-7 − 1e-7 is less than 2e-8, and 0.1 + 0.2 is more than 0.3.
+    let short = "time.end = 2.2e-7
+        [[stage]]
+        end = 1e-7
+        step = 1e-8
+        [[stage]]
+        end = 1.2e-7
+        step = 2e-8
+        [[stage]]
+        step = 1e-8";
+    let last = "time.end = 0.3
+        [[stage]]
+        end = 0.2
+        step = 0.1
+        [[stage]]
+        end = '0.1 + 0.2'
+        step = 0.1
+        adaptive = { smallest = '0.1 + 0.2', largest = 0.3 }";
+    for (stages, steps, end) in [(short, 21, 2.2e-7), (last, 3, 0.3)] {
+        simulate(&deck(stages), |mut simulation: Simulation<1>| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            assert_eq!(simulation.clock.number(), steps);
+            assert!((simulation.clock.time() / end - 1.0).abs() < 1e-12);
+        });
+    }
+}
