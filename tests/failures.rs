@@ -469,3 +469,26 @@ fn a_load_that_sets_in_hides_no_blow_up() {
         failing(&mut command, "are the steps too large?", 1);
     }
 }
+
+#[test]
+fn families_that_do_not_fit_in_memory() {
+    let folder = Folder::new("memory");
+    // A law that keeps numbers of bonds, of which a point has some thousands: they take about 1 GB.
+    let deck = folder.write(
+        "deck.toml",
+        "dimension = '3d'
+        grid = { spacing = 1, horizon = 12, volume_correction = 'none' }
+        material.metal.elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 1 }
+        body.block = { material = 'metal', shape.box = { lower = [0, 0, 0], upper = [16, 16, 16] } }
+        time.end = 1
+        ",
+    );
+    for arguments in [&["run", "--threads", "1"][..], &["check"]] {
+        let mut command = Command::new("sh");
+        let limited = "ulimit -v 1000000; exec \"$@\"";
+        command.args(["-c", limited, "sh", env!("CARGO_BIN_EXE_fissure")]);
+        command.args(arguments).arg(&deck).current_dir(&folder.0);
+        let message = "[grid] horizon: with 12 m, 12.0 spacings, bonds, most of them within [body.block], take 0.9";
+        failing(&mut command, message, 2);
+    }
+}

@@ -12,7 +12,7 @@ use crate::refine::Grids;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
-use super::bonds::{Acting, Evolution, ForceTimes, Forces};
+use super::bonds::{Acting, Evolution, ForceTimes, Forces, history_fits};
 use super::conditions::{Conditions, Here, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
@@ -170,7 +170,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let halo = std::mem::take(&mut domain.halo);
         // The points are known to the model from here on.
         drop(domain);
-        let interactions = assign(plan, &model, &blocks, bonds);
+        let interactions = assign(plan, &model, &blocks, bonds)
+            .and_then(|all| history_fits::<D>(&all).map(|()| all))
+            .map_err(|fault| fault.error(plan));
+        let interactions = agree(comm, interactions)?;
         let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
         between()?;
         let stiffness = forces.stiffness(&model);
