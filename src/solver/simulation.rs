@@ -74,6 +74,8 @@ pub struct Simulation<'a, const D: usize> {
     pub grids: Grids<'a>,
     /// What refinements during the run have done.
     pub refined: Refined,
+    /// Kinetic energy that changes of the density scale from stage to stage have added, J.
+    pub density_scale_energy: f64,
     /// Where the time went.
     pub times: Times,
     /// Whether the second half kick of the present step is still to be made.
@@ -232,6 +234,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             kept: Kept::default(),
             grids: refined,
             refined: Refined::default(),
+            density_scale_energy: 0.0,
             times: Times::default(),
             is_halfway: false,
             bad: None,
@@ -425,7 +428,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Finds the power of damping at the present velocities.
-    fn find_damping(&mut self) {
+    pub(super) fn find_damping(&mut self) {
         self.walk(|part, _| {
             part.add_damped_energy(0.0);
             true
