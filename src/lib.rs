@@ -8,6 +8,7 @@ pub mod error;
 pub mod families;
 pub mod lanes;
 pub mod material;
+pub mod memory;
 pub mod output;
 pub mod partition;
 pub mod picture;

@@ -365,3 +365,94 @@ fn defaults_are_the_accurate_ones() {
         assert!(full.contains("volume_correction = \"none\""), "{full}");
     }
 }
+
+/// Number of points of each body, the places of all points (m), and whether all bonds are those of one lattice, of a deck in
+/// the plane with cells of 0.1 m.
+fn filled(grid: &str, bodies: &str) -> (Vec<usize>, Vec<[f64; 3]>, bool) {
+    let text = format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 0.1, horizon = 0.3 {grid} }}
+        material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
+        {bodies}
+        time.end = 1
+        "
+    );
+    let source = Source {
+        path: "deck.toml".into(),
+        text,
+    };
+    let plan = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
+    let comm = threads::alone();
+    let simulation = Simulation::<2>::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}"));
+    let (model, forces) = (&simulation.model, &simulation.forces);
+    let of = |body: usize| {
+        let blocks = model.block.iter();
+        blocks
+            .filter(|block| plan.body_of(usize::from(**block)) == body)
+            .count()
+    };
+    let counts = (0..plan.bodies.len()).map(of).collect();
+    let places = (0..model.owned())
+        .map(|point| model.position(point))
+        .collect();
+    (
+        counts,
+        places,
+        forces.lattice_bonds() == forces.directed_bonds(),
+    )
+}
+
+#[test]
+fn a_body_of_whole_cells_is_filled_exactly() {
+    let body = |name: &str, shape: &str| {
+        format!("body.{name} = {{ material = 'glass', shape.{shape} }}\n")
+    };
+    let centred = body(
+        "a",
+        "box = { lower = [-0.25, -0.15], upper = [0.25, 0.15] }",
+    );
+    let (counts, places, _) = filled("", &centred);
+    assert_eq!(counts, [15]);
+    assert!(
+        places
+            .iter()
+            .any(|place| place.iter().all(|x| x.abs() < 1e-12))
+    );
+    // As before where an origin is given: points on all borders count.
+    assert_eq!(filled(", origin = [0, 0]", &centred).0, [24]);
+
+    // From 0 on, where that fits.
+    let (counts, places, _) = filled(
+        "",
+        &body("a", "box = { lower = [-0.3, 0.1], upper = [0.3, 0.4] }"),
+    );
+    assert_eq!(counts, [18]);
+    for place in places {
+        for x in &place[..2] {
+            let cells = (x / 0.1 - 0.5).round();
+            assert_eq!(*x, (cells + 0.5) * 0.1);
+        }
+    }
+
+    // One grid for all bodies with the same cells: that of the first one whose faces are whole cells apart.
+    let disc = body("disc", "disc = { centre = [-0.6, 0], radius = 0.25 }");
+    let other = body("b", "box = { lower = [0.25, -0.15], upper = [0.65, 0.15] }");
+    let (counts, _, is_lattice) = filled("", &(disc + &centred + &other));
+    assert_eq!(counts[1..], [15, 12]);
+    assert!(is_lattice);
+
+    // Each other size of cells has its own.
+    let coarse = "body.b = { material = 'glass', spacing = 0.15, shape.box = { lower = [0.25, -0.15], upper = [0.7, 0.15] } }";
+    assert_eq!(filled("", &(centred + coarse)).0, [15, 6]);
+
+    // Other shapes with flat faces.
+    let hole = "{ disc = { centre = [0, 0], radius = 0.04 } }";
+    let outside = "{ box = { lower = [-0.25, -0.15], upper = [0.25, 0.15] } }";
+    let pierced = body("a", &format!("difference = [{outside}, {hole}]"));
+    assert_eq!(filled("", &pierced).0, [14]);
+    let polygon = "polygon.vertices = [[-0.25, -0.15], [0.25, -0.15], [0.25, 0.15], [-0.25, 0.15]]";
+    assert_eq!(filled("", &body("a", polygon)).0, [15]);
+    let far = "{ box = { lower = [0.65, -0.15], upper = [0.85, 0.15] } }";
+    let both = body("a", &format!("union = [{far}, {outside}]"));
+    assert_eq!(filled("", &both).0, [21]);
+}

@@ -556,3 +556,34 @@ fn two_points_that_are_thrown_apart_lose_the_energy_of_their_bond() {
         assert!(late < 2.0 * step / 0.2, "{step}: {lost} {bond}");
     }
 }
+
+#[test]
+fn the_step_follows_the_damping() {
+    // r Δt would be 80, 8 and 0.8 with the stable step.
+    let deck = |rate: f64| {
+        format!(
+            "dimension = 'plane-stress'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5, damping = {rate} }}
+            body.plate = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [12, 8] }} }}
+            initial.push.velocity = ['0.01*x', 0]
+            time.end = 3
+            "
+        )
+    };
+    for rate in [100.0, 10.0, 1.0] {
+        simulate::<2, _>(&deck(rate), |mut simulation| {
+            assert!(rate * simulation.clock.step() <= 0.4);
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let start = row(&mut observer, &mut simulation).energies.kinetic;
+            while !simulation.is_over() {
+                simulation.advance();
+                let now = row(&mut observer, &mut simulation).energies;
+                assert!(now.error.abs() < 0.05 * start, "{rate}: {now:?}");
+                assert!(now.kinetic + now.strain <= 1.01 * start, "{rate}: {now:?}");
+            }
+            let end = row(&mut observer, &mut simulation).energies;
+            assert!(end.kinetic < 0.1 * start, "{rate}: {end:?}");
+        });
+    }
+}

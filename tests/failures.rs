@@ -405,3 +405,90 @@ fn a_motion_that_jumps_is_no_blow_up() {
         .arg(folder.join("out"));
     succeed(&mut command);
 }
+
+/// A strip at rest that is held at one end and pulled at the other.
+fn pulled(pull: &str, more: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+        material.rubber.pmb = {{ density = 1100, youngs_modulus = 3e6 }}
+        body.strip = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [0.03, 0.01] }} }}
+        set.left.where = 'x < 2e-3'
+        set.right.where = 'x > 28e-3'
+        condition.hold = {{ set = 'left', displacement = [0, 0] }}
+        condition.pull = {{ set = 'right', {pull} }}
+        {more}
+        "
+    )
+}
+
+/// Loads and motions that set in while a body is at rest.
+const PULLS: [&str; 6] = [
+    "traction = ['1e5*step(t - 1e-4)', 0]",
+    "traction = ['1e5*min(t/5e-4, 1)', 0]",
+    "body_force = ['1e8*if(t > 1e-4, 1, 0)', 0]",
+    "displacement = ['1e-4*step(t - 1e-4)', 'free']",
+    "velocity = ['step(t - 1e-4)', 'free']",
+    "force = ['sin(t/1e-4)', 0]",
+];
+
+#[test]
+fn a_load_that_sets_in_is_no_blow_up() {
+    let folder = Folder::new("sets-in");
+    // With a row at every step, one sees the load before it has done any work.
+    let each = PULLS.map(|pull| (pull, "history.every_steps = 1"));
+    for (k, (pull, rows)) in each.into_iter().chain([(PULLS[0], "")]).enumerate() {
+        let deck = pulled(pull, &format!("time.end = 3e-4\n{rows}"));
+        let deck = folder.write("deck.toml", &deck);
+        let mut command = fissure(1 + k % 2);
+        command.arg("run").arg(&deck).arg("--overwrite");
+        command.arg("--output").arg(folder.join("out"));
+        let output = finish(&mut command);
+        let printed = text(&output);
+        assert!(output.status.success(), "{pull} {rows}: {printed}");
+        assert!(
+            !printed.contains("the energy has grown"),
+            "{pull} {rows}: {printed}"
+        );
+    }
+}
+
+#[test]
+fn a_load_that_sets_in_hides_no_blow_up() {
+    let folder = Folder::new("sets-in-unstable");
+    let stable =
+        crate::support::simulate::<2, _>(&pulled(PULLS[0], "time.end = 1"), |it| it.stable_step);
+    for pull in [PULLS[0], PULLS[1], PULLS[4]] {
+        let step = 3.0 * stable;
+        let time = format!("time = {{ end = {}, step = {step} }}", 60.0 * step);
+        let deck = pulled(pull, &format!("{time}\nhistory.every_steps = 1"));
+        let deck = folder.write("deck.toml", &deck);
+        let mut command = fissure(1);
+        command.arg("run").arg(&deck).arg("--overwrite");
+        command.arg("--output").arg(folder.join("out"));
+        failing(&mut command, "are the steps too large?", 1);
+    }
+}
+
+#[test]
+fn families_that_do_not_fit_in_memory() {
+    let folder = Folder::new("memory");
+    // A law that keeps numbers of bonds, of which a point has some thousands: they take about 1 GB.
+    let deck = folder.write(
+        "deck.toml",
+        "dimension = '3d'
+        grid = { spacing = 1, horizon = 12, volume_correction = 'none' }
+        material.metal.elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 1 }
+        body.block = { material = 'metal', shape.box = { lower = [0, 0, 0], upper = [16, 16, 16] } }
+        time.end = 1
+        ",
+    );
+    for arguments in [&["run", "--threads", "1"][..], &["check"]] {
+        let mut command = Command::new("sh");
+        let limited = "ulimit -v 1000000; exec \"$@\"";
+        command.args(["-c", limited, "sh", env!("CARGO_BIN_EXE_fissure")]);
+        command.args(arguments).arg(&deck).current_dir(&folder.0);
+        let message = "[grid] horizon: with 12 m, 12.0 spacings, bonds, most of them within [body.block], take 0.9";
+        failing(&mut command, message, 2);
+    }
+}

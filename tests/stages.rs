@@ -1,7 +1,9 @@
 //! Stages of a run: a body relaxed under a load stays at rest when its motion is followed, and springs
 //! back when the load is taken off; and bodies of another density move as they must.
 
-use crate::support::{simulate, simulate_on};
+use crate::support::saved::{state, whole};
+use crate::support::{plan, simulate, simulate_on};
+use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
 
@@ -159,4 +161,171 @@ fn a_body_of_nine_times_the_density_moves_a_third_as_fast() {
     assert!((scaled.kinetic - energies.kinetic).abs() < 1e-9 * energies.kinetic);
     assert_eq!(none, None);
     assert_eq!(ratio, Some(scaled.kinetic / scaled.strain));
+}
+
+#[test]
+fn a_stage_may_be_one_step_long_up_to_rounding() {
+    let deck = |stages: &str| {
+        format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [10] }} }}
+            {stages}
+            "
+        )
+    };
+    // 1.2e-7 − 1e-7 is less than 2e-8, and 0.1 + 0.2 is more than 0.3.
+    let short = "time.end = 2.2e-7
+        [[stage]]
+        end = 1e-7
+        step = 1e-8
+        [[stage]]
+        end = 1.2e-7
+        step = 2e-8
+        [[stage]]
+        step = 1e-8";
+    let last = "time.end = 0.3
+        [[stage]]
+        end = 0.2
+        step = 0.1
+        [[stage]]
+        end = '0.1 + 0.2'
+        step = 0.1
+        adaptive = { smallest = '0.1 + 0.2', largest = 0.3 }";
+    for (stages, steps, end) in [(short, 21, 2.2e-7), (last, 3, 0.3)] {
+        simulate(&deck(stages), |mut simulation: Simulation<1>| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            assert_eq!(simulation.clock.number(), steps);
+            assert!((simulation.clock.time() / end - 1.0).abs() < 1e-12);
+        });
+    }
+}
+
+/// A prescribed velocity on one side of the block.
+const GUIDE: &str = "set.left.where = 'x < 3'
+        condition.guide = { set = 'left', velocity = [0.1, 'free'] }";
+
+/// A block that flies and is pulled along, with its velocity prescribed on one side or not, and with damping or not; its
+/// density scale goes from 1 to 4, and to 0.5.
+fn flying(damping: f64, support: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5, damping = {damping} }}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [8, 6] }} }}
+        initial.flight.velocity = ['0.1 + 0.01*y', 0.05]
+        {support}
+        time = {{ end = 12, safety = 0.05 }}
+        [[stage]]
+        end = 4
+        [[stage]]
+        end = 8
+        density_scale = 4
+        [[stage]]
+        density_scale = 0.5
+        "
+    )
+}
+
+/// The values of a column of the history after each step.
+fn column(observer: &HistoryObserver, rows: &[Vec<f64>], name: &str) -> Vec<f64> {
+    let columns = observer.columns();
+    let index = columns.iter().position(|column| column.0 == name).unwrap();
+    rows.iter().map(|row| row[index]).collect()
+}
+
+#[test]
+fn a_change_of_density_keeps_momentum_and_books_energy() {
+    for (damping, support, free) in [(0.0, "", true), (0.02, "", false), (0.02, GUIDE, false)] {
+        let deck = flying(damping, support);
+        assert_eq!(
+            plan_warnings(&deck),
+            [
+                "density_scale: changes from 1 to 4 at t = 4 s",
+                "density_scale: changes from 4 to 0.5 at t = 8 s",
+            ]
+        );
+        simulate(&deck, |mut simulation: Simulation<2>| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let mut rows = Vec::new();
+            loop {
+                let snapshot = Snapshot::new(&mut simulation);
+                rows.push(observer.row(&mut simulation, &snapshot).values);
+                if simulation.is_over() {
+                    break;
+                }
+                simulation.advance();
+            }
+            let of = |name: &str| column(&observer, &rows, name);
+            let (kinetic, error) = (of("kinetic_energy"), of("energy_error"));
+            let most = kinetic.iter().copied().fold(0.0, f64::max);
+            let worst = error.iter().fold(0.0_f64, |worst, e| worst.max(e.abs()));
+            assert!(
+                worst < 1e-3 * most,
+                "{damping} {support}: {worst:e} of {most:e}"
+            );
+            let added = of("density_scale_energy");
+            let last = added.len() - 1;
+            assert_eq!(added[1], 0.0);
+            assert!(added[last].abs() > 0.1 * most, "{} of {most}", added[last]);
+            if free {
+                for name in ["momentum_x", "momentum_y"] {
+                    let momentum = of(name);
+                    for later in &momentum {
+                        assert!((later / momentum[0] - 1.0).abs() < 1e-12, "{name}: {later}");
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// The warnings of a deck, without places and from the key on up to the first semicolon.
+fn plan_warnings(deck: &str) -> Vec<String> {
+    let short = |warning: &String| {
+        let text = warning
+            .split_once("]] ")
+            .map_or(&warning[..], |(_, text)| text);
+        text.split(';').next().unwrap_or_default().to_owned()
+    };
+    plan(deck).warnings.iter().map(short).collect()
+}
+
+#[test]
+fn a_change_of_density_is_the_same_on_any_ranks_and_after_a_restart() {
+    let deck = flying(0.02, GUIDE);
+    let plan = plan(&deck);
+    let run = |ranks: usize, stop: u64| {
+        whole(threads::run(ranks, |comm: &dyn Communicator| {
+            let mut simulation = Simulation::<2>::new(&plan, comm).unwrap();
+            while !simulation.is_over() {
+                if simulation.clock.number() == stop {
+                    let (order, saved) = state(&simulation);
+                    simulation = Simulation::new(&plan, comm).unwrap();
+                    simulation.restore(&order, &saved).unwrap();
+                }
+                simulation.advance();
+            }
+            state(&simulation).1
+        }))
+    };
+    let steps = simulate(&deck, |simulation: Simulation<2>| simulation.last_step());
+    let one = run(1, u64::MAX);
+    let at_change = simulate(&deck, |mut simulation: Simulation<2>| {
+        while !simulation.is_stage_over() {
+            simulation.advance();
+        }
+        simulation.clock.number()
+    });
+    for (ranks, stop) in [
+        (3, u64::MAX),
+        (1, at_change),
+        (2, at_change + 1),
+        (2, steps - 1),
+    ] {
+        assert_eq!(run(ranks, stop), one, "{ranks} ranks, stopped at {stop}");
+    }
 }

@@ -86,6 +86,85 @@ pub fn bodies(
         })
     })
     .and_then(|bodies| rows_are_taken_once(scope, bodies.into_values().collect()))
+    .map(|mut bodies| {
+        if deck.grid.get_ref().origin.is_none() {
+            anchor(&mut bodies, scope.dimension);
+        }
+        bodies
+    })
+}
+
+/// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their points
+/// stay aligned. In each direction it is 0, unless the first body whose flat faces are whole cells apart would not be
+/// filled exactly; then it is the lower face of that body.
+fn anchor(bodies: &mut [plan::Body], dimension: usize) {
+    let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
+    for index in 0..bodies.len() {
+        let plan::PointSource::Lattice { spacing, .. } = bodies[index].points else {
+            continue;
+        };
+        let known = anchors.iter().find(|(of, _)| *of == spacing);
+        let anchor = known.map_or_else(
+            || {
+                let shapes = || same_cells(bodies, spacing);
+                let along =
+                    |k: usize| shapes().find_map(|shape| anchor_along(shape, spacing[k], k));
+                std::array::from_fn(|k| (k < dimension).then(|| along(k)).flatten().unwrap_or(0.0))
+            },
+            |(_, anchor)| *anchor,
+        );
+        anchors.push((spacing, anchor));
+        if let plan::PointSource::Lattice { origin, .. } = &mut bodies[index].points {
+            *origin = anchor;
+        }
+    }
+}
+
+/// The shapes of the bodies with cells of these edges (m).
+fn same_cells(bodies: &[plan::Body], edges: [f64; 3]) -> impl Iterator<Item = &plan::Shape> {
+    bodies.iter().filter_map(move |body| match &body.points {
+        plan::PointSource::Lattice { shape, spacing, .. } => (*spacing == edges).then_some(shape),
+        plan::PointSource::File { .. } => None,
+    })
+}
+
+/// The share of a cell's edge by which a number of cells may differ from a whole one.
+const WHOLE: f64 = 1e-6;
+
+/// Where cells with an edge (m) begin that fill a shape exactly along an axis, m: 0 if they may begin there. `None` for a
+/// shape that is not a whole number of cells long between two flat faces.
+fn anchor_along(shape: &plan::Shape, edge: f64, axis: usize) -> Option<f64> {
+    let [lower, upper] = flat_faces(shape, axis)?;
+    let is_whole = |length: f64| {
+        let cells = length / edge;
+        (cells - cells.round()).abs() < WHOLE
+    };
+    is_whole(upper - lower).then_some(if is_whole(lower) { 0.0 } else { lower })
+}
+
+/// Where a shape begins and ends along an axis, m, if it does so with flat faces.
+fn flat_faces(shape: &plan::Shape, axis: usize) -> Option<[f64; 2]> {
+    match shape {
+        plan::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
+        plan::Shape::Prism { bottom, top, .. } if axis == 2 => Some([*bottom, *top]),
+        plan::Shape::Prism { vertices, .. } => {
+            let places = || vertices.iter().map(|vertex| vertex[axis]);
+            Some([
+                places().fold(f64::INFINITY, f64::min),
+                places().fold(f64::NEG_INFINITY, f64::max),
+            ])
+        }
+        plan::Shape::Cylinder { from, to, .. } => {
+            let is_along = (0..3).all(|k| k == axis || from[k] == to[k]);
+            is_along.then_some([from[axis].min(to[axis]), from[axis].max(to[axis])])
+        }
+        plan::Shape::Ball { .. } => None,
+        plan::Shape::Union(parts) => parts
+            .iter()
+            .map(|part| flat_faces(part, axis))
+            .reduce(|a, b| Some([a?[0].min(b?[0]), a?[1].max(b?[1])]))?,
+        plan::Shape::Difference(parts) => flat_faces(&parts[0], axis),
+    }
 }
 
 /// An error if a body asks for rows of a point file that an earlier one takes.

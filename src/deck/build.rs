@@ -187,6 +187,12 @@ impl Plan {
         stages.any(|stage| stage.time.density_scale != 1.0)
     }
 
+    /// Whether a stage that follows the equation of motion has another density scale than the one before it, which does so
+    /// too.
+    pub fn changes_density_scale(&self) -> bool {
+        self.stages.windows(2).any(changes_density_scale)
+    }
+
     /// Adds an initial velocity (m/s) of a set, given by its index: an expression a component.
     pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
         self.initials.push(Initial {
@@ -282,4 +288,11 @@ impl Expression {
         let parsed = Self::parse(text, &|_| None, &[], variables);
         parsed.map_err(|error| Error::input(format!("`{text}`: {error}")))
     }
+}
+
+/// Whether two stages in a row follow the equation of motion with different density scales.
+pub(super) fn changes_density_scale(pair: &[Stage]) -> bool {
+    let [before, after] = [&pair[0].time, &pair[1].time];
+    let moves = !before.is_relaxation() && !after.is_relaxation();
+    moves && before.density_scale != after.density_scale
 }

@@ -1,11 +1,13 @@
-//! What a deck may say but most likely does not mean: names that nothing uses, and conditions that are
-//! none.
+//! What a deck may say but most likely does not mean: names that nothing uses, conditions that are none, and stages that
+//! change the mass of moving points.
 
 use indexmap::IndexSet;
 use toml::Value;
 
+use super::build::changes_density_scale;
 use super::expression::Expression;
 use super::grammar::{Damage, Deck};
+use super::number::shown;
 use super::plan::{Plan, Selector};
 use super::source::Source;
 use crate::error::{Error, Result};
@@ -50,6 +52,19 @@ pub fn doubts(source: &Source, deck: &Deck, plan: &Plan) -> Result<Vec<String>> 
             );
             warnings.push(source.warning(set.span.clone(), message));
         }
+    }
+    let pairs = plan.stages.windows(2).zip(deck.stage.iter().skip(1));
+    for (pair, table) in pairs.filter(|(pair, _)| changes_density_scale(pair)) {
+        let [before, after] = [0, 1].map(|k| pair[k].time.density_scale);
+        let message = format!(
+            "[[stage]] density_scale: changes from {} to {} at t = {} s; moving points keep their momentum, so their \
+             velocities and their kinetic energy are multiplied by {} (column `density_scale_energy` of the history)",
+            shown(before),
+            shown(after),
+            shown(pair[0].time.end),
+            shown(before / after),
+        );
+        warnings.push(source.warning(table.span(), message));
     }
     Ok(warnings)
 }

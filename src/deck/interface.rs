@@ -123,7 +123,7 @@ fn one_micromodulus(
         key.map_or(String::new(), |key| format!(" with a `{key}`"))
     };
     let message = format!(
-        "{key}: one micromodulus for both ends needs the same bond-based law in both bodies, but \
+        "{key}: one micromodulus for both ends needs the same bond-based law in both bodies (a state-based law has none), but \
          [body.{}] is `{first}`{} and [body.{}] is `{second}`{}; take `own`",
         pair[0].name,
         with_key(pair[0]),

@@ -8,6 +8,9 @@ use super::plan::{self, Method, StepRule};
 use super::resolve::{Scope, find};
 use crate::error::Result;
 
+/// The share by which times that are computed in different ways may differ.
+const UP_TO_ROUNDING: f64 = 1e-9;
+
 /// A stretch of time with the keys of `[time]` or of a stage.
 struct Stretch<'a> {
     /// The table, as messages name it.
@@ -126,15 +129,16 @@ fn stage_end(
         return Err(scope.error(table.span(), message));
     };
     let end = scope.positive(number, "[[stage]] end")?;
-    let words = if end <= start {
+    let about = |other: f64| (end - other).abs() <= UP_TO_ROUNDING * whole;
+    let words = if end <= start || about(start) {
         format!("must be after its start, {} s", shown(start))
-    } else if is_last && end != whole {
+    } else if is_last && !about(whole) {
         let whole = shown(whole);
         format!("the last stage ends with the run, [time] end = {whole} s; leave it out here")
-    } else if !is_last && end >= whole {
+    } else if !is_last && (end >= whole || about(whole)) {
         format!("must be before the end of the run, {} s", shown(whole))
     } else {
-        return Ok(end);
+        return Ok(if is_last { whole } else { end });
     };
     let message = format!("[[stage]] end: {words}, is {} s", shown(end));
     Err(scope.error(number.span(), message))
@@ -196,7 +200,7 @@ impl Stretch<'_> {
         let step = scope.positive(number, &key)?;
         let words = if self.method == grammar::Method::Relaxation {
             "relaxation has load steps, `relaxation.load_steps` of them".to_owned()
-        } else if step > self.length {
+        } else if step > self.length * (1.0 + UP_TO_ROUNDING) {
             let (step, length) = (shown(step), shown(self.length));
             let whole = if self.key == "[time]" { "run" } else { "stage" };
             format!("{step} s is longer than the {whole}, {length} s")
@@ -229,7 +233,7 @@ impl Stretch<'_> {
             step(&rule.largest, "largest")?,
         );
         if let (Some(low), Some(high), Some(number)) = (smallest, largest, &rule.smallest)
-            && low > high
+            && low > high * (1.0 + UP_TO_ROUNDING)
         {
             let (low, high) = (shown(low), shown(high));
             let message = format!("{key} smallest: {low} s is more than `largest`, {high} s");

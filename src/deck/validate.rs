@@ -77,10 +77,13 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
 
 fn places(deck: &Deck) -> plan::Places {
     let time = deck.time.get_ref();
+    let of_stages = deck.stage.iter().map(|stage| &stage.get_ref().adaptive);
+    let mut adaptive = std::iter::once(&time.adaptive).chain(of_stages).flatten();
     plan::Places {
         horizon: deck.grid.get_ref().horizon.span(),
         end: time.end.span(),
         step: time.step.as_ref().unwrap_or(&time.end).span(),
+        adaptive: adaptive.next().map_or(time.end.span(), Spanned::span),
     }
 }
 

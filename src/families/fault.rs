@@ -1,8 +1,9 @@
 //! What can be wrong with points so that they cannot be bonded.
 
-use crate::deck::plan::PointSource;
+use crate::deck::plan::{Body, PointSource};
 use crate::deck::{Plan, shown};
 use crate::error::Error;
+use crate::memory::Shortage;
 use crate::points::Point;
 
 /// The most neighbours of a point; a horizon of 16 spacings has as many in 3-D, one of 80 in the plane.
@@ -22,6 +23,13 @@ pub enum Fault {
         /// The horizon in spacings of the neighbours, if they lie on a lattice.
         spacings: Option<f64>,
     },
+    /// Bonds do not fit in memory.
+    TooLittleMemory {
+        /// The blocks that most of them join.
+        blocks: [usize; 2],
+        /// What the bonds take, and what there is.
+        shortage: Shortage,
+    },
     /// The layout of a grid has too many places without a point.
     TooManyHoles,
 }
@@ -36,6 +44,9 @@ impl Fault {
                 neighbours,
                 spacings,
             } => too_many_neighbours(plan, *blocks, *neighbours, *spacings),
+            Self::TooLittleMemory { blocks, shortage } => {
+                too_little_memory(plan, *blocks, *shortage)
+            }
             Self::TooManyHoles => Error::run(
                 "a rank's part of a grid has too many holes for a lattice (2³¹ places at most); \
                  use more ranks or `family = \"list\"`",
@@ -70,6 +81,39 @@ fn rounded(value: f64) -> String {
     shown((value / unit).round() * unit)
 }
 
+/// The key that gives a body its horizon.
+fn horizon_key(plan: &Plan, body: &Body) -> String {
+    if body.horizon_place == plan.places.horizon {
+        "[grid] horizon".to_owned()
+    } else {
+        format!("[body.{}] horizon", body.name)
+    }
+}
+
+fn too_little_memory(plan: &Plan, blocks: [usize; 2], shortage: Shortage) -> Error {
+    let [near, other] = blocks.map(|block| plan.block(block));
+    let (body, other) = (near.body, other.body);
+    let spacings = match &body.points {
+        PointSource::Lattice { spacing, .. } => {
+            format!(", {:.1} spacings,", body.horizon / spacing[0])
+        }
+        PointSource::File { .. } => String::new(),
+    };
+    let ends = if body.name == other.name {
+        format!("within [body.{}]", body.name)
+    } else {
+        format!("from [body.{}] to [body.{}]", body.name, other.name)
+    };
+    let [needed, available] = [shortage.needed, shortage.available].map(|x| x as f64 / 1e9);
+    let message = format!(
+        "{}: with {} m{spacings} bonds, most of them {ends}, take {needed:.2} GB of memory on a rank, where \
+         {available:.2} GB are left; take a shorter horizon, a larger spacing or more nodes",
+        horizon_key(plan, body),
+        shown(near.horizon),
+    );
+    plan.source.error(body.horizon_place.clone(), message)
+}
+
 fn too_many_neighbours(
     plan: &Plan,
     blocks: [usize; 2],
@@ -78,11 +122,7 @@ fn too_many_neighbours(
 ) -> Error {
     let [near, other] = blocks.map(|block| plan.block(block));
     let (body, other) = (near.body, other.body);
-    let key = if body.horizon_place == plan.places.horizon {
-        "[grid] horizon".to_owned()
-    } else {
-        format!("[body.{}] horizon", body.name)
-    };
+    let key = horizon_key(plan, body);
     // The horizon itself, where the longest bond may be longer: cells are shared.
     let spacings = match &other.points {
         PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),

@@ -13,7 +13,7 @@ use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 /// each pair of blocks, row by row, and is symmetric.
 ///
 /// # Errors
-/// When two points lie at the same place, or one would have too many neighbours.
+/// When two points lie at the same place, one would have too many neighbours, or there is not enough memory.
 pub fn find(
     domain: &Domain,
     frames: &[GridFrame],
@@ -74,7 +74,7 @@ pub fn find(
         }
         if let Some(index) = shared(pair) {
             let grid = grids[index].clone();
-            let lattice = BondLattice::new(index, grid, domain, ends, *cutoff, dimension);
+            let lattice = BondLattice::new(index, grid, domain, ends, *cutoff, dimension)?;
             if !lattice.is_empty() {
                 families.push(BlockBonds::Lattice(lattice));
             }

@@ -7,8 +7,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::lanes::WIDTH;
+use crate::memory::check_room;
 use crate::partition::Domain;
 
+use super::fault::Fault;
 use super::grid::Grid;
 use super::offset::{Offset, offsets};
 use super::store::{Store, bit_bytes};
@@ -49,6 +51,9 @@ pub struct BondLattice {
 
 impl BondLattice {
     /// The bonds between two blocks on a grid of `dimension` dimensions; `cutoff` (m) is the longest.
+    ///
+    /// # Errors
+    /// When there is not enough memory for them.
     pub fn new(
         index: usize,
         grid: Arc<Grid>,
@@ -56,11 +61,15 @@ impl BondLattice {
         blocks: [usize; 2],
         cutoff: f64,
         dimension: usize,
-    ) -> Self {
+    ) -> Result<Self, Fault> {
         let (offsets, around) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
-        let mut shifts = vec![0; grid.lines.len() * around.len()];
         // A body whose points are farther apart than its bonds reach has none.
         let none = offsets.is_empty();
+        let vectors = if none { Vec::new() } else { vectors(&grid) };
+        let shift_bytes = size_of::<i32>() * grid.lines.len() * around.len();
+        let bytes = shift_bytes as u64 + vectors.len() as u64 * offsets.len() as u64;
+        check_room(bytes).map_err(|shortage| Fault::TooLittleMemory { blocks, shortage })?;
+        let mut shifts = vec![0; grid.lines.len() * around.len()];
         let origin = |line: &super::grid::Line| line.start as i64 - line.first;
         for (line, shifts) in grid
             .lines
@@ -88,7 +97,7 @@ impl BondLattice {
             own_volume: volume(here),
             offsets,
             weighted: [false; 2],
-            vectors: if none { Vec::new() } else { vectors(&grid) },
+            vectors,
             around,
             shifts,
             store: Store::default(),
@@ -96,7 +105,7 @@ impl BondLattice {
             grid,
         };
         lattice.find_bonds();
-        lattice
+        Ok(lattice)
     }
 
     /// Sets all bits of bonds and keeps the vectors that have any.

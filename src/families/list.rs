@@ -155,6 +155,11 @@ impl BondList {
         }
     }
 
+    /// Bytes that [`Self::weigh`] takes for so many ends.
+    pub fn weight_bytes(&self, ends: usize) -> u64 {
+        (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
+    }
+
     /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let mut breakable = vec![u8::MAX; self.neighbours.len()];

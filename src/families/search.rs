@@ -5,6 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::lanes::WIDTH;
+use crate::memory::check_room;
 use crate::partition::Domain;
 use crate::points::bins::Bins;
 use crate::points::{Point, distance_squared};
@@ -96,7 +97,7 @@ struct Chunk {
 /// pair of them, row by row, and is symmetric.
 ///
 /// # Errors
-/// When two points lie at the same place, or one has too many neighbours.
+/// When two points lie at the same place, one has too many neighbours, or there is not enough memory.
 pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>, Fault> {
     let order = Order::new(&domain.points, blocks, cutoffs);
     let squares: Vec<f64> = cutoffs.iter().map(|cutoff| cutoff * cutoff).collect();
@@ -119,6 +120,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
         for chunk in &wave {
             append(&mut lists, domain, blocks, chunk);
         }
+        let done = (first + WAVE * CHUNK).min(domain.owned);
+        fits(&lists, done as f64 / domain.owned as f64)?;
     }
     lists.retain(|list| !list.is_empty());
     for list in &mut lists {
@@ -130,6 +133,17 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
         list.reach = largest.map_or(0, |index| index as usize + 1);
     }
     Ok(lists)
+}
+
+/// An error if lists do not fit in memory that grow as they have so far, with this share of all points.
+fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
+    let bytes: usize = lists.iter().map(BondList::bytes).sum();
+    let to_come = bytes as f64 * (1.0 / done - 1.0);
+    check_room(to_come as u64).map_err(|shortage| {
+        let largest = lists.iter().max_by_key(|list| list.bytes());
+        let blocks = largest.map_or([0; 2], |list| [list.here, list.there]);
+        Fault::TooLittleMemory { blocks, shortage }
+    })
 }
 
 impl Chunk {
@@ -286,6 +300,21 @@ mod tests {
         };
         assert_eq!(a.id.min(b.id), 0);
         assert_eq!(a.id.max(b.id), 1);
+    }
+
+    #[test]
+    fn lists_that_will_not_fit_in_memory_are_an_error() {
+        let points: Vec<Point> = (0..9)
+            .map(|k| Point::new(k, [k as f64, 0.0, 0.0], 1.0, 0))
+            .collect();
+        let domain = distribute(&threads::alone(), points, 9, 2.0).unwrap();
+        let lists = search(&domain, 1, &[2.0]).unwrap();
+        assert_eq!(fits(&lists, 1e-3), Ok(()));
+        let fault = fits(&lists, 1e-18).unwrap_err();
+        assert!(
+            matches!(fault, Fault::TooLittleMemory { blocks: [0, 0], .. }),
+            "{fault:?}"
+        );
     }
 
     #[test]

@@ -35,6 +35,11 @@ impl Store {
         self.numbers = vec![Lanes::splat(0.0); width * self.intact.len()];
     }
 
+    /// Bytes that so many numbers a bond take.
+    pub fn history_bytes(&self, width: usize) -> u64 {
+        (width * self.intact.len() * size_of::<Lanes>()) as u64
+    }
+
     /// Some of the groups.
     pub fn groups(&mut self, range: Range<usize>) -> Groups<'_> {
         let numbers = self.width * range.start..self.width * range.end;

@@ -13,8 +13,7 @@ use crate::solver::observers::HistoryRow;
 /// times over.
 const TOLD: f64 = 1.0;
 
-/// A gain of so many times the energy that was put in ends the run, if it is seen twice in a row: where a
-/// prescribed motion jumps, its points have a speed for two steps that no work accounts for.
+/// A gain of so many times the energy that was put in ends the run, if it is seen twice in a row.
 const FATAL: f64 = 100.0;
 
 /// A gain that is seen once and ends the run.
@@ -73,7 +72,8 @@ impl EnergyWatch {
         let (start, work) = (row.first_energy, row.energies.work);
         // Bonds that were seen to give energy by breaking hide what has been gained.
         let gain = row.energies.error - row.energies.fracture.min(0.0);
-        self.put_in = self.put_in.max(start.abs() + work.abs());
+        let put_in = start.abs() + work.abs() + row.step_energy;
+        self.put_in = self.put_in.max(put_in);
         let share = gain / self.put_in.max(self.floor);
         let text = || {
             format!(

@@ -6,8 +6,9 @@ use crate::deck::plan::{
 };
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
-use crate::families::{BlockBonds, CellShare};
+use crate::families::{BlockBonds, CellShare, Fault};
 use crate::material::{Built, Given, PairLaw};
+use crate::memory::check_room;
 use crate::points::distance_squared;
 
 use super::bonds::{BlockLaws, Interaction};
@@ -255,12 +256,15 @@ fn criterion(
 }
 
 /// Gives the bonds between two blocks their laws, criterion and weights.
+///
+/// # Errors
+/// When there is not enough memory for the weights.
 pub fn assign<const D: usize>(
     plan: &Plan,
     model: &Model<D>,
     blocks: &[BlockLaws],
     all: Vec<BlockBonds>,
-) -> Vec<Interaction> {
+) -> std::result::Result<Vec<Interaction>, Fault> {
     let per_point = blocks
         .iter()
         .any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
@@ -276,16 +280,16 @@ pub fn assign<const D: usize>(
                 share: cell_share(plan, &other, horizon),
             }
         });
-        weigh(plan, model, &mut bonds, &ends);
+        weigh(plan, model, &mut bonds, &ends)?;
         let horizons = ends.each_ref().map(|end| end.horizon);
         let criterion = criterion(plan, blocks, indices, horizons, per_point);
         let [own, far] = ends.map(|end| end.built.law);
-        Interaction {
+        Ok(Interaction {
             bonds,
             laws: PairLaw::new(own, far),
             criterion,
             influence: plan.volume_correction == VolumeCorrection::None,
-        }
+        })
     };
     all.into_iter().map(give).collect()
 }
@@ -311,12 +315,17 @@ impl End {
 }
 
 /// Sets the weights of the bonds between two blocks, unless they are all 1.
-fn weigh<const D: usize>(plan: &Plan, model: &Model<D>, bonds: &mut BlockBonds, ends: &[End; 2]) {
+fn weigh<const D: usize>(
+    plan: &Plan,
+    model: &Model<D>,
+    bonds: &mut BlockBonds,
+    ends: &[End; 2],
+) -> std::result::Result<(), Fault> {
     let plain = plan.volume_correction == VolumeCorrection::None
         && ends[0].horizon == ends[1].horizon
         && ends.iter().all(|end| end.built.influence.is_none());
     if plain {
-        return;
+        return Ok(());
     }
     // The far end of bonds within a block has the same weights.
     let [here, there] = bonds.blocks();
@@ -328,6 +337,10 @@ fn weigh<const D: usize>(plan: &Plan, model: &Model<D>, bonds: &mut BlockBonds, 
             }
         }
         BlockBonds::List(list) => {
+            check_room(list.weight_bytes(count)).map_err(|shortage| Fault::TooLittleMemory {
+                blocks: [here, there],
+                shortage,
+            })?;
             let offset = |here: usize, there: usize| {
                 let [a, b] = [here, there].map(|point| model.position(point));
                 std::array::from_fn(|k| b[k] - a[k])
@@ -335,4 +348,5 @@ fn weigh<const D: usize>(plan: &Plan, model: &Model<D>, bonds: &mut BlockBonds, 
             list.weigh(count, offset, |k, offset| ends[k].weight(offset));
         }
     }
+    Ok(())
 }

@@ -12,7 +12,7 @@ use crate::refine::Grids;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
-use super::bonds::{Acting, Evolution, ForceTimes, Forces};
+use super::bonds::{Acting, Evolution, ForceTimes, Forces, history_fits};
 use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
@@ -74,6 +74,8 @@ pub struct Simulation<'a, const D: usize> {
     pub grids: Grids<'a>,
     /// What refinements during the run have done.
     pub refined: Refined,
+    /// Kinetic energy that changes of the density scale from stage to stage have added, J.
+    pub density_scale_energy: f64,
     /// Where the time went.
     pub times: Times,
     /// Whether the second half kick of the present step is still to be made.
@@ -170,7 +172,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let halo = std::mem::take(&mut domain.halo);
         // The points are known to the model from here on.
         drop(domain);
-        let interactions = assign(plan, &model, &blocks, bonds);
+        let interactions = assign(plan, &model, &blocks, bonds)
+            .and_then(|all| history_fits::<D>(&all).map(|()| all))
+            .map_err(|fault| fault.error(plan));
+        let interactions = agree(comm, interactions)?;
         let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
         between()?;
         let family_volume = Repeated::new(forces.intact_families(&model).volume);
@@ -230,6 +235,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             kept: Kept::default(),
             grids: refined,
             refined: Refined::default(),
+            density_scale_energy: 0.0,
             times: Times::default(),
             is_halfway: false,
             bad: None,
@@ -423,7 +429,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Finds the power of damping at the present velocities.
-    fn find_damping(&mut self) {
+    pub(super) fn find_damping(&mut self) {
         self.walk(|part, _| {
             part.add_damped_energy(0.0);
             true

@@ -1,5 +1,7 @@
 //! Stages of a run: each with its method, its end, and the loads and supports that act.
 
+use crate::comm::sum::{ExactSum, reduce};
+
 use super::Simulation;
 use super::motion::Clock;
 use super::motion::fields::Fields;
@@ -39,7 +41,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// one.
     pub(super) fn begin_stage(&mut self, stage: usize) {
         self.complete_step();
-        let relaxed = self.relaxes();
+        let (relaxed, scale) = (self.relaxes(), self.time_rule().density_scale);
         self.enter(stage);
         let (step, _) = self.steps[stage];
         self.clock.set_stage(step, self.time_rule().end);
@@ -55,9 +57,44 @@ impl<const D: usize> Simulation<'_, D> {
         components.for_each(|component| component.fill(0.0));
         let clock = self.clock;
         self.load(clock.time(), true);
-        if !self.guide() {
+        let mut finite = self.guide();
+        let factor = self.time_rule().density_scale / scale;
+        if factor != 1.0 && !relaxed && !self.relaxes() {
+            finite &= self.keep_momentum(factor);
+        }
+        if !finite {
             self.note_bad(&clock);
         }
+    }
+
+    /// Keeps the momentum of all points after their densities have been multiplied by a factor, but for components of
+    /// motion that are prescribed, and books the change of kinetic energy. Returns whether all is finite. Collective.
+    ///
+    /// With momentum kept no force acts at the change: keeping velocities would need an impulse, and keeping kinetic
+    /// energy an impulse that depends on the frame of reference.
+    fn keep_momentum(&mut self, factor: f64) -> bool {
+        let before = self.kinetic_energy() / factor;
+        let components = self.fields.velocity.iter_mut();
+        components
+            .flatten()
+            .for_each(|velocity| *velocity /= factor);
+        let finite = self.guide();
+        self.find_damping();
+        self.density_scale_energy += self.kinetic_energy() - before;
+        finite
+    }
+
+    /// Kinetic energy over all ranks, J. Collective.
+    fn kinetic_energy(&self) -> f64 {
+        let model = &self.model;
+        let mut sum = [ExactSum::ZERO];
+        for point in 0..model.owned() {
+            let mass = model.density_of(point) * model.volume[point];
+            let velocity = self.fields.velocity.iter().map(|column| column[point]);
+            let square: f64 = velocity.map(|component| component * component).sum();
+            sum[0].add(0.5 * mass * square);
+        }
+        reduce(self.comm, &mut sum)[0]
     }
 
     /// Makes conditions and density those of a stage.

@@ -11,6 +11,8 @@ pub fn alone(plan: &Plan, body: usize) -> Option<(Plan, [f64; 3])> {
     if let Some(damage) = &mut body.damage {
         damage.no_failure.clear();
     }
+    // It is never moved by steps.
+    body.material.damping = 0.0;
     let mut alone = Plan {
         source: plan.source.clone(),
         volume_correction: plan.volume_correction,
@@ -19,7 +21,6 @@ pub fn alone(plan: &Plan, body: usize) -> Option<(Plan, [f64; 3])> {
         bodies: vec![body],
         ..Plan::new(plan.dimension, plan.horizon, 1.0)
     };
-    // It is never moved by steps.
     alone.time.step = StepRule::Fixed(1.0);
     Some((alone, spacing))
 }

@@ -15,7 +15,8 @@ pub struct Grid {
     pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded.
     pub horizon: Number,
-    /// A corner of a lattice cell in m; points lie at the centres of cells. 0 if not given.
+    /// A corner of a lattice cell in m; points lie at the centres of cells. If not given, 0 in each direction, or the lower
+    /// face of the first body that is a whole number of cells long and would not be filled exactly from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
     /// What the volumes of points near the edge of a family count: `"exact"`, `"linear"` or `"none"`; if not

@@ -81,4 +81,6 @@ pub struct Places {
     pub end: Range<usize>,
     /// The time step; the end time if the step is automatic.
     pub step: Range<usize>,
+    /// The first rule of an adaptive step; the end time if there is none.
+    pub adaptive: Range<usize>,
 }

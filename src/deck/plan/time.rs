@@ -34,6 +34,18 @@ pub struct Adaptive {
     pub largest: Option<f64>,
 }
 
+/// The smallest step as a share of the largest, where the deck does not say.
+const SMALLEST_SHARE: f64 = 0.01;
+
+impl Adaptive {
+    /// The smallest and the largest step (s) of a stage for which a step (s) was chosen.
+    pub fn limits(&self, step: f64) -> [f64; 2] {
+        let largest = self.largest.unwrap_or(step);
+        let smallest = self.smallest.unwrap_or(SMALLEST_SHARE * largest);
+        [smallest.min(largest), largest]
+    }
+}
+
 /// A stage of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {

@@ -29,9 +29,10 @@ use std::sync::Arc;
 
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
-use crate::families::{BlockBonds, Grid, Which};
+use crate::families::{BlockBonds, Fault, Grid, Which};
 use crate::lanes::{Instructions, Numbers};
 use crate::material::{Law, with_pair};
+use crate::memory::check_room;
 
 use super::model::Model;
 use grid_points::GridValues;
@@ -60,6 +61,29 @@ enum Pass {
     PointSum(usize),
     /// The forces.
     Force,
+}
+
+/// Numbers that the laws of an interaction keep of a bond.
+fn history_width<const D: usize>(interaction: &Interaction) -> usize {
+    fn width<L: Law<D>, const D: usize>(_: &[L; 2]) -> usize {
+        2 * L::Memory::COUNT
+    }
+    with_pair!(&interaction.laws, laws => width::<_, D>(laws))
+}
+
+/// An error if the numbers that laws keep of bonds do not fit in memory.
+pub fn history_fits<const D: usize>(
+    interactions: &[Interaction],
+) -> std::result::Result<(), Fault> {
+    let bytes = |interaction: &Interaction| {
+        let width = history_width::<D>(interaction);
+        interaction.bonds.store().history_bytes(width)
+    };
+    check_room(interactions.iter().map(bytes).sum()).map_err(|shortage| {
+        let largest = interactions.iter().max_by_key(|it| bytes(it));
+        let blocks = largest.map_or([0; 2], |it| it.bonds.blocks());
+        Fault::TooLittleMemory { blocks, shortage }
+    })
 }
 
 /// The bonds of a rank and what it takes to sum over them.
@@ -112,10 +136,7 @@ impl<const D: usize> Forces<D> {
         let breaks = blocks.iter().any(|block| block.damage.is_some());
         let remembers = (blocks.iter()).any(|block| block.law.counts::<D>().memory > 0);
         for interaction in &mut interactions {
-            fn width<L: Law<D>, const D: usize>(_: &[L; 2]) -> usize {
-                2 * L::Memory::COUNT
-            }
-            let width = with_pair!(&interaction.laws, laws => width::<_, D>(laws));
+            let width = history_width::<D>(interaction);
             interaction.bonds.remember(width);
         }
         let passes = [

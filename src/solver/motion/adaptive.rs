@@ -14,9 +14,6 @@
 use crate::deck::plan::Adaptive;
 use crate::solver::Simulation;
 
-/// The smallest step as a share of the largest, where the deck does not say.
-const SMALLEST_SHARE: f64 = 0.01;
-
 /// How much longer than the step the rest of a stage may be to count as one.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
@@ -38,10 +35,8 @@ pub struct StepControl {
 impl StepControl {
     /// Begins a stage for which a step of this size (s) was chosen.
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
-        let largest = rule.largest.unwrap_or(step);
-        let smallest = rule.smallest.unwrap_or(SMALLEST_SHARE * largest);
-        self.limits = [smallest.min(largest), largest];
-        self.step = step.min(largest);
+        self.limits = rule.limits(step);
+        self.step = step.min(self.limits[1]);
         self.calm = 0;
     }
 

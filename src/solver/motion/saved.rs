@@ -48,6 +48,9 @@ impl<const D: usize> Simulation<'_, D> {
         let steps = self.step_control.words().into_iter();
         let times = stage.chain(clock).chain(steps);
         let refined = self.refined.words().into_iter();
+        let changes = self.plan.changes_density_scale();
+        let scaled = changes.then(|| self.density_scale_energy.to_bits());
+        let refined = refined.chain(scaled);
         times.chain(refined).chain(self.load_step.words()).collect()
     }
 
@@ -56,12 +59,14 @@ impl<const D: usize> Simulation<'_, D> {
         let (stage, rest) = progress.split_at(1);
         let (clock, rest) = rest.split_at(CLOCK);
         let (steps, rest) = rest.split_at(STEP_CONTROL);
-        let (refined, load_step) = rest.split_at(REFINED);
+        let (refined, rest) = rest.split_at(REFINED);
+        let (scaled, load_step) = rest.split_at(usize::from(self.plan.changes_density_scale()));
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
         self.step_control = StepControl::of_words(std::array::from_fn(|k| steps[k]));
         self.refined = Refined::of_words(std::array::from_fn(|k| refined[k]));
+        self.density_scale_energy = scaled.first().copied().map_or(0.0, f64::from_bits);
         self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
     }
 

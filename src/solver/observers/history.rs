@@ -60,7 +60,7 @@ pub struct Energies {
     /// Taken by viscous damping and by bonds that yield.
     pub dissipated: f64,
     /// Kinetic + strain + fracture + dissipated − work, less its value at the start and what refinements
-    /// have added: 0 for an exact integrator.
+    /// and changes of the density scale have added: 0 for an exact integrator.
     pub error: f64,
 }
 
@@ -75,6 +75,8 @@ pub struct HistoryRow {
     pub energies: Energies,
     /// Energy at the start, which the error of the balance refers to, J.
     pub first_energy: f64,
+    /// Kinetic energy, J, that loads and prescribed motions can give within a step before they do work.
+    pub step_energy: f64,
     /// Bonds broken since the start.
     pub broken: u64,
 }
@@ -112,6 +114,9 @@ impl HistoryObserver {
         }
         if plan.scales_density() {
             columns.push(("kinetic_ratio".to_owned(), "1"));
+        }
+        if plan.changes_density_scale() {
+            columns.push(("density_scale_energy".to_owned(), "J"));
         }
         if simulation.may_refine() {
             columns.push(("points".to_owned(), "1"));
@@ -257,15 +262,16 @@ impl HistoryObserver {
         }
         sums.push(dissipated);
         sums.push(sum(fields.overshoot_energy.as_deref().unwrap_or_default()));
+        let step = simulation.clock.step();
+        sums.push(simulation.conditions.step_energy(model, fields, step));
         let directed = self.support_forces.iter().map(|(members, _)| members);
         for members in self.reactions.iter().chain(directed) {
             sums.extend(simulation.conditions.reaction(model, fields, members));
         }
         let sums = reduce(comm, &mut sums);
         let (own, rest) = sums.split_at(3 + D);
-        let ([work, dissipated, overshoot], reactions) =
-            rest.split_first_chunk().expect("three sums");
-        let (work, dissipated, overshoot) = (*work, *dissipated, *overshoot);
+        let (&[work, dissipated, overshoot, step_energy], reactions) =
+            rest.split_first_chunk().expect("four sums");
 
         let cracked = Cracked::new(simulation, snapshot);
         let intact = snapshot.intact();
@@ -288,7 +294,10 @@ impl HistoryObserver {
             overshoot,
             work,
             dissipated,
-            error: energy - first_energy - simulation.refined.energy,
+            error: energy
+                - first_energy
+                - simulation.refined.energy
+                - simulation.density_scale_energy,
         };
         // Refinements add intact bonds, and take some away where horizons become shorter.
         let there_were = first_intact as i64 + simulation.refined.bonds;
@@ -318,6 +327,9 @@ impl HistoryObserver {
         }
         if simulation.plan.scales_density() {
             values.push(energies.kinetic / energies.strain);
+        }
+        if simulation.plan.changes_density_scale() {
+            values.push(simulation.density_scale_energy);
         }
         if self.refines {
             values.extend([simulation.model.total as f64, simulation.refined.energy]);
@@ -351,6 +363,7 @@ impl HistoryObserver {
             number: simulation.clock.number(),
             energies,
             first_energy,
+            step_energy,
             broken,
         }
     }

@@ -25,6 +25,7 @@ use super::assign::cutoffs;
 use super::motion::fields::Birth;
 use super::observers::Snapshot;
 use super::observers::history::point_sums;
+use super::steps::automatic_step;
 use facets::Facets;
 use past::{NOWHERE, Past};
 pub use trigger::{is_possible, may_coarsen};
@@ -178,7 +179,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (time, rule) = (other.clock.time(), other.time_rule());
         if let StepRule::Automatic(safety) = rule.step {
             let rest = rule.end - time;
-            let most = safety * other.scaled_stable_step();
+            let most = automatic_step(other.plan, &rule, safety, other.stable_step);
             other.clock.set_step(rest / (rest / most).ceil());
         }
         other.place(time, 0.0);
