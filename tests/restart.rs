@@ -571,11 +571,22 @@ fn a_full_disc_leaves_the_checkpoint_before() {
     }
     // Something else takes up the rest of the disc.
     let _ = std::fs::write(disc.join("other"), vec![0; 20 << 20]);
-    let output = wait(child);
-    let printed = text(&output);
-    assert_eq!(output.status.code(), Some(1), "{printed}");
-    assert_eq!(printed.matches("error:").count(), 1, "{printed}");
-    assert!(printed.contains("No space left"), "{printed}");
+    let is_full = |output: std::process::Output| {
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{printed}");
+        assert_eq!(printed.matches("error:").count(), 1, "{printed}");
+        assert!(printed.contains("No space left"), "{printed}");
+    };
+    is_full(wait(child));
+    // There is no room for the copy that a later end needs: the result stays where it is.
+    let before = entries(&out);
+    is_full(finish(&mut run(
+        2,
+        &deck,
+        &out,
+        &["--restart", "--set", "end=4e-5"],
+    )));
+    assert_eq!(entries(&out), before);
     std::fs::remove_file(disc.join("other")).unwrap();
     succeed(&mut run(1, &deck, &out, &["--restart"]));
     let whole = folder.join("whole");
@@ -695,6 +706,101 @@ fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
         let reader = ResultReader::open(&result(&out)).unwrap();
         assert_eq!(reader.steps().unwrap(), [1000, 1200, 1400, 1500]);
     }
+}
+
+/// The names in a folder, each with the file's number.
+fn entries(folder: &Path) -> Vec<(std::ffi::OsString, u64)> {
+    use std::os::unix::fs::DirEntryExt;
+
+    let entries = std::fs::read_dir(folder).unwrap().flatten();
+    let mut entries: Vec<_> = entries
+        .map(|entry| (entry.file_name(), entry.ino()))
+        .collect();
+    entries.sort();
+    entries
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_not_called_damaged() {
+    let folder = Folder::new("unreadable");
+    let deck = folder.write("deck.toml", &plate("2e-6", ""));
+    let (out, file) = (folder.join("out"), |name: &str| {
+        folder.join("out").join(name)
+    });
+    succeed(&mut run(1, &deck, &out, &[]));
+    let later = ["--restart", "--set", "end=4e-6"];
+    let refused = |ranks: usize, message: &str| {
+        let before = entries(&out);
+        let output = finish(&mut run(ranks, &deck, &out, &later));
+        let printed = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{printed}");
+        assert_eq!(printed.matches("error:").count(), 1, "{printed}");
+        assert_eq!(printed.matches(message).count(), 1, "{printed}");
+        assert_eq!(entries(&out), before);
+    };
+
+    // As a program has it that writes to the file through HDF5.
+    let writer = std::fs::File::open(result(&out)).unwrap();
+    writer.lock().unwrap();
+    for ranks in [1, 2] {
+        refused(ranks, "result.vtkhdf is locked by another program");
+    }
+    let output = finish(fissure(1).arg("plot").arg(result(&out)));
+    let printed = text(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
+    assert!(printed.contains("is locked by another program"), "{printed}");
+    drop(writer);
+
+    for (name, message) in [
+        ("result.vtkhdf", "result.vtkhdf: cannot read the result"),
+        ("checkpoint_0.h5", "checkpoint_0.h5: the checkpoint cannot be read"),
+    ] {
+        // Permissions do not bind root; these two do.
+        let aside = folder.join("aside");
+        std::fs::rename(file(name), &aside).unwrap();
+        std::os::unix::fs::symlink("not-mounted/file", file(name)).unwrap();
+        refused(1, message);
+        std::fs::remove_file(file(name)).unwrap();
+        std::fs::create_dir(file(name)).unwrap();
+        refused(2, message);
+        std::fs::remove_dir(file(name)).unwrap();
+        std::fs::rename(&aside, file(name)).unwrap();
+    }
+
+    succeed(&mut run(2, &deck, &out, &later));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &later[1..]));
+    assert_eq!(
+        difference(&datasets(&result(&whole)), &datasets(&result(&out))),
+        None
+    );
+}
+
+#[test]
+fn a_refined_region_is_continued_in_its_result() {
+    let folder = Folder::new("region");
+    let more = "refinement = { levels = 1, region.mid = { where = 'x > 0.04' } }";
+    let refined = plate("1e-6", more).replace("step = 1e-8", "step = 5e-9");
+    let deck = folder.write("deck.toml", &refined);
+    let (whole, out) = (folder.join("whole"), folder.join("out"));
+    let later = ["--restart", "--set", "end=2e-6"];
+    succeed(&mut run(1, &deck, &whole, &later[1..]));
+    succeed(&mut run(2, &deck, &out, &[]));
+    let output = finish(&mut run(3, &deck, &out, &later));
+    let printed = text(&output);
+    assert!(output.status.success(), "{printed}");
+    assert!(!printed.contains("a new result begins"), "{printed}");
+    let expected = datasets(&result(&whole));
+    assert!(expected.contains_key("level 0"));
+    assert_eq!(difference(&expected, &datasets(&result(&out))), None);
+
+    // Other points are still found to be others.
+    let some = text.replace("every_steps = 200", "every_steps = 200\nset = 'top'");
+    let some = some.replace("output.every_steps = 200\nset", "output.every_steps = 200\noutput.set");
+    std::fs::write(&deck, some).unwrap();
+    let output = finish(&mut run(1, &deck, &out, &["--restart", "--set", "end=3e-6"]));
+    let printed = text(&output);
+    assert!(printed.contains("other points are asked for"), "{printed}");
 }
 
 #[test]

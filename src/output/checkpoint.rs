@@ -26,6 +26,11 @@ const PART: &str = "checkpoint.part";
 /// Changes with the layout.
 const VERSION: i64 = 8;
 
+/// Whether a name in a folder is in use, also by a link to a file that is missing or cannot be read.
+pub fn is_taken(path: &Path) -> bool {
+    !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
+}
+
 /// A checkpoint but for the state of the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
@@ -127,28 +132,23 @@ impl Checkpoints {
     /// not. Collective.
     ///
     /// # Errors
-    /// When there is none.
+    /// When there is none, or the system does not let one be read: it may be the newest, and the next checkpoint
+    /// would replace it.
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,
         warn: &mut dyn FnMut(String),
     ) -> Result<(Self, PathBuf)> {
         // Rank 0's view counts: a file system may show the others something older.
-        let mut packed = Vec::new();
-        if comm.rank() == 0 {
-            let mut found: Vec<(Option<u64>, u8)> = (0..)
-                .zip(NAMES)
-                .filter(|(_, name)| folder.join(name).exists())
-                .map(|(slot, name)| (seal::number(&folder.join(name)), slot))
-                .collect();
-            // One that is not even sealed may have been the newest.
-            found.sort_by_key(|(number, _)| (number.is_some(), std::cmp::Reverse(*number)));
-            packed = found.into_iter().map(|(_, slot)| slot).collect();
-        }
+        let slots = match comm.rank() {
+            0 => newest_first(folder),
+            _ => Ok(Vec::new()),
+        };
+        let mut packed = agree(comm, slots)?;
         comm.broadcast(0, &mut packed);
         for slot in packed {
             let path = folder.join(NAMES[usize::from(slot)]);
-            if seal::is_intact(comm, &path) {
+            if seal::is_intact(comm, &path)? {
                 let checkpoints = Self {
                     folder: folder.to_owned(),
                     next: 1 - usize::from(slot),
@@ -162,6 +162,20 @@ impl Checkpoints {
             folder.display()
         )))
     }
+}
+
+/// Which of the two checkpoints of a folder exist, in the order of their use.
+fn newest_first(folder: &Path) -> Result<Vec<u8>> {
+    let mut found: Vec<(Option<u64>, u8)> = Vec::new();
+    for (slot, name) in (0..).zip(NAMES) {
+        let path = folder.join(name);
+        if is_taken(&path) {
+            found.push((seal::number(&path)?, slot));
+        }
+    }
+    // One that is not even sealed may have been the newest.
+    found.sort_by_key(|(number, _)| (number.is_some(), std::cmp::Reverse(*number)));
+    Ok(found.into_iter().map(|(_, slot)| slot).collect())
 }
 
 /// Reads a checkpoint's header. Collective.

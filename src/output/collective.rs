@@ -3,6 +3,7 @@
 use super::access::{self, Creation};
 use super::attribute::{Attribute, set_attribute};
 use super::dataset::{Dataset, Rows};
+use super::failure::innermost;
 use super::reserve::Reservation;
 use super::transfer::{self, Transfer};
 use crate::comm::{Communicator, agree, without_confirmation};
@@ -430,11 +431,4 @@ impl Drop for CollectiveFile<'_> {
 
 fn failure(path: &Path, doing: &str, error: &hdf5::Error) -> Error {
     Error::run(format!("{}: {doing}: {}", path.display(), innermost(error)))
-}
-
-/// HDF5's own account of what went wrong first.
-fn innermost(error: &hdf5::Error) -> String {
-    let stack = error.stack();
-    let frame = stack.as_ref().and_then(|frames| frames.last());
-    frame.map_or_else(|| error.to_string(), |frame| frame.desc().to_owned())
 }

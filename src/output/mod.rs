@@ -7,6 +7,7 @@ mod changing;
 pub mod checkpoint;
 mod collective;
 mod dataset;
+mod failure;
 mod field;
 mod history;
 mod read;

@@ -1,11 +1,13 @@
 //! Reading result files, by one process.
 
+use super::failure::{innermost, system_error};
 use super::field::POINT_DATA;
 use super::history::{COLUMNS, HISTORY, SEPARATOR, UNITS};
 use super::vtkhdf::STEPS;
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
+use std::io::ErrorKind::{NotFound, WouldBlock};
 use std::path::{Path, PathBuf};
 
 /// The type of a field's numbers.
@@ -50,6 +52,9 @@ pub struct StoredColumn {
 }
 
 /// A result file open for reading.
+///
+/// Errors are of the kind [`Input`](crate::error::ErrorKind::Input) where the file is missing, damaged or no result,
+/// and of the kind [`Run`](crate::error::ErrorKind::Run) where the system does not let it be read.
 #[derive(Debug)]
 pub struct ResultReader {
     file: hdf5::File,
@@ -63,50 +68,69 @@ impl ResultReader {
     /// Opens a result file.
     ///
     /// # Errors
-    /// There is no such file, it is no HDF5 file, or not a result of Fissure.
+    /// There is no such file, it is no HDF5 file, or not a result of Fissure; another program has locked it, or the
+    /// system does not let it be read.
     pub fn open(path: &Path) -> Result<Self> {
         let problem = |text: &str| Err(Error::input(format!("{}: {text}", path.display())));
         if let Err(error) = std::fs::metadata(path) {
+            if error.kind() != NotFound {
+                return Err(cannot_read(path, &error));
+            }
             return problem(&format!("cannot open the result file: {error}"));
         }
+        let readable = |error: &hdf5::Error| match system_error(error) {
+            Some(cause) => Err(cannot_read(path, &cause)),
+            None => Ok(()),
+        };
         let file = match hdf5::File::open(path) {
             Ok(file) => file,
             Err(error) => {
-                let stack = error.stack();
-                let frame = stack.as_ref().and_then(|frames| frames.last());
-                let cause = frame.map_or_else(|| error.to_string(), |it| it.desc().to_owned());
+                readable(&error)?;
+                let cause = innermost(&error);
                 return problem(&format!("this is not a readable HDF5 file: {cause}"));
             }
         };
-        if !file.link_exists("VTKHDF") {
+        if let Err(error) = file.group("VTKHDF") {
+            readable(&error)?;
             return problem("this HDF5 file is not a result of Fissure: it has no group /VTKHDF");
         }
         let steps = file.group(STEPS).and_then(|group| group.attr("NSteps"));
-        let Ok(steps) = steps.and_then(|attribute| attribute.read_scalar::<i64>()) else {
-            return problem("this VTKHDF file is not a result of Fissure: it has no time steps");
+        let steps = match steps.and_then(|attribute| attribute.read_scalar::<i64>()) {
+            Ok(steps) => steps as usize,
+            Err(error) => {
+                readable(&error)?;
+                let text = "this VTKHDF file is not a result of Fissure: it has no time steps";
+                return problem(text);
+            }
         };
         // A loss of power may have left any of the three numbers as it was before.
-        let rows = ["Values", "Step"].map(|name| {
-            let table = file.dataset(&format!("{STEPS}/{name}"));
-            table.map_or(0, |table| table.size())
-        });
-        let steps = rows.into_iter().fold(steps as usize, usize::min);
+        let mut complete = steps;
+        for name in ["Values", "Step"] {
+            let rows = match file.dataset(&format!("{STEPS}/{name}")) {
+                Ok(table) => table.size(),
+                Err(error) => {
+                    readable(&error)?;
+                    0
+                }
+            };
+            complete = complete.min(rows);
+        }
         let points = file.dataset("/VTKHDF/NumberOfPoints");
-        let points = match points
-            .and_then(|dataset| dataset.read_raw::<u64>())
-            .as_deref()
-        {
-            Ok(points) if !points.is_empty() => points
-                .iter()
-                .map(|count| *count as usize)
-                .collect::<Vec<_>>(),
-            _ => return problem("this VTKHDF file is not a result of Fissure: it has no points"),
+        let counts: Vec<usize> = match points.and_then(|dataset| dataset.read_raw::<u64>()) {
+            Ok(points) => points.into_iter().map(|count| count as usize).collect(),
+            Err(error) => {
+                readable(&error)?;
+                Vec::new()
+            }
         };
+        if counts.is_empty() {
+            return problem("this VTKHDF file is not a result of Fissure: it has no points");
+        }
         Ok(Self {
             file,
             path: path.to_path_buf(),
-            counts: points,
-            steps,
+            counts,
+            steps: complete,
         })
     }
 
@@ -304,12 +328,42 @@ impl ResultReader {
         Ok(values)
     }
 
+    /// Reads all points and values of the first steps.
+    ///
+    /// # Errors
+    /// The file is damaged or has fewer steps.
+    pub fn check(&self, steps: usize) -> Result<()> {
+        let fields = self.fields()?;
+        self.history()?;
+        for step in 0..steps {
+            self.positions(step)?;
+            for field in &fields {
+                self.field(&field.name, step)?;
+            }
+        }
+        Ok(())
+    }
+
     fn damaged(&self, object: &str, error: &hdf5::Error) -> Error {
+        if let Some(cause) = system_error(error) {
+            return cannot_read(&self.path, &cause);
+        }
         let file = self.path.display();
         Error::input(format!(
             "{file}: cannot read {object} of this result file: {error}"
         ))
     }
+}
+
+/// The error for a file that the system does not let be read.
+fn cannot_read(path: &Path, cause: &std::io::Error) -> Error {
+    let path = path.display();
+    Error::run(match cause.kind() {
+        WouldBlock => format!(
+            "{path} is locked by another program that has it open for writing; close it there, then try again"
+        ),
+        _ => format!("{path}: cannot read the result file: {cause}"),
+    })
 }
 
 fn text(object: &hdf5::Location, name: &str) -> hdf5::Result<String> {

@@ -41,35 +41,56 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// The number in the seal of a file, without a look at the rest; `None` where there is no seal.
-pub fn number(path: &Path) -> Option<u64> {
-    let sealed = length(path).ok()?.checked_sub(SEAL_BYTES)?;
-    let mut file = File::open(path).ok()?;
-    file.seek(SeekFrom::Start(sealed)).ok()?;
-    let mut words = [0_u64; 4];
-    for word in &mut words {
-        let mut bytes = [0; 8];
-        file.read_exact(&mut bytes).ok()?;
-        *word = u64::from_le_bytes(bytes);
-    }
-    (words[0] == MAGIC && words[1] == sealed).then_some(words[3])
+/// The number in the seal of a file, without a check of the other bytes; `None` where there is no seal.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn number(path: &Path) -> Result<Option<u64>> {
+    let seal = read_seal(path).map_err(|error| failure(path, &error))?;
+    Ok(seal.map(|seal| seal.number))
 }
 
-/// Whether a file is as it was when it was sealed; one that cannot be read is not. Collective.
-pub fn is_intact(comm: &dyn Communicator, path: &Path) -> bool {
-    let seal = from_root(comm, path, || {
-        let number = number(path).ok_or(std::io::ErrorKind::InvalidData)?;
-        let sealed = length(path)? - SEAL_BYTES;
-        let mut file = File::open(path)?;
-        file.seek(SeekFrom::Start(sealed + 16))?;
-        let mut bytes = [0; 8];
-        file.read_exact(&mut bytes)?;
-        Ok([sealed, u64::from_le_bytes(bytes), number])
-    });
-    let checked = seal.and_then(|[length, expected, number]| {
-        Ok(checksum(comm, path, length)? ^ mix(number) == expected)
-    });
-    checked.unwrap_or(false)
+/// Whether a file has the bytes that were sealed. Collective.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
+    let words = from_root(comm, path, || {
+        let seal = read_seal(path)?;
+        Ok(seal.map_or([0; 4], |seal| [1, seal.length, seal.sum, seal.number]))
+    })?;
+    let [1, length, sum, number] = words else {
+        return Ok(false);
+    };
+    Ok(checksum(comm, path, length)? ^ mix(number) == sum)
+}
+
+/// What a seal holds beside its mark.
+struct Seal {
+    /// Number of sealed bytes.
+    length: u64,
+    /// Their checksum, mixed with the number.
+    sum: u64,
+    number: u64,
+}
+
+/// The seal at the end of a file, if there is one.
+fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
+    let mut file = File::open(path)?;
+    let Some(sealed) = length(path)?.checked_sub(SEAL_BYTES) else {
+        return Ok(None);
+    };
+    file.seek(SeekFrom::Start(sealed))?;
+    let mut bytes = [0; SEAL_BYTES as usize];
+    file.read_exact(&mut bytes)?;
+    let [magic, length, sum, number]: [u64; 4] = bytemuck::cast(bytes);
+    let [magic, length, sum, number] = [magic, length, sum, number].map(u64::from_le);
+    let seal = Seal {
+        length,
+        sum,
+        number,
+    };
+    Ok((magic == MAGIC && length == sealed).then_some(seal))
 }
 
 /// What rank 0 reads of a file, on all ranks: others may see an older state of it. Collective.
@@ -132,7 +153,10 @@ pub fn mix(word: u64) -> u64 {
 }
 
 fn failure(path: &Path, error: &std::io::Error) -> Error {
-    Error::run(format!("{}: {error}", path.display()))
+    Error::run(format!(
+        "{}: the checkpoint cannot be read or written: {error}",
+        path.display()
+    ))
 }
 
 #[cfg(test)]
@@ -146,8 +170,8 @@ mod tests {
         let bytes: Vec<u8> = (0..1003).map(|k| (k * 7) as u8).collect();
         std::fs::write(&path, &bytes).unwrap();
         threads::run(3, |comm| seal(comm, &path, 42).unwrap());
-        assert_eq!(number(&path), Some(42));
-        let intact = |ranks| threads::run(ranks, |comm| is_intact(comm, &path));
+        assert_eq!(number(&path).unwrap(), Some(42));
+        let intact = |ranks| threads::run(ranks, |comm| is_intact(comm, &path).unwrap());
         assert_eq!(intact(2), [true, true]);
         let sealed = std::fs::read(&path).unwrap();
         for bit in (0..8 * sealed.len()).step_by(61) {
@@ -159,6 +183,13 @@ mod tests {
         for length in [0, 10, 500, sealed.len() - 1] {
             std::fs::write(&path, &sealed[..length]).unwrap();
             assert_eq!(intact(1), [false], "cut to {length}");
+        }
+        // A file that cannot be read is not a damaged one: this link points to itself.
+        std::fs::remove_file(&path).unwrap();
+        std::os::unix::fs::symlink(&path, &path).unwrap();
+        assert!(number(&path).is_err());
+        for checked in threads::run(2, |comm| is_intact(comm, &path)) {
+            assert!(checked.is_err());
         }
         std::fs::remove_file(&path).unwrap();
     }

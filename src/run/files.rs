@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::output::checkpoint::Checkpoints;
+use crate::output::checkpoint::{Checkpoints, is_taken};
 
 /// How long a run waits for another one that writes to its folder.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -40,9 +40,9 @@ impl Files {
         let existing = files
             .into_iter()
             .chain(Checkpoints::paths(&self.folder))
-            .find(|file| file.exists());
+            .find(|file| is_taken(file));
         if let (Some(file), false) = (existing, overwrite) {
-            let restart = if Checkpoints::paths(&self.folder).any(|path| path.exists()) {
+            let restart = if Checkpoints::paths(&self.folder).any(|path| is_taken(&path)) {
                 "--restart continues the run, "
             } else {
                 ""
@@ -100,13 +100,13 @@ impl Files {
             file.with_file_name(format!("{stem}_until_step_{number}{again}.{extension}"))
         };
         let is_free = |count: &u32| {
-            !named(&self.result, *count).exists() && !named(&self.history, *count).exists()
+            !is_taken(&named(&self.result, *count)) && !is_taken(&named(&self.history, *count))
         };
         let count = (0..).find(is_free).unwrap_or(u32::MAX);
         let aside = |file: &Path| named(file, count);
         let mut kept = Vec::new();
         for file in [&self.result, &self.history] {
-            if file.exists() {
+            if is_taken(file) {
                 fs::rename(file, aside(file))
                     .map_err(|error| file_error(file, "rename", &error))?;
                 kept.push(aside(file));

@@ -57,7 +57,7 @@ use crate::survey::{Survey, calibrated};
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
 use energy_watch::EnergyWatch;
-use recorder::{Recorder, Start, damaged, why_not_continued};
+use recorder::{Recorder, Start, damage, why_not_continued};
 use restart::{Restart, restart};
 use watch::{Decision, Watch};
 
@@ -350,8 +350,12 @@ impl<'a> Job<'a> {
                         recorder.observer.continue_from(header.start);
                         return Ok((checkpoints, recorder));
                     }
-                    // The checkpoint is good: that of the result must not keep it from going on.
-                    Err(error) => damaged(&error),
+                    // The checkpoint is intact: a damaged result must not keep the run from going on. Other
+                    // failures, such as a full disc, leave the result in its place.
+                    Err(error) => match damage(self.comm, &self.files, header.outputs)? {
+                        Some(why) => why,
+                        None => return Err(error),
+                    },
                 }
             }
         };

@@ -7,7 +7,7 @@ use crate::comm::{self, Communicator, IdOrder, agree};
 use crate::deck::Plan;
 use crate::deck::plan::Field;
 use crate::error::{Error, ErrorKind, Result};
-use crate::output::checkpoint::Header;
+use crate::output::checkpoint::{Header, is_taken};
 use crate::output::{
     Creation, HistoryContents, Number, ResultFile, ResultReader, SideCar, StoredField, mix,
 };
@@ -305,7 +305,8 @@ fn kept<const D: usize>(
 /// another one, or the plan asks for other fields or columns. Collective.
 ///
 /// # Errors
-/// When a set of the history is empty, or a deck cannot be parsed.
+/// When a set of the history is empty, or a deck cannot be parsed; when another program has locked the result, or
+/// the system does not let it be read.
 pub fn why_not_continued<const D: usize>(
     simulation: &Simulation<'_, D>,
     files: &Files,
@@ -316,14 +317,20 @@ pub fn why_not_continued<const D: usize>(
     let observer = HistoryObserver::new(simulation)?;
     let changed = agree(comm, history_differences(&header.deck, physics))?;
     let order = simulation.id_order();
-    let all: Vec<usize> = (0..order.count()).collect();
-    let rows = kept(simulation, &order)?.unwrap_or(all);
-    let own = rows.iter().map(|row| mix(order.first() + *row as u64));
-    let points = comm::total(comm, own.fold(0, u64::wrapping_add));
+    let kept = kept(simulation, &order)?;
+    let owned = &simulation.model.ids[..simulation.model.owned()];
+    let ids = pick(&kept, order.collect(comm, owned, 1), 1);
+    let own = ids.into_iter().map(mix).fold(0, u64::wrapping_add);
+    let points = comm::total(comm, own);
     let look = || -> Result<Option<String>> {
-        if !files.result.exists() {
+        if !is_taken(&files.result) {
             return Ok(Some("the result so far is gone".to_owned()));
         }
+        // A link to a disc that is not mounted is no damage.
+        std::fs::metadata(&files.result).map_err(|error| {
+            let path = files.result.display();
+            Error::run(format!("{path}: cannot read the result so far: {error}"))
+        })?;
         let reader = ResultReader::open(&files.result)?;
         let columns = reader.history()?;
         let rows = columns
@@ -364,19 +371,40 @@ pub fn why_not_continued<const D: usize>(
         }
         Ok(changed.map(|lines| format!("columns of the history mean something else: {lines}")))
     };
-    let why = match comm.rank() {
-        0 => look().unwrap_or_else(|error| Some(damaged(&error))),
-        _ => None,
+    found_by_root(comm, look)
+}
+
+/// The damage for which the first outputs of a result cannot be read; none where they can. Collective.
+///
+/// # Errors
+/// When another program has locked the result, or the system does not let it be read.
+pub fn damage(comm: &dyn Communicator, files: &Files, outputs: u64) -> Result<Option<String>> {
+    found_by_root(comm, || {
+        ResultReader::open(&files.result)?.check(outputs as usize)?;
+        Ok(None)
+    })
+}
+
+/// Why rank 0 finds that a result cannot be continued. A result that is damaged is such a reason, a failure of
+/// the system to read it is an error. Collective.
+fn found_by_root(
+    comm: &dyn Communicator,
+    look: impl FnOnce() -> Result<Option<String>>,
+) -> Result<Option<String>> {
+    let found = match comm.rank() {
+        0 => match look() {
+            Err(error) if error.kind == ErrorKind::Input => {
+                let text = format!("the result so far is damaged ({})", error.message);
+                Ok(Some(text))
+            }
+            found => found,
+        },
+        _ => Ok(None),
     };
-    let mut why = why.unwrap_or_default().into_bytes();
+    let mut why = agree(comm, found)?.unwrap_or_default().into_bytes();
     comm.broadcast(0, &mut why);
     let why = String::from_utf8_lossy(&why).into_owned();
     Ok((!why.is_empty()).then_some(why))
-}
-
-/// Why a result that cannot be read, or not be written to, is not continued.
-pub fn damaged(error: &Error) -> String {
-    format!("the result so far is damaged ({})", error.message)
 }
 
 fn wanted_fields(plan: &Plan) -> Vec<&'static str> {
