@@ -69,6 +69,9 @@ impl ResultReader {
         if let Err(error) = std::fs::metadata(path) {
             return problem(&format!("cannot open the result file: {error}"));
         }
+        if path.to_str().is_none() {
+            return problem("the path of a result file must be UTF-8; rename the file or its folder");
+        }
         let file = match hdf5::File::open(path) {
             Ok(file) => file,
             Err(error) => {
