@@ -370,3 +370,110 @@ fn several_decks_are_looked_at_one_after_the_other() {
         assert!(output.status.success());
     }
 }
+
+#[test]
+fn stages_are_reported_one_by_one() {
+    let folder = Folder::new("stages");
+    let deck = folder.write(
+        "bar.toml",
+        "dimension = '1d'
+        grid = { spacing = 1, horizon = 3 }
+        material.m.pmb = { density = 1, youngs_modulus = 1 }
+        body.bar = { material = 'm', shape.box = { lower = [0], upper = [20] } }
+        time = { end = 30, step = 0.1 }
+        [[stage]]
+        end = 10
+        method = 'relaxation'
+        relaxation.load_steps = 7
+        [[stage]]
+        end = 20
+        [[stage]]
+        adaptive.largest = 0.05
+        ",
+    );
+    let printed = succeed(fissure(1).arg("check").arg(&deck));
+    for line in [
+        "  stage 1                 7 load steps\n",
+        "  stage 2                 100 steps of 100.0 ms\n",
+        "  stage 3                 200 steps of 50.00 ms, more if bonds break\n",
+        " for the steps, ",
+        " for an iteration, ",
+    ] {
+        assert!(printed.contains(line), "{line}{printed}");
+    }
+    assert!(!printed.contains("time step"), "{printed}");
+}
+
+#[test]
+fn a_path_need_not_be_utf_8() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let folder = Folder::new("latin");
+    let name = |bytes| folder.join(OsStr::from_bytes(bytes));
+    let deck = name(b"b\xe4r.toml");
+    let text_of_deck = "dimension = '1d'
+        grid = { spacing = 1, horizon = 3 }
+        material.m.pmb = { density = 1, youngs_modulus = 1 }
+        body.bar = { material = 'm', shape.box = { lower = [0], upper = [20] } }
+        time = { end = 0.5, step = 0.1 }
+        ";
+    std::fs::write(&deck, text_of_deck).unwrap();
+    for command in ["check", "explain"] {
+        succeed(fissure(1).arg(command).arg(&deck));
+    }
+    let run = |output: &std::path::Path| {
+        let mut command = fissure(1);
+        command.arg("run").arg(&deck).arg("--output").arg(output);
+        command
+    };
+    let out = folder.join("out");
+    succeed(&mut run(&out));
+    let result = out.join("result.vtkhdf");
+    assert!(ResultReader::open(&result).is_ok());
+    // The HDF5 library takes no other paths.
+    let moved = name(b"re\xdfult.vtkhdf");
+    let refused = |command: &mut std::process::Command, words: &str| {
+        let output = finish(command);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(words), "{}", text(&output));
+    };
+    let words = "the path of the output folder must be UTF-8; --output DIR writes elsewhere";
+    refused(&mut run(&name(b"\xff")), words);
+    std::fs::rename(&result, &moved).unwrap();
+    let words = "the path of a result file must be UTF-8; rename the file or its folder";
+    refused(fissure(1).arg("plot").arg(&moved), words);
+    let set = OsStr::from_bytes(b"a=\xff");
+    refused(run(&out).arg("--set").arg(set), "invalid UTF-8");
+}
+
+#[test]
+fn a_point_file_without_line_ends_is_not_read_into_memory() {
+    let folder = Folder::new("endless");
+    let points = std::fs::File::create(folder.join("huge.txt")).unwrap();
+    points.set_len(5 << 30).unwrap();
+    let deck = folder.write(
+        "cloud.toml",
+        "dimension = '3d'
+        grid.horizon = 1.6
+        material.foam.pmb = { density = 30, youngs_modulus = 1e6 }
+        body.cloud = { material = 'foam', points.file = 'huge.txt' }
+        time.end = 0.1
+        ",
+    );
+    for command in ["check", "run"] {
+        let mut limited = std::process::Command::new("sh");
+        limited.args(["-c", "ulimit -v 4000000; exec \"$@\"", "sh"]);
+        limited
+            .arg(fissure(1).get_program())
+            .arg(command)
+            .arg(&deck);
+        if command == "run" {
+            limited.arg("--output").arg(folder.join("out"));
+        }
+        let output = finish(&mut limited);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        let words = "huge.txt:1: is longer than 65536 bytes; is this a point file?";
+        assert!(text(&output).contains(words), "{}", text(&output));
+    }
+}

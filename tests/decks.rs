@@ -11,7 +11,7 @@ use fissure::comm::threads;
 use fissure::deck::{self, Deck, Plan, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::solver::Simulation;
-use fissure::solver::observers::HistoryObserver;
+use fissure::survey::look;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -40,24 +40,10 @@ fn right_decks() -> Vec<Source> {
     sources
 }
 
-/// Number of points, step (s) and number of steps of the run that a plan makes.
-fn prepare(plan: &Plan) -> Result<(u64, f64, u64)> {
-    fn of<const D: usize>(plan: &Plan) -> Result<(u64, f64, u64)> {
-        let comm = threads::alone();
-        let mut simulation = Simulation::<D>::new(plan, &comm)?;
-        simulation.check()?;
-        HistoryObserver::new(&simulation)?;
-        Ok((
-            simulation.model.total,
-            simulation.clock.step(),
-            simulation.clock.last(),
-        ))
-    }
-    match plan.dimension.count() {
-        1 => of::<1>(plan),
-        2 => of::<2>(plan),
-        _ => of::<3>(plan),
-    }
+/// Number of points, and first step (s) and number of steps of each stage, of the run that a plan makes.
+fn prepare(plan: &Plan) -> Result<(u64, Vec<(f64, f64)>)> {
+    let look = look(plan, 1, false)?;
+    Ok((look.points, look.steps))
 }
 
 /// What a wrong deck says its error must be.
@@ -113,8 +99,11 @@ fn a_wrong_deck_gets_the_message_beside_its_mistake() {
 fn a_right_deck_makes_a_run() {
     for source in right_decks() {
         let plan = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
-        let (points, _, steps) = prepare(&plan).unwrap_or_else(|error| panic!("{error}"));
-        assert!(points > 0 && steps > 0, "{}", source.path.display());
+        let (points, stages) = prepare(&plan).unwrap_or_else(|error| panic!("{error}"));
+        let all_step = stages
+            .iter()
+            .all(|(step, steps)| *step > 0.0 && *steps >= 1.0);
+        assert!(points > 0 && all_step, "{}", source.path.display());
     }
 }
 

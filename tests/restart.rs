@@ -748,12 +748,18 @@ fn a_file_that_cannot_be_read_is_not_called_damaged() {
     let output = finish(fissure(1).arg("plot").arg(result(&out)));
     let printed = text(&output);
     assert_eq!(output.status.code(), Some(1), "{printed}");
-    assert!(printed.contains("is locked by another program"), "{printed}");
+    assert!(
+        printed.contains("is locked by another program"),
+        "{printed}"
+    );
     drop(writer);
 
     for (name, message) in [
         ("result.vtkhdf", "result.vtkhdf: cannot read the result"),
-        ("checkpoint_0.h5", "checkpoint_0.h5: the checkpoint cannot be read"),
+        (
+            "checkpoint_0.h5",
+            "checkpoint_0.h5: the checkpoint cannot be read",
+        ),
     ] {
         // Permissions do not bind root; these two do.
         let aside = folder.join("aside");
@@ -795,10 +801,17 @@ fn a_refined_region_is_continued_in_its_result() {
     assert_eq!(difference(&expected, &datasets(&result(&out))), None);
 
     // Other points are still found to be others.
-    let some = text.replace("every_steps = 200", "every_steps = 200\nset = 'top'");
-    let some = some.replace("output.every_steps = 200\nset", "output.every_steps = 200\noutput.set");
+    let some = refined.replace(
+        "output.every_steps",
+        "output.set = 'top'\noutput.every_steps",
+    );
     std::fs::write(&deck, some).unwrap();
-    let output = finish(&mut run(1, &deck, &out, &["--restart", "--set", "end=3e-6"]));
+    let output = finish(&mut run(
+        1,
+        &deck,
+        &out,
+        &["--restart", "--set", "end=3e-6"],
+    ));
     let printed = text(&output);
     assert!(printed.contains("other points are asked for"), "{printed}");
 }

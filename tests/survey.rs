@@ -1,10 +1,12 @@
 //! What `check` and the start of a run say of a deck: figures of its bodies, and warnings about what it
 //! allows but most likely does not mean.
 
+use crate::support::command::Folder;
 use crate::support::{plan, simulate, simulate_on};
 use fissure::deck::plan::VolumeCorrection;
 use fissure::families::CellShare;
-use fissure::survey::{Survey, interior, size};
+use fissure::solver::steps::even_clock;
+use fissure::survey::{Cost, Survey, interior, look, size};
 
 /// A plate of 12 × 8 cells and what else is to be there.
 fn plate(extra: &str) -> String {
@@ -273,7 +275,7 @@ fn volume_that_is_lost() {
 
 #[test]
 fn areas_for_volumes() {
-    let folder = crate::support::command::Folder::new("areas");
+    let folder = Folder::new("areas");
     let rows = |volume: f64| {
         let row = |k: i32| format!("{} {} {volume} 1\n", k % 10, k / 10);
         (0..100).map(row).collect::<String>()
@@ -409,7 +411,7 @@ fn the_size_of_a_run_without_making_it() {
                 "{estimate:?} {points}"
             );
             assert!(
-                (estimate.directed_bonds / bonds - 1.0).abs() < 0.1,
+                (estimate.directed_bonds() / bonds - 1.0).abs() < 0.1,
                 "{estimate:?} {bonds}"
             );
         });
@@ -417,7 +419,7 @@ fn the_size_of_a_run_without_making_it() {
     // A horizon far beyond the body is no more work than the body.
     let wide = plate("").replace("horizon = 3", "horizon = 3e12");
     let found = size(&plan(&wide)).unwrap();
-    assert_eq!(found.directed_bonds, 96.0 * 95.0);
+    assert_eq!(found.directed_bonds(), 96.0 * 95.0);
     let large = "dimension = '3d'
         grid = { volume_correction = 'none', spacing = 5e-4, horizon = 1.5e-3 }
         material.glass.pmb = { density = 2, youngs_modulus = 5 }
@@ -426,7 +428,106 @@ fn the_size_of_a_run_without_making_it() {
     let found = size(&plan(large)).unwrap();
     assert_eq!(found.all_points(), 8e9);
     assert!(
-        (found.directed_bonds / (122.0 * 8e9) - 1.0).abs() < 0.01,
+        (found.directed_bonds() / (122.0 * 8e9) - 1.0).abs() < 0.01,
         "{found:?}"
     );
+}
+
+/// Points in rows of ten, `count` of each block, block by block.
+fn blocks_of_points(folder: &Folder, count: i32, blocks: i32) -> std::path::PathBuf {
+    let row = |k: i32| format!("{} {} 1 {}\n", k % 10, k / 10, k / count);
+    let rows: String = (0..count * blocks).map(row).collect();
+    folder.write("points.txt", &rows)
+}
+
+#[test]
+fn each_body_counts_its_own_rows_of_a_file() {
+    let folder = Folder::new("blocks");
+    // The second file is long, so that pieces of it are read.
+    for (count, blocks, off) in [(200, 3, 0.0), (120_000, 10, 0.02)] {
+        let file = blocks_of_points(&folder, count, blocks);
+        let body = |block: i32| {
+            let file = file.display();
+            format!(
+                "body.b{block} = {{ material = 'm', points = {{ file = '{file}', block = {block} }} }}\n"
+            )
+        };
+        let bodies: String = (0..blocks).map(body).collect();
+        let text = format!(
+            "dimension = 'plane-stress'
+            grid.horizon = 3
+            material.m.pmb = {{ density = 1, youngs_modulus = 1 }}
+            {bodies}
+            output.set = 'b1'
+            time.end = 1
+            "
+        );
+        let found = size(&plan(&text)).unwrap();
+        assert_eq!(found.points.len(), blocks as usize);
+        let near = |found: f64, expected: f64, off: f64| (found / expected - 1.0).abs() <= off;
+        for points in &found.points {
+            assert!(near(*points, f64::from(count), off), "{found:?}");
+        }
+        assert!(near(found.held, f64::from(count), off), "{found:?}");
+        // The area within the horizon, less that of the point itself.
+        let bonds = found.directed_bonds() / found.all_points();
+        assert!(
+            (bonds - (9.0 * std::f64::consts::PI - 1.0)).abs() < 1e-9,
+            "{bonds}"
+        );
+    }
+}
+
+#[test]
+fn the_estimated_result_holds_the_set_of_the_output() {
+    for set in [
+        "set.some.where = 'x < 10'",
+        "set.some.shape.disc = { centre = [20, 20], radius = 8 }",
+        "set.some.ids = [1, 2, 3]",
+    ] {
+        for output in [
+            "output.every_steps = 1",
+            "output = { every_steps = 1, set = 'some' }",
+            "output = { every_steps = 1, set = 'block' }",
+        ] {
+            let text = plate(&format!(
+                "{set}
+                {output}
+                history.every_steps = 1000
+                history.reactions = ['some']
+                body.block = {{ material = 'glass', shape.box = {{ lower = [12, 0], upper = [112, 100] }} }}"
+            ));
+            let plan = plan(&text);
+            let look = look(&plan, 1, false).unwrap_or_else(|error| panic!("{error}"));
+            let clock = even_clock(&plan, &look.steps);
+            let estimate = Cost::estimate(&plan, &size(&plan).unwrap(), &clock);
+            assert_eq!(estimate.outputs, look.cost.outputs);
+            let off = estimate.result / look.cost.result - 1.0;
+            assert!(off.abs() < 0.02, "{output} {set}: {off}");
+        }
+    }
+}
+
+#[test]
+fn steps_follow_the_limits_of_an_adaptive_step() {
+    // The stable step is about 0.4 s; no bond breaks.
+    for (step, largest) in [
+        ("", 0.011),
+        ("step = 0.02, ", 0.11),
+        ("step = 0.02, ", 0.02),
+    ] {
+        let time = format!("time = {{ end = 4, {step}adaptive.largest = {largest} }}");
+        let text = plate("").replace("time.end = 1", &time);
+        let look = look(&plan(&text), 1, false).unwrap();
+        let made = simulate::<2, _>(&text, |mut simulation| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            simulation.clock.number()
+        });
+        assert_eq!(look.steps.len(), 1);
+        let (first, steps) = look.steps[0];
+        let expected = if step.is_empty() { largest } else { 0.02 };
+        assert_eq!((first, steps), (expected, made as f64), "{time}");
+    }
 }

@@ -5,9 +5,8 @@ use std::path::Path;
 use fissure::deck::{self, Plan};
 use fissure::error::Result;
 use fissure::solver::assign::cutoffs;
-use fissure::solver::motion::Clock;
 use fissure::solver::size::is_feasible;
-use fissure::solver::steps::choose_steps;
+use fissure::solver::steps::{choose_steps, even_clock};
 use fissure::survey::{Cost, Interior, Size, calibrated, interior, look, size};
 
 use super::check_report as say;
@@ -44,7 +43,7 @@ fn check_one(deck: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> R
     let size = size(&plan)?;
     let few = size.cells <= MOST_CELLS
         && size.all_points() <= MOST_POINTS
-        && size.directed_bonds <= MOST_BONDS;
+        && size.directed_bonds() <= MOST_BONDS;
     let report = if few {
         look_at(&plan, &asked)?
     } else {
@@ -97,13 +96,9 @@ fn look_at(plan: &Plan, asked: &Asked) -> Result<Report> {
     );
     say::cost(&mut report, &look.cost, asked.ranks, look.ghosts);
     say::time(&mut report, plan, look.stable_step);
-    say::steps(&mut report, &look.clock);
+    say::steps(&mut report, plan, &look.steps);
     if let Some(seconds) = look.seconds {
-        if plan.relaxes() {
-            say::iteration_time(&mut report, seconds, asked.ranks);
-        } else {
-            say::run_time(&mut report, seconds, look.steps, asked.ranks);
-        }
+        say::run_time(&mut report, plan, &look.steps, seconds, asked.ranks);
     }
     for warning in &survey.warnings {
         report.say(format_args!("warning: {warning}"));
@@ -123,7 +118,7 @@ fn estimate(plan: &Plan, asked: &Asked, size: &Size) -> Result<Report> {
     }
     report.say("size, estimated: there is too much of it to be made here");
     report.line("points", format_args!("{:.3e}", size.all_points()));
-    report.line("bonds", format_args!("{:.3e}", 0.5 * size.directed_bonds));
+    report.line("bonds", format_args!("{:.3e}", 0.5 * size.directed_bonds()));
     let stable = interiors
         .iter()
         .flatten()
@@ -132,12 +127,11 @@ fn estimate(plan: &Plan, asked: &Asked, size: &Size) -> Result<Report> {
     // Where all points come from files nothing is known of the step.
     if stable.is_finite() {
         let steps = choose_steps(plan, stable)?;
-        let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
-        let clock = Clock::new(plan.time.end / all, plan.time.end);
-        let cost = Cost::estimate(plan, size.all_points(), size.directed_bonds, &clock);
+        let clock = even_clock(plan, &steps);
+        let cost = Cost::estimate(plan, size, &clock);
         say::cost(&mut report, &cost, asked.ranks, 0.0);
         say::time(&mut report, plan, stable);
-        say::steps(&mut report, &clock);
+        say::steps(&mut report, plan, &steps);
     }
     report.say("sets, cracks and probes are not looked at");
     for warning in &plan.warnings {

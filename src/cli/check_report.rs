@@ -5,10 +5,9 @@ use std::path::Path;
 
 use fissure::damage::DamageLaw;
 use fissure::deck::Plan;
-use fissure::deck::plan::{Block, Body, DamageRule, PointSource, Sense};
+use fissure::deck::plan::{Block, Body, DamageRule, PointSource, Sense, Time};
 use fissure::dimension::Dimension;
 use fissure::solver::assign::block_laws;
-use fissure::solver::motion::Clock;
 use fissure::survey::{BodyFigures, Cost, Interior, Survey, parting_cost};
 
 use super::format::{bytes, count, duration, si};
@@ -244,34 +243,75 @@ pub fn time(report: &mut Report, plan: &Plan, stable: f64) {
     report.line("stable step", si(stable, "s"));
 }
 
-/// Step and number of steps.
-pub fn steps(report: &mut Report, clock: &Clock) {
-    report.line("time step", si(clock.step(), "s"));
-    report.line("steps", count(clock.last()));
+/// First step and number of steps of each stage.
+pub fn steps(report: &mut Report, plan: &Plan, steps: &[(f64, f64)]) {
+    let stages = plan.all_stages();
+    if let ([stage], [(step, steps)]) = (&stages[..], steps) {
+        let steps = count(*steps as u64);
+        if stage.time.is_relaxation() {
+            report.line("load steps", steps);
+        } else {
+            report.line(
+                "time step",
+                si(*step, "s") + &largest_step(&stage.time, *step),
+            );
+            report.line("steps", steps + note_on_steps(&stage.time));
+        }
+        return;
+    }
+    for (number, (stage, (step, steps))) in (1..).zip(stages.iter().zip(steps)) {
+        let steps = count(*steps as u64);
+        let words = if stage.time.is_relaxation() {
+            format!("{steps} load steps")
+        } else {
+            let (step, largest) = (si(*step, "s"), largest_step(&stage.time, *step));
+            format!(
+                "{steps} steps of {step}{largest}{}",
+                note_on_steps(&stage.time)
+            )
+        };
+        report.line(&format!("stage {number}"), words);
+    }
 }
 
-/// How long the steps take, from the wall-clock time of one on this rank.
-pub fn run_time(report: &mut Report, seconds: f64, steps: u64, ranks: u32) {
-    let threads = rayon::current_num_threads();
-    let all = seconds * steps as f64 / f64::from(ranks);
-    report.line(
-        "run time",
-        format_args!(
-            "about {} for the steps, {ranks} rank(s) × {threads} thread(s) like these",
-            duration(all)
-        ),
-    );
+/// The largest step of a stage, where it is above the first one (s).
+fn largest_step(time: &Time, first: f64) -> String {
+    match time.adaptive.and_then(|rule| rule.largest) {
+        Some(largest) if largest > first => format!(" at first, then up to {}", si(largest, "s")),
+        _ => String::new(),
+    }
 }
 
-/// How long an iteration of a load step takes, from the wall-clock time of one on this rank.
-pub fn iteration_time(report: &mut Report, seconds: f64, ranks: u32) {
+fn note_on_steps(time: &Time) -> &'static str {
+    match time.adaptive {
+        Some(_) => ", more if bonds break",
+        None => "",
+    }
+}
+
+/// Run time of the steps, and of an iteration of a load step, from the wall-clock time (s) of one on this rank.
+pub fn run_time(report: &mut Report, plan: &Plan, steps: &[(f64, f64)], seconds: f64, ranks: u32) {
     let threads = rayon::current_num_threads();
-    report.line(
-        "run time",
-        format_args!(
-            "about {} for an iteration, {ranks} rank(s) × {threads} thread(s) like these; a load step \
-             takes some hundreds to ten thousands",
-            duration(seconds / f64::from(ranks))
-        ),
-    );
+    let on = format!("{ranks} rank(s) × {threads} thread(s) like these");
+    let seconds = seconds / f64::from(ranks);
+    let stages = plan.all_stages();
+    let explicit = stages.iter().zip(steps);
+    let explicit = explicit.filter(|(stage, _)| !stage.time.is_relaxation());
+    let explicit: f64 = explicit.map(|(_, (_, steps))| steps).sum();
+    if explicit > 0.0 {
+        let whole = duration(seconds * explicit);
+        report.line(
+            "run time",
+            format_args!("about {whole} for the steps, {on}"),
+        );
+    }
+    if plan.relaxes() {
+        let iteration = duration(seconds);
+        report.line(
+            "run time",
+            format_args!(
+                "about {iteration} for an iteration, {on}; a load step takes some hundreds to ten thousands"
+            ),
+        );
+    }
 }

@@ -54,7 +54,9 @@ fn run_deck(
     let stem = arguments.deck.file_stem().unwrap_or_default();
     let folder = arguments.output.clone();
     let hosts = world.hosts();
-    let command_line: Vec<String> = std::env::args().collect();
+    // Paths need not be UTF-8; attributes of the result are.
+    let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+    let command_line: Vec<String> = words.collect();
     let options = Options {
         existing: match (arguments.overwrite, arguments.restart) {
             (true, _) => Existing::Replace,

@@ -8,7 +8,7 @@ use serde_spanned::Spanned;
 use super::grammar::{self, Deck};
 use super::number::shown;
 use super::plan;
-use super::resolve::{Scope, find, resolve_each};
+use super::resolve::{Scope, resolve_each};
 use super::shapes;
 use super::validate;
 use crate::error::Result;
@@ -43,8 +43,8 @@ pub fn bodies(
         let body = table.get_ref();
         let key = format!("[body.{name}]");
         let names = materials.keys().map(String::as_str);
-        let material = find(
-            scope.source,
+        let material = scope.find_used(
+            "material",
             &body.material,
             names,
             &format!("{key} material"),
@@ -54,7 +54,8 @@ pub fn bodies(
             .as_ref()
             .map(|damage| {
                 let names = damages.keys().map(String::as_str);
-                let index = find(scope.source, damage, names, &format!("{key} damage"))?;
+                let key = format!("{key} damage");
+                let index = scope.find_used("damage", damage, names, &key)?;
                 Ok(damages[index].clone())
             })
             .transpose()?;
@@ -147,12 +148,9 @@ fn flat_faces(shape: &plan::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
         plan::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
         plan::Shape::Prism { bottom, top, .. } if axis == 2 => Some([*bottom, *top]),
-        plan::Shape::Prism { vertices, .. } => {
-            let places = || vertices.iter().map(|vertex| vertex[axis]);
-            Some([
-                places().fold(f64::INFINITY, f64::min),
-                places().fold(f64::NEG_INFINITY, f64::max),
-            ])
+        plan::Shape::Prism { base, .. } => {
+            let (lower, upper) = base.bounds();
+            Some([lower[axis], upper[axis]])
         }
         plan::Shape::Cylinder { from, to, .. } => {
             let is_along = (0..3).all(|k| k == axis || from[k] == to[k]);

@@ -2,45 +2,28 @@
 //! change the mass of moving points.
 
 use indexmap::IndexSet;
+use serde_spanned::Spanned;
 use toml::Value;
 
 use super::build::changes_density_scale;
 use super::expression::Expression;
-use super::grammar::{Damage, Deck};
+use super::grammar::{Deck, Tables};
 use super::number::shown;
 use super::plan::{Plan, Selector};
+use super::resolve::Scope;
 use super::source::Source;
 use crate::error::{Error, Result};
 
-/// A warning for each of them.
+/// A warning for each of them. `scope` is that of the validated deck.
 ///
 /// # Errors
 /// When the deck cannot be written out to look for names.
-pub fn doubts(source: &Source, deck: &Deck, plan: &Plan) -> Result<Vec<String>> {
+pub fn doubts(scope: &Scope, deck: &Deck, plan: &Plan) -> Result<Vec<String>> {
+    let source = scope.source;
     let mut warnings = unused_parameters(source, deck)?;
-    let mut unused = |section: &str, name: &str, place: std::ops::Range<usize>| {
-        let message = format!("[{section}.{name}]: nothing in the deck uses it");
-        warnings.push(source.warning(place, message));
-    };
-    let bodies = || deck.body.values().map(|body| body.get_ref());
-    for (name, table) in &deck.material {
-        if bodies().all(|body| body.material.get_ref() != name) {
-            unused("material", name, table.span());
-        }
-    }
-    for (name, table) in &deck.damage {
-        let uses = |damage: Option<&str>| damage == Some(name);
-        let mut used = bodies().map(|body| body.damage.as_ref().map(|text| &text.get_ref()[..]));
-        if !used.any(uses) {
-            unused("damage", name, table.span());
-        }
-    }
-    let used = used_sets(deck);
-    for (name, table) in &deck.set {
-        if !used.contains(&name[..]) {
-            unused("set", name, table.span());
-        }
-    }
+    warnings.extend(unused(scope, "material", &deck.material));
+    warnings.extend(unused(scope, "damage", &deck.damage));
+    warnings.extend(unused(scope, "set", &deck.set));
     for set in &plan.sets {
         if let Selector::Where(condition) = &set.selector
             && !condition.is_condition()
@@ -69,30 +52,16 @@ pub fn doubts(source: &Source, deck: &Deck, plan: &Plan) -> Result<Vec<String>> 
     Ok(warnings)
 }
 
-/// The names of the sets that anything in the deck asks for.
-fn used_sets(deck: &Deck) -> IndexSet<&str> {
-    let history = deck.history.get_ref();
-    let conditions = deck.condition.values().map(|table| &table.get_ref().set);
-    let initials = deck.initial.values().map(|table| &table.get_ref().set);
-    let tips = history.tip.values().map(|table| &table.get_ref().set);
-    let cracks = history.crack.values().map(|table| &table.get_ref().set);
-    let forces = history.force.values().map(|table| &table.get_ref().set);
-    let zones = deck
-        .damage
-        .values()
-        .flat_map(|table| match table.get_ref() {
-            Damage::CriticalStretch(law) => &law.get_ref().no_failure,
-            Damage::Energy(law) => &law.get_ref().no_failure,
-        });
-    conditions
-        .chain(initials)
-        .chain(tips)
-        .chain(cracks)
-        .chain(forces)
-        .chain(zones)
-        .chain(&history.reactions)
-        .map(|name| &name.get_ref()[..])
-        .collect()
+/// A warning for each table of a section that no other part of the deck refers to.
+fn unused<T>(scope: &Scope, section: &'static str, tables: &Tables<T>) -> Vec<String> {
+    let used = scope.used.borrow();
+    let is_unused = |name: &String| !used.contains(&(section, name.clone()));
+    let unused = tables.iter().filter(|(name, _)| is_unused(name));
+    let warning = |(name, table): (&String, &Spanned<T>)| {
+        let message = format!("[{section}.{name}]: nothing in the deck uses it");
+        scope.source.warning(table.span(), message)
+    };
+    unused.map(warning).collect()
 }
 
 fn unused_parameters(source: &Source, deck: &Deck) -> Result<Vec<String>> {
@@ -165,6 +134,29 @@ time.end = 1
             "a.toml:8: [set.left]: nothing in the deck uses it",
         ];
         assert_eq!(doubts(others), expected);
+    }
+
+    #[test]
+    fn a_set_is_used_wherever_a_deck_may_name_one() {
+        let set = "set.some.where = 'x < height'\n";
+        let unused = "a.toml:7: [set.some]: nothing in the deck uses it";
+        assert_eq!(doubts(set), [unused]);
+        for use_of_it in [
+            "initial.push = { set = 'some', velocity = [1, 0] }",
+            "condition.hold = { set = 'some', displacement = [0, 0] }",
+            "output.set = 'some'",
+            "history.reactions = ['some']",
+            "history.force.pull = { set = 'some', direction = [1, 0] }",
+            "history.crack.main = { set = 'some', from = [0, 0] }",
+            "history.tip.main = { set = 'some', from = [0, 0], direction = [1, 0] }",
+            "damage.d.critical_stretch = { fracture_energy = 1, no_failure = ['some'] }
+            body.other = { material = 'glass', damage = 'd', shape.disc = { centre = [9, 9], radius = 3 } }",
+            "damage.d.energy = { fracture_energy = 1, no_failure = ['some'] }
+            body.other = { material = 'glass', damage = 'd', shape.disc = { centre = [9, 9], radius = 3 } }",
+        ] {
+            let found = doubts(&format!("{set}{use_of_it}"));
+            assert_eq!(found, Vec::<String>::new(), "{use_of_it}");
+        }
     }
 
     #[test]

@@ -36,6 +36,7 @@ pub use plan::Plan;
 pub use source::Source;
 
 use crate::error::Result;
+use resolve::Scope;
 
 /// The commented deck that `fissure init` writes.
 pub const EXAMPLE: &str = include_str!("example.toml");
@@ -74,8 +75,9 @@ impl Deck {
     /// # Errors
     /// As [`read`].
     pub fn plan(&self) -> Result<Plan> {
-        let mut plan = validate::validate(&self.source, &self.grammar)?;
-        plan.warnings = doubts::doubts(&self.source, &self.grammar, &plan)?;
+        let scope = Scope::of(&self.source, &self.grammar)?;
+        let mut plan = validate::validate(&scope, &self.grammar)?;
+        plan.warnings = doubts::doubts(&scope, &self.grammar, &plan)?;
         Ok(plan)
     }
 

@@ -1,8 +1,9 @@
 //! Numbers, vectors and expressions of a deck, evaluated against its parameters.
 
+use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
-use indexmap::IndexMap;
+use indexmap::{IndexMap, IndexSet};
 use nalgebra::Vector3;
 use serde_spanned::Spanned;
 
@@ -24,6 +25,8 @@ pub struct Scope<'a> {
     pub parameters: IndexMap<String, f64>,
     /// Number of components of a vector.
     pub dimension: usize,
+    /// Section and name of the tables that [`Self::find_used`] has found.
+    pub used: RefCell<IndexSet<(&'static str, String)>>,
 }
 
 impl<'a> Scope<'a> {
@@ -40,6 +43,7 @@ impl<'a> Scope<'a> {
                 DimensionName::PlaneStress | DimensionName::PlaneStrain => 2,
                 DimensionName::Space => 3,
             },
+            used: RefCell::default(),
         };
         parameters::evaluate(&mut scope, &deck.parameters)?;
         Ok(scope)
@@ -48,6 +52,24 @@ impl<'a> Scope<'a> {
     /// An error at a place of the deck.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
         self.source.error(span, message)
+    }
+
+    /// The index of a table of `section` by its name, one of `names`. The table counts as used from then on.
+    ///
+    /// # Errors
+    /// On an unknown name.
+    pub fn find_used<'n>(
+        &self,
+        section: &'static str,
+        name: &Text,
+        names: impl Iterator<Item = &'n str> + Clone,
+        key: &str,
+    ) -> Result<usize> {
+        let index = find(self.source, name, names, key)?;
+        self.used
+            .borrow_mut()
+            .insert((section, name.get_ref().clone()));
+        Ok(index)
     }
 
     /// A finite number.

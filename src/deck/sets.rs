@@ -4,7 +4,7 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Text};
 use super::plan;
-use super::resolve::{POSITION, Scope, find};
+use super::resolve::{POSITION, Scope};
 use super::shapes;
 use crate::error::Result;
 
@@ -83,12 +83,8 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
 /// # Errors
 /// On an unknown set.
 pub fn find_set(scope: &Scope, name: &Text, sets: &[plan::Set], key: &str) -> Result<usize> {
-    find(
-        scope.source,
-        name,
-        sets.iter().map(|set| set.name.as_str()),
-        key,
-    )
+    let names = sets.iter().map(|set| set.name.as_str());
+    scope.find_used("set", name, names, key)
 }
 
 /// The indices of several sets.

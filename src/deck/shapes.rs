@@ -10,6 +10,7 @@ use super::number::{Number, Vector, shown};
 use super::plan;
 use super::resolve::Scope;
 use crate::error::Result;
+use crate::points::Polygon;
 
 /// Validates a shape.
 ///
@@ -89,7 +90,7 @@ fn resolve(
         Shape::Polygon { vertices } => {
             only_in(2, "polygon", "`prism`")?;
             Ok(plan::Shape::Prism {
-                vertices: corners(scope, key, vertices)?,
+                base: corners(scope, key, vertices)?,
                 bottom: f64::NEG_INFINITY,
                 top: f64::INFINITY,
             })
@@ -107,7 +108,7 @@ fn resolve(
                 return Err(scope.error(top.span(), message));
             }
             Ok(plan::Shape::Prism {
-                vertices: corners(scope, key, vertices)?,
+                base: corners(scope, key, vertices)?,
                 bottom: low,
                 top: high,
             })
@@ -136,20 +137,18 @@ fn several(
         .collect()
 }
 
-fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<Vec<[f64; 2]>> {
+fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<Polygon> {
     let key = format!("{key} vertices");
     if vertices.get_ref().len() < 3 {
         let message = format!("{key}: needs at least three corners");
         return Err(scope.error(vertices.span(), message));
     }
-    vertices
-        .get_ref()
-        .iter()
-        .map(|vertex| match &vertex.get_ref()[..] {
-            [x, y] => Ok([scope.number(x, &key)?, scope.number(y, &key)?]),
-            _ => Err(scope.error(vertex.span(), format!("{key}: a corner is [x, y]"))),
-        })
-        .collect()
+    let corner = |vertex: &Vector| match &vertex.get_ref()[..] {
+        [x, y] => Ok([scope.number(x, &key)?, scope.number(y, &key)?]),
+        _ => Err(scope.error(vertex.span(), format!("{key}: a corner is [x, y]"))),
+    };
+    let corners = vertices.get_ref().iter().map(corner);
+    Ok(Polygon::new(corners.collect::<Result<_>>()?))
 }
 
 /// Validates a pre-crack.

@@ -191,18 +191,16 @@ fn find_value<'t>(
 
 /// A path as the deck's sections have it: `[body.plate] shape box`.
 fn label(path: &[String]) -> String {
-    let section = path.first().map_or("", String::as_str);
-    let count = match section {
-        "material" | "damage" | "crack" => 3,
-        "history" => match path.get(1).map_or("", String::as_str) {
-            "force" | "probe" | "front" | "crack" | "tip" => 3,
-            _ => 1,
-        },
-        "interface" if path.get(1).is_some_and(|key| key == "pair") => 3,
-        "body" | "set" | "initial" | "condition" => 2,
-        "time" if path.len() > 2 => 2,
-        "grid" | "interface" | "time" | "stage" | "output" | "parameters" => 1,
-        _ => 0,
+    let part = |index: usize| path.get(index).map_or("", String::as_str);
+    // Number of parts of the path that are between the brackets.
+    let count = match (part(0), part(1)) {
+        ("title" | "dimension" | "thickness" | "cross_section", _) => 0,
+        ("material" | "damage" | "crack", _) => 3,
+        ("body" | "set" | "initial" | "condition", _) => 2,
+        ("interface", "pair") | ("refinement", "region") => 3,
+        ("history", "force" | "probe" | "front" | "crack" | "tip") => 3,
+        ("time", "adaptive" | "relaxation") | ("refinement", "trigger") => 2,
+        _ => 1,
     };
     let (header, keys) = path.split_at(count.min(path.len()));
     let header = match header {
@@ -274,6 +272,142 @@ fn given(value: &DeValue, written: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::grammar::Deck;
+    use super::*;
+    use crate::deck;
+
+    /// A deck with every section that the grammar has.
+    const SECTIONS: &str = "title = 'all'
+dimension = 'plane-stress'
+thickness = 1
+[parameters]
+height = 2
+[grid]
+spacing = 1
+horizon = 3
+[interface]
+rule = 'own'
+[interface.pair.NAME]
+bodies = ['plate', 'block']
+rule = 'own'
+[refinement]
+levels = 1
+[refinement.region.NAME]
+where = 'x < 1'
+[refinement.trigger]
+energy = 0.5
+[material.NAME.pmb]
+density = 1
+[damage.NAME.energy]
+alpha = 0.25
+[body.NAME]
+material = 'glass'
+[set.NAME]
+where = 'x < 1'
+[crack.NAME.segment]
+from = [0, 0]
+to = [1, 0]
+[initial.NAME]
+velocity = [1, 0]
+[condition.NAME]
+force = [1, 0]
+set = 'all'
+[time]
+end = 1
+[time.adaptive]
+reduce = 0.5
+[time.relaxation]
+tolerance = 1e-3
+[[stage]]
+safety = 0.5
+[output]
+every = 1
+[history]
+every = 1
+[history.force.NAME]
+direction = [1, 0]
+set = 'all'
+[history.probe.NAME]
+at = [0, 0]
+[history.front.NAME]
+threshold = 1
+from = [0, 0]
+direction = [1, 0]
+field = 'damage'
+[history.crack.NAME]
+from = [0, 0]
+[history.tip.NAME]
+from = [0, 0]
+direction = [1, 0]
+[checkpoint]
+every_time = 1
+[balance]
+imbalance = 1.5
+";
+
+    /// The first line of the error of a deck.
+    fn error_of(text: String) -> String {
+        let source = Source {
+            path: "a.toml".into(),
+            text,
+        };
+        let error = deck::parse(&source).err();
+        let error = error.unwrap_or_else(|| panic!("no error: {}", source.text));
+        error.message.lines().next().unwrap_or_default().to_owned()
+    }
+
+    /// [`SECTIONS`] with another text in place of the line with this number, from 0.
+    fn with_line(number: usize, other: &str) -> String {
+        let lines = SECTIONS.lines().enumerate();
+        let lines = lines.map(|(k, line)| if k == number { other } else { line });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
+    #[test]
+    fn errors_name_the_section_in_brackets() {
+        let known = toml::from_str::<Deck>("unknown = 1").unwrap_err();
+        let sections = known.message().split('`').skip(3).step_by(2);
+        let mut sections: Vec<&str> = sections.collect();
+        let lines: Vec<&str> = SECTIONS.lines().collect();
+        for (number, line) in lines.iter().enumerate() {
+            let first = line.trim_matches(['[', ']']);
+            let first = first.split(['.', ' ']).next().unwrap_or_default();
+            sections.retain(|section| *section != first);
+            if !line.starts_with('[') {
+                continue;
+            }
+            // A value of the wrong kind, and a key that is none.
+            let key = lines[number + 1].split(' ').next().unwrap_or_default();
+            let error = error_of(with_line(number + 1, &format!("{key} = 1979-05-27")));
+            assert!(
+                error.contains(&format!(": {line} {key}: must be ")),
+                "{error}"
+            );
+            let more = format!("wrong_key = 1979-05-27\n{}", lines[number + 1]);
+            let error = error_of(with_line(number + 1, &more));
+            let expected = match *line {
+                "[parameters]" => ": [parameters] wrong_key: must be ".to_owned(),
+                // The keys of a law are those of its declaration, and checked after the names.
+                "[material.NAME.pmb]" => ": [".to_owned(),
+                _ => format!(": {line}: unknown key `wrong_key`"),
+            };
+            assert!(error.contains(&expected), "{line}: {error}");
+        }
+        assert_eq!(sections, ["cross_section"]);
+    }
+
+    #[test]
+    fn names_of_all_sections_are_checked() {
+        for (number, line) in SECTIONS.lines().enumerate() {
+            if !line.contains("NAME") {
+                continue;
+            }
+            let header = line.replace("NAME", "'a\"b'");
+            let section = &line[..line.find(".NAME").unwrap()];
+            let error = error_of(with_line(number, &header));
+            let expected = format!(": {section}]: the name `a\"b` must have 1 to ");
+            assert!(error.contains(&expected), "{line}: {error}");
+        }
+    }
 
     /// What is told of a wrong deck depends on these words of the reader.
     #[test]

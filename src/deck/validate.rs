@@ -8,7 +8,6 @@ use super::grammar::{
 use super::number::{Edges, Number, shown};
 use super::plan::{self, Plan};
 use super::resolve::{Scope, resolve_each};
-use super::source::Source;
 use super::{
     bodies, conditions, damage, history, interface, materials, names, outputs, refinement, sets,
     shapes, time,
@@ -16,38 +15,35 @@ use super::{
 use crate::dimension::{Constraint, Dimension};
 use crate::error::Result;
 
-/// Validates a parsed deck.
+/// Validates a parsed deck, whose values are resolved against `scope`.
 ///
 /// # Errors
 /// The first mistake, with its place in the deck, the key and what would be right.
-pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
-    let scope = Scope::of(source, deck)?;
-    names::names(&scope, deck)?;
-    let dimension = dimension(&scope, deck)?;
+pub fn validate(scope: &Scope, deck: &Deck) -> Result<Plan> {
+    names::names(scope, deck)?;
+    let dimension = dimension(scope, deck)?;
     let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;
     let spacing = match &deck.grid.get_ref().spacing {
         None => None,
-        Some(edges) => Some(spacing(&scope, edges, "[grid] spacing", horizon)?),
+        Some(edges) => Some(spacing(scope, edges, "[grid] spacing", horizon)?),
     };
-    let sets = sets::sets(&scope, deck)?;
+    let sets = sets::sets(scope, deck)?;
     let materials = resolve_each(&deck.material, |name, table| {
-        materials::material(&scope, dimension, name, table)
+        materials::material(scope, dimension, name, table)
     })?;
     let damages = resolve_each(&deck.damage, |name, table| {
-        damage::damage(&scope, &sets, name, table)
+        damage::damage(scope, &sets, name, table)
     })?;
-    let bodies = bodies::bodies(&scope, deck, spacing, &materials, &damages)?;
-    let volume_correction = volume_correction(&scope, deck, &bodies)?;
-    let family = family(&scope, deck)?;
-    let interface = interface::interface(&scope, deck, &bodies)?;
-    let refinement = refinement::refinement(&scope, deck, &bodies)?;
-    let cracks = resolve_each(&deck.crack, |name, table| {
-        shapes::crack(&scope, name, table)
-    })?;
-    let time = time::time(&scope, deck)?;
-    let stages = time::stages(&scope, deck, &time)?;
+    let bodies = bodies::bodies(scope, deck, spacing, &materials, &damages)?;
+    let volume_correction = volume_correction(scope, deck, &bodies)?;
+    let family = family(scope, deck)?;
+    let interface = interface::interface(scope, deck, &bodies)?;
+    let refinement = refinement::refinement(scope, deck, &bodies)?;
+    let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
+    let time = time::time(scope, deck)?;
+    let stages = time::stages(scope, deck, &time)?;
     Ok(Plan {
-        source: source.clone(),
+        source: scope.source.clone(),
         warnings: Vec::new(),
         title: deck.title.get_ref().clone(),
         places: places(deck),
@@ -63,13 +59,13 @@ pub fn validate(source: &Source, deck: &Deck) -> Result<Plan> {
         bodies,
         refinement,
         cracks: cracks.into_values().collect(),
-        initials: conditions::initials(&scope, deck, &sets)?,
-        conditions: conditions::conditions(&scope, deck, &sets, single(&deck.grid, spacing))?,
+        initials: conditions::initials(scope, deck, &sets)?,
+        conditions: conditions::conditions(scope, deck, &sets, single(&deck.grid, spacing))?,
         stages,
-        output: outputs::output(&scope, deck, &sets, time.end)?,
-        history: history::history(&scope, deck, &sets, horizon)?,
-        checkpoint: outputs::checkpoint(&scope, deck)?,
-        balance: outputs::balance(&scope, deck)?,
+        output: outputs::output(scope, deck, &sets, time.end)?,
+        history: history::history(scope, deck, &sets, horizon)?,
+        checkpoint: outputs::checkpoint(scope, deck)?,
+        balance: outputs::balance(scope, deck)?,
         sets,
         time,
     })

@@ -31,9 +31,16 @@ mod tests {
 
     #[test]
     fn the_error_number_of_a_system_call() {
-        let locked = "unable to lock file, errno = 11, error message = 'Resource temporarily unavailable'";
+        let locked =
+            "unable to lock file, errno = 11, error message = 'Resource temporarily unavailable'";
         assert_eq!(number(locked), Some(11));
-        assert_eq!(number("truncated file: eof = 96, sblock->base_addr = 0"), None);
-        assert_eq!(number("file read failed: errno = 0, error message = 'Success'"), None);
+        assert_eq!(
+            number("truncated file: eof = 96, sblock->base_addr = 0"),
+            None
+        );
+        assert_eq!(
+            number("file read failed: errno = 0, error message = 'Success'"),
+            None
+        );
     }
 }

@@ -78,6 +78,11 @@ impl ResultReader {
             }
             return problem(&format!("cannot open the result file: {error}"));
         }
+        if path.to_str().is_none() {
+            return problem(
+                "the path of a result file must be UTF-8; rename the file or its folder",
+            );
+        }
         let readable = |error: &hdf5::Error| match system_error(error) {
             Some(cause) => Err(cannot_read(path, &cause)),
             None => Ok(()),

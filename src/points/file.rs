@@ -15,7 +15,7 @@ use crate::error::{Error, Result, excerpt};
 use super::Point;
 
 /// The bodies that take rows of a file: their index and the block number they ask for.
-pub(super) fn users(plan: &Plan, file: &Path) -> Vec<(usize, Option<u32>)> {
+pub fn users(plan: &Plan, file: &Path) -> Vec<(usize, Option<u32>)> {
     plan.bodies
         .iter()
         .enumerate()
@@ -28,6 +28,10 @@ pub(super) fn users(plan: &Plan, file: &Path) -> Vec<(usize, Option<u32>)> {
 
 /// The most bytes of a row.
 const LONGEST_ROW: u64 = 1 << 16;
+
+/// Bytes of a piece of a long file, and the number of pieces that are read to estimate the points of all.
+const PIECE: u64 = 1 << 16;
+const SAMPLED: u64 = 256;
 
 /// The largest size of a coordinate, m: squares of distances stay far from overflow.
 const FARTHEST: f64 = 1e30;
@@ -81,6 +85,28 @@ pub(super) fn piece(plan: &Plan, path: &Path, comm: &dyn Communicator) -> Result
     agree(comm, checked)
 }
 
+/// Points of a file, and the number of points that each of them stands for: 1 unless the file is long, of which evenly
+/// spaced pieces are read. Wrong rows are left out. `None` if the file cannot be read.
+pub fn sample(plan: &Plan, path: &Path) -> Option<(Vec<Point>, f64)> {
+    let users = users(plan, path);
+    let length = std::fs::metadata(path).ok()?.len();
+    if length <= SAMPLED * PIECE {
+        let share = read_share(plan, path, &users, 0, 1).ok()?;
+        return Some((share.points, 1.0));
+    }
+    let pieces = length.div_ceil(PIECE);
+    let mut points = Vec::new();
+    for k in 0..SAMPLED {
+        let piece = (u128::from(pieces) * u128::from(k) / u128::from(SAMPLED)) as usize;
+        points.extend(
+            read_share(plan, path, &users, piece, pieces as usize)
+                .ok()?
+                .points,
+        );
+    }
+    Some((points, pieces as f64 / SAMPLED as f64))
+}
+
 /// Reads the rows that start within this rank's share of the file's bytes.
 fn read_share(
     plan: &Plan,
@@ -106,7 +132,12 @@ fn read_share(
         // The row that is under way at `start` belongs to the share before.
         file.seek(SeekFrom::Start(start - 1))?;
         let mut reader = BufReader::new(file);
-        at = start - 1 + reader.skip_until(b'\n')? as u64;
+        let skipped = (&mut reader).take(LONGEST_ROW + 1).skip_until(b'\n')? as u64;
+        if skipped > LONGEST_ROW {
+            // The share in which this row starts has the error.
+            return Ok(share);
+        }
+        at = start - 1 + skipped;
         reader
     };
     while at < end {
@@ -348,6 +379,11 @@ mod tests {
         let long = [b"0 0 1 1\n".to_vec(), vec![b'0'; 1 << 17]].concat();
         let expected = "points.csv:2: is longer than 65536 bytes; is this a point file?";
         assert_eq!(read("long", &long), Err(expected.to_owned()));
+        // The longest row, with shares that start within it.
+        let spaces = |count: usize| [&b"0 0 1 1"[..], &vec![b' '; count], b"\n1 0 1 1\n"].concat();
+        assert_eq!(read("longest", &spaces(65_528)), Ok(vec![0.0, 1.0]));
+        let expected = "points.csv:1: is longer than 65536 bytes; is this a point file?";
+        assert_eq!(read("longer", &spaces(65_529)), Err(expected.to_owned()));
     }
 
     #[test]

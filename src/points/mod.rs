@@ -4,13 +4,15 @@
 
 pub mod bins;
 pub mod crack;
-mod file;
+pub(crate) mod file;
 pub mod lattice;
+mod polygon;
 mod region;
 pub mod set;
 pub mod shape;
 
 pub use lattice::LatticeBody;
+pub use polygon::Polygon;
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! Which positions lie within a shape.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 
 use crate::deck::plan::Shape;
 
@@ -13,22 +13,9 @@ pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
             std::array::from_fn(|k| from[k].min(to[k]) - radius),
             std::array::from_fn(|k| from[k].max(to[k]) + radius),
         ),
-        Shape::Prism {
-            vertices,
-            bottom,
-            top,
-        } => {
-            let extreme = |k: usize, pick: fn(f64, f64) -> f64| {
-                vertices
-                    .iter()
-                    .map(|vertex| vertex[k])
-                    .reduce(pick)
-                    .unwrap_or(0.0)
-            };
-            (
-                [extreme(0, f64::min), extreme(1, f64::min), *bottom],
-                [extreme(0, f64::max), extreme(1, f64::max), *top],
-            )
+        Shape::Prism { base, bottom, top } => {
+            let (lower, upper) = base.bounds();
+            ([lower[0], lower[1], *bottom], [upper[0], upper[1], *top])
         }
         Shape::Union(parts) => parts.iter().map(bounds).fold(
             ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]),
@@ -62,14 +49,10 @@ pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
                 && along <= length + tolerance
                 && across <= (radius + tolerance).powi(2)
         }
-        Shape::Prism {
-            vertices,
-            bottom,
-            top,
-        } => {
+        Shape::Prism { base, bottom, top } => {
             position[2] >= bottom - tolerance
                 && position[2] <= top + tolerance
-                && in_polygon(vertices, [position[0], position[1]], tolerance)
+                && base.contains([position[0], position[1]], tolerance)
         }
         Shape::Union(parts) => parts.iter().any(|part| contains(part, position, tolerance)),
         // What is cut away is cut without its border, so that the rest keeps points on the border.
@@ -82,43 +65,10 @@ pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     }
 }
 
-/// Even-odd rule; positions closer to an edge than |tolerance| are in for a positive tolerance and
-/// out for a negative one.
-fn in_polygon(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool {
-    let edges = || {
-        let next = vertices.iter().cycle().skip(1);
-        vertices.iter().zip(next)
-    };
-    if edges().any(|(a, b)| distance_to_segment(*a, *b, position) <= tolerance.abs()) {
-        return tolerance > 0.0;
-    }
-    edges()
-        .filter(|(a, b)| {
-            let spans = (a[1] > position[1]) != (b[1] > position[1]);
-            spans && position[0] < a[0] + (position[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-        })
-        .count()
-        % 2
-        == 1
-}
-
-fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
-    let [a, b, p] = [a, b, p].map(Vector2::from);
-    let (edge, offset) = (b - a, p - a);
-    let along = edge.dot(&offset) / edge.dot(&edge);
-    // A repeated corner has no length: its distance is that to the corner.
-    let along = if along.is_nan() {
-        0.0
-    } else {
-        along.clamp(0.0, 1.0)
-    };
-    let across = offset - along * edge;
-    libm::hypot(across.x, across.y)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::points::Polygon;
 
     #[test]
     fn borders_belong_to_a_shape_and_to_what_remains_of_it() {
@@ -141,14 +91,14 @@ mod tests {
     #[test]
     fn a_polygon_may_be_concave() {
         let l_shape = Shape::Prism {
-            vertices: vec![
+            base: Polygon::new(vec![
                 [0.0, 0.0],
                 [2.0, 0.0],
                 [2.0, 1.0],
                 [1.0, 1.0],
                 [1.0, 2.0],
                 [0.0, 2.0],
-            ],
+            ]),
             bottom: 0.0,
             top: 1.0,
         };

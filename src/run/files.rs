@@ -58,8 +58,14 @@ impl Files {
     /// Makes the folder and takes it for this run, until the returned file is dropped. For rank 0.
     ///
     /// # Errors
-    /// When the folder cannot be made or another run writes to it.
+    /// When the folder cannot be made, its path is not UTF-8, or another run writes to it.
     pub fn lock(&self) -> Result<fs::File> {
+        if self.folder.to_str().is_none() {
+            return Err(Error::input(format!(
+                "{}: the path of the output folder must be UTF-8; --output DIR writes elsewhere",
+                self.folder.display()
+            )));
+        }
         fs::create_dir_all(&self.folder)
             .map_err(|error| file_error(&self.folder, "create the folder", &error))?;
         let path = self.folder.join(".lock");

@@ -12,7 +12,7 @@ use crate::output::{
     Creation, HistoryContents, Number, ResultFile, ResultReader, SideCar, StoredField, mix,
 };
 use crate::solver::Simulation;
-use crate::solver::conditions::{members, not_empty};
+use crate::solver::conditions::output_members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
@@ -288,11 +288,9 @@ fn kept<const D: usize>(
     order: &IdOrder,
 ) -> Result<Option<Vec<usize>>> {
     let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
-    let Some((set, span)) = &plan.output.set else {
+    let Some(points) = output_members(plan, comm, model)? else {
         return Ok(None);
     };
-    let points = members(plan, model, *set);
-    not_empty(plan, comm, *set, &points, ("[output] set", span.clone()))?;
     let mut flags = vec![0_u32; model.owned()];
     points.iter().for_each(|point| flags[*point as usize] = 1);
     let flags = order.collect(comm, &flags, 1);

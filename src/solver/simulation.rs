@@ -51,7 +51,7 @@ pub struct Simulation<'a, const D: usize> {
     pub stages: Vec<Stage>,
     /// Index of the present stage.
     pub stage: usize,
-    /// Step (s) of each stage, and how many of them it takes.
+    /// First step (s) of each stage, and the number of its steps if no bond breaks.
     pub(super) steps: Vec<(f64, f64)>,
     /// Volume of each owned point's whole family, broken bonds included, m³.
     pub family_volume: Repeated,

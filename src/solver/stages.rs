@@ -5,6 +5,7 @@ use crate::comm::sum::{ExactSum, reduce};
 use super::Simulation;
 use super::motion::Clock;
 use super::motion::fields::Fields;
+use super::steps::even_clock;
 
 impl<const D: usize> Simulation<'_, D> {
     /// Whether the present stage has come to its end.
@@ -23,13 +24,12 @@ impl<const D: usize> Simulation<'_, D> {
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
     }
 
-    /// A clock that makes as many steps as the run.
+    /// A clock that makes as many steps as the run if no bond breaks.
     pub fn expected_clock(&self) -> Clock {
-        if self.stages.len() == 1 {
-            return self.clock;
+        match &self.stages[..] {
+            [stage] if stage.time.adaptive.is_none() => self.clock,
+            _ => even_clock(self.plan, &self.steps),
         }
-        let end = self.plan.time.end;
-        Clock::new(end / self.last_step() as f64, end)
     }
 
     /// The stable step with the density of the present stage, s.

@@ -6,13 +6,14 @@ use crate::deck::plan::{Adaptive, Method, Plan, Stage, StepRule, Time};
 use crate::deck::shown;
 use crate::error::Result;
 
+use super::motion::Clock;
 use super::motion::clock::steps_to;
 
 /// Most steps of a stage; as many can be counted, and time still advances with each.
 const MOST_STEPS: f64 = 1e15;
 
-/// The step (s) of each stage of a run, and how many of them it takes, with a stable step (s). An automatic
-/// step divides the stage evenly.
+/// The first step (s) of each stage of a run, and the number of steps of the stage if no bond breaks, for a stable
+/// step (s). An automatic step divides the stage evenly, unless `[time.adaptive] largest` limits it.
 ///
 /// # Errors
 /// When there is no stable step, or there are more steps than can be counted.
@@ -26,7 +27,14 @@ pub fn choose_steps(plan: &Plan, stable: f64) -> Result<Vec<(f64, f64)>> {
     plan.all_stages().into_iter().map(choose).collect()
 }
 
-/// The step (s) of a stage of some length (s), and how many of them it takes.
+/// A clock with equal steps that makes as many steps as all stages together, of which `steps` has the first step (s)
+/// and the number of steps.
+pub fn even_clock(plan: &Plan, steps: &[(f64, f64)]) -> Clock {
+    let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
+    Clock::new(plan.time.end / all, plan.time.end)
+}
+
+/// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks.
 fn choose_step(plan: &Plan, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     let (step, steps) = match (time.method, time.step) {
         (Method::Relaxation(rule), _) => {
@@ -49,15 +57,19 @@ fn choose_step(plan: &Plan, time: &Time, length: f64, stable: f64) -> Result<(f6
             (length / steps, steps)
         }
     };
+    let (step, steps) = match (time.method, &time.adaptive) {
+        (Method::Explicit, Some(rule)) => {
+            adapts_in_time(plan, rule, length, step)?;
+            adapted(rule, (step, steps), length)
+        }
+        _ => (step, steps),
+    };
     if steps > MOST_STEPS {
         let message = format!(
             "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",
             shown(length)
         );
         return Err(plan.source.error(plan.places.step.clone(), message));
-    }
-    if let (Method::Explicit, Some(rule)) = (time.method, &time.adaptive) {
-        adapts_in_time(plan, rule, length, step)?;
     }
     Ok((step, steps))
 }
@@ -122,4 +134,95 @@ fn follows_damping(plan: &Plan, key: &str, place: &Range<usize>, step: f64) -> R
         SIGN_CHANGES / rate,
     );
     Err(plan.source.error(place.clone(), message))
+}
+
+/// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks, under an adaptive
+/// rule: at most the largest step, and raised to that.
+fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
+    match rule.largest {
+        Some(largest) if largest < step => (largest, steps_to(length, largest)),
+        Some(largest) if largest > step => (step, raised(rule, [step, largest], length)),
+        _ => (step, steps),
+    }
+}
+
+/// The number of steps that take a time (s), where the first step (s) is raised to the largest (s) in rounds of
+/// `rule.steps` steps.
+fn raised(rule: &Adaptive, [first, largest]: [f64; 2], length: f64) -> f64 {
+    let round = rule.steps as f64;
+    let growth = rule.raise - 1.0;
+    let rounds_to = |ratio: f64| libm::log(ratio) / libm::log1p(growth);
+    // Rounds before the largest step, at most those that fit: the time of k rounds is a geometric series.
+    let before_largest = rounds_to(largest / first).ceil();
+    let fitting = rounds_to(1.0 + length * growth / (round * first)).floor();
+    let rounds = before_largest.min(fitting);
+    let raised = libm::expm1(rounds * libm::log1p(growth));
+    let left = length - round * first * raised / growth;
+    let step = (first * (1.0 + raised)).min(largest);
+    (rounds * round + left.max(0.0) / step).ceil().max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rule(raise: f64, steps: u64, largest: f64) -> Adaptive {
+        Adaptive {
+            most_broken: 2,
+            stable_broken: 1,
+            steps,
+            reduce: 0.5,
+            raise,
+            smallest: None,
+            largest: Some(largest),
+        }
+    }
+
+    /// Steps counted one by one.
+    fn counted(rule: &Adaptive, mut step: f64, length: f64) -> u64 {
+        let (mut time, mut calm, mut steps) = (0.0, 0, 0);
+        while time < length * (1.0 - 1e-9) {
+            time += step;
+            steps += 1;
+            calm += 1;
+            if calm == rule.steps {
+                step = (step * rule.raise).min(rule.largest.unwrap());
+                calm = 0;
+            }
+        }
+        steps
+    }
+
+    #[test]
+    fn a_largest_step_limits_the_first_one() {
+        let limited = adapted(&rule(1.5, 10, 1e-10), (8e-8, 125.0), 1e-5);
+        assert_eq!(limited, (1e-10, 1e5));
+        let same = adapted(&rule(1.5, 10, 8e-8), (8e-8, 125.0), 1e-5);
+        assert_eq!(same, (8e-8, 125.0));
+    }
+
+    #[test]
+    fn a_first_step_below_the_largest_is_raised() {
+        for (raise, each, largest) in [
+            (1.5, 10, 64.0),
+            (2.0, 1, 1e9),
+            (1.01, 3, 2.0),
+            (8.0, 7, 3.0),
+        ] {
+            let rule = rule(raise, each, largest);
+            for length in [5.0, 300.0, 1e5] {
+                let (step, found) = adapted(&rule, (1.0, length), length);
+                let expected = counted(&rule, 1.0, length) as f64;
+                assert_eq!(step, 1.0);
+                assert!(
+                    (found - expected).abs() <= 1.0,
+                    "{rule:?} {length}: {found} for {expected}"
+                );
+            }
+        }
+        // A step that is hardly raised at all is not counted one by one.
+        let slow = rule(1.0 + f64::EPSILON, 1, 2.0);
+        let steps = adapted(&slow, (1e-12, 1e12), 1.0).1;
+        assert!((steps / 1e12 - 1.0).abs() < 1e-3, "{steps}");
+    }
 }

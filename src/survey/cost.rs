@@ -1,10 +1,10 @@
 //! What a run takes: memory and space on the disc.
 
-use crate::deck::plan::{Action, FamilyRule, Plan, PointSource, Quadrature};
+use super::Size;
+use crate::deck::plan::{Action, Block, Body, FamilyRule, Plan, PointSource, Quadrature};
 use crate::material::{Law, PlasticState};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
-use crate::solver::conditions::members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::refinement::may_coarsen;
@@ -71,11 +71,12 @@ struct Counts {
 }
 
 impl Cost {
-    /// Of a run that stands ready on one rank, with so many columns in its history. The memory of its
-    /// set-up is estimated where it is not measured.
+    /// The cost of a run that is set up on one rank, with `columns` in its history and `held` points in its result.
+    /// Memory that is not measured is estimated.
     pub fn of<const D: usize>(
         simulation: &Simulation<'_, D>,
         columns: usize,
+        held: u64,
         measured: Option<Measured>,
     ) -> Self {
         let (plan, model) = (simulation.plan, &simulation.model);
@@ -84,11 +85,9 @@ impl Cost {
         let kept = kept.iter().map(|length| f64::from(*length)).sum();
         let bonds = simulation.forces.bytes() as f64;
         let listed = simulation.forces.directed_bonds() - simulation.forces.lattice_bonds();
-        let count = |set: usize| members(plan, model, set).len() as f64;
-        let held = plan.output.set.as_ref().map(|(set, _)| count(*set));
         let counts = Counts {
             points,
-            share: held.map_or(1.0, |held| held / points),
+            share: held as f64 / points,
             memory: measured.unwrap_or_else(|| estimated(plan, points, bonds, listed as f64)),
             bonds: kept,
             columns: columns as f64,
@@ -97,8 +96,9 @@ impl Cost {
         cost(plan, counts, &simulation.expected_clock())
     }
 
-    /// Of a run of so many points and bonds, counted from both ends, and such steps, by estimate.
-    pub fn estimate(plan: &Plan, points: f64, directed_bonds: f64, clock: &Clock) -> Self {
+    /// The cost of a run of some size with the steps of a clock, by estimate.
+    pub fn estimate(plan: &Plan, size: &Size, clock: &Clock) -> Self {
+        let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
         let is_lattice = |source: &PointSource| matches!(source, PointSource::Lattice { .. });
         let on_lattice = plan.family != FamilyRule::List
             && plan.quadrature == Quadrature::Midpoint
@@ -108,11 +108,15 @@ impl Cost {
         } else {
             (LISTED, directed_bonds)
         };
+        let bodies = plan.bodies.iter().zip(&size.bonds);
+        let history = bodies.map(|(body, bonds)| bonds * history_bytes(plan, body));
+        let history: f64 = history.sum();
+        let bonds = bytes * directed_bonds + history;
         let counts = Counts {
             points,
-            share: 1.0,
-            memory: estimated(plan, points, bytes * directed_bonds, listed),
-            bonds: ON_LATTICE * directed_bonds,
+            share: size.held / points,
+            memory: estimated(plan, points, bonds, listed),
+            bonds: ON_LATTICE * directed_bonds + history,
             columns: 16.0,
             saved: saved_width(plan),
         };
@@ -124,6 +128,17 @@ impl Cost {
         let points = self.set_up.max(self.time_loop) / f64::from(ranks);
         BASE[usize::from(ranks > 1)] + points * (1.0 + ghosts)
     }
+}
+
+/// Bytes of history that a law keeps for each bond of a body's points.
+fn history_bytes(plan: &Plan, body: &Body) -> f64 {
+    let law = block_laws(plan, &Block::unrefined(body)).law;
+    let numbers = match plan.dimension.count() {
+        1 => law.counts::<1>().memory,
+        2 => law.counts::<2>().memory,
+        _ => law.counts::<3>().memory,
+    };
+    (size_of::<f64>() * numbers) as f64
 }
 
 /// Memory of the set-up and after it, by formula.

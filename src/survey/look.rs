@@ -8,8 +8,9 @@ use crate::comm::threads;
 use crate::deck::Plan;
 use crate::error::Result;
 use crate::solver::Simulation;
-use crate::solver::motion::Clock;
+use crate::solver::conditions::output_members;
 use crate::solver::observers::HistoryObserver;
+use crate::solver::steps::choose_steps;
 
 /// How long the time loop is tried to know its speed.
 const TRIAL: Duration = Duration::from_millis(300);
@@ -34,10 +35,8 @@ pub struct Look {
     pub cost: Cost,
     /// The stable step, with the safety that is asked for, s.
     pub stable_step: f64,
-    /// The clock, as far as it is known.
-    pub clock: Clock,
-    /// The number of the last step.
-    pub steps: u64,
+    /// First step (s) of each stage, and the number of its steps if no bond breaks.
+    pub steps: Vec<(f64, f64)>,
     /// Wall-clock time of a step on one rank, s, if it was tried.
     pub seconds: Option<f64>,
 }
@@ -61,6 +60,9 @@ fn look_in<const D: usize>(plan: &Plan, ranks: u32, tried: bool) -> Result<Look>
     let after = memory::resident();
     simulation.check()?;
     let columns = HistoryObserver::new(&simulation)?.columns().len();
+    let total = simulation.model.total;
+    let held = output_members(plan, &comm, &simulation.model)?;
+    let held = held.map_or(total, |points| points.len() as u64);
     let survey = Survey::new(&mut simulation);
     let measured = before.map(|before| Measured {
         peak: after.peak - before,
@@ -68,14 +70,13 @@ fn look_in<const D: usize>(plan: &Plan, ranks: u32, tried: bool) -> Result<Look>
     });
     Ok(Look {
         survey,
-        points: simulation.model.total,
+        points: total,
         bonds: simulation.forces.directed_bonds() / 2,
         lattice_bonds: simulation.forces.lattice_bonds() / 2,
         ghosts: ghost_share(&edges(&simulation), plan.horizon, ranks),
-        cost: Cost::of(&simulation, columns, measured),
+        cost: Cost::of(&simulation, columns, held, measured),
         stable_step: simulation.scaled_stable_step(),
-        clock: simulation.expected_clock(),
-        steps: simulation.last_step(),
+        steps: choose_steps(plan, simulation.stable_step)?,
         seconds: tried.then(|| seconds_a_step(&mut simulation)),
     })
 }

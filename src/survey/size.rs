@@ -1,13 +1,9 @@
 //! How large a run is, from its plan: without making its points, of which there may be too many.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader};
-use std::path::Path;
-
-use crate::deck::plan::{Plan, PointSource};
+use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::dimension::Dimension;
 use crate::error::Result;
-use crate::points::LatticeBody;
+use crate::points::{LatticeBody, file, set};
 use crate::solver::assign::cutoffs;
 
 /// Cells looked at, of all samples together, to count neighbours.
@@ -16,9 +12,6 @@ const MOST_LOOKS: f64 = 4e6;
 /// Points of each body whose neighbours are counted, at most.
 const SAMPLES: u64 = 400;
 
-/// Rows of a point file that are read to know the others.
-const ROWS: usize = 1000;
-
 /// The size of a run, about.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
@@ -26,14 +19,21 @@ pub struct Size {
     pub cells: f64,
     /// Number of points of each body.
     pub points: Vec<f64>,
-    /// Bonds, each counted from both ends.
-    pub directed_bonds: f64,
+    /// Bonds of the points of each body; those of all bodies count each bond from both ends.
+    pub bonds: Vec<f64>,
+    /// Number of points of the result.
+    pub held: f64,
 }
 
 impl Size {
     /// Number of all points.
     pub fn all_points(&self) -> f64 {
         self.points.iter().sum()
+    }
+
+    /// Number of all bonds, each counted from both ends.
+    pub fn directed_bonds(&self) -> f64 {
+        self.bonds.iter().sum()
     }
 }
 
@@ -45,24 +45,37 @@ pub fn size(plan: &Plan) -> Result<Size> {
     let bodies = (0..plan.bodies.len())
         .map(|body| LatticeBody::new(plan, body))
         .collect::<Result<Vec<_>>>()?;
-    let cutoffs = cutoffs(plan);
-    let mut size = Size {
-        cells: 0.0,
-        points: Vec::new(),
-        directed_bonds: 0.0,
+    let files = from_files(plan);
+    let points = |index: usize| match &bodies[index] {
+        Some(lattice) => lattice.points(),
+        None => files[index].points,
     };
+    let mut size = Size {
+        cells: bodies
+            .iter()
+            .flatten()
+            .map(|body| body.cells() as f64)
+            .sum(),
+        points: (0..bodies.len()).map(points).collect(),
+        bonds: Vec::new(),
+        held: 0.0,
+    };
+    let (cutoffs, all) = (cutoffs(plan), size.all_points());
     for (here, body) in bodies.iter().enumerate() {
-        let (points, neighbours) = match body {
+        let neighbours = match body {
             Some(lattice) => {
-                size.cells += lattice.cells() as f64;
                 let reach = &cutoffs[here * plan.block_count()..][..bodies.len()];
-                (lattice.points(), neighbours(lattice, &bodies, reach))
+                neighbours(lattice, &bodies, reach)
             }
-            None => from_file(plan, here),
+            None => {
+                let volume = files[here].volume / files[here].points;
+                (family_volume(plan, here) / volume).min(all) - 1.0
+            }
         };
-        size.directed_bonds += points * neighbours;
-        size.points.push(points);
+        // A body without points has no mean volume.
+        size.bonds.push(size.points[here] * neighbours.max(0.0));
     }
+    size.held = held(plan, &bodies, &files, &size.points);
     Ok(size)
 }
 
@@ -90,43 +103,76 @@ fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64])
     (found as f64 / places.len() as f64 - 1.0).max(0.0)
 }
 
-/// Points of a file, and how many of them lie within a horizon, as if all rows were like the first ones.
-fn from_file(plan: &Plan, body: usize) -> (f64, f64) {
-    let PointSource::File { path, .. } = &plan.bodies[body].points else {
-        return (0.0, 0.0);
-    };
-    let Some((rows, volume)) = rows(path, plan.dimension.count()) else {
-        return (0.0, 0.0);
-    };
+/// The points of a body from a file.
+#[derive(Clone, Copy, Default)]
+struct Rows {
+    points: f64,
+    /// Volume of all points, m³.
+    volume: f64,
+    /// Number of points that are in the set of the result, if there is one.
+    held: f64,
+}
+
+/// The points of each body that are rows of a file.
+fn from_files(plan: &Plan) -> Vec<Rows> {
+    let mut rows = vec![Rows::default(); plan.bodies.len()];
+    for (index, body) in plan.bodies.iter().enumerate() {
+        let PointSource::File { path, .. } = &body.points else {
+            continue;
+        };
+        // The first body that takes rows of a file counts those of all bodies.
+        if file::users(plan, path)[0].0 != index {
+            continue;
+        }
+        let Some((points, weight)) = file::sample(plan, path) else {
+            continue;
+        };
+        for point in points {
+            let body = point.block as usize;
+            rows[body].points += weight;
+            rows[body].volume += weight * point.volume;
+            rows[body].held += weight * f64::from(u8::from(is_held(plan, body, point.position)));
+        }
+    }
+    rows
+}
+
+/// The volume (m³) within the horizon of a point of a body.
+fn family_volume(plan: &Plan, body: usize) -> f64 {
     let horizon = plan.bodies[body].horizon;
-    let ball = match plan.dimension {
+    match plan.dimension {
         Dimension::Space => 4.0 / 3.0 * std::f64::consts::PI * horizon.powi(3),
         Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
             std::f64::consts::PI * horizon * horizon * thickness
         }
         Dimension::Line { cross_section, .. } => 2.0 * horizon * cross_section,
-    };
-    (rows, (ball / volume).min(rows))
+    }
 }
 
-/// The number of rows of a file and the mean volume of its points (m³), from its beginning and length.
-fn rows(path: &Path, dimension: usize) -> Option<(f64, f64)> {
-    if !std::fs::metadata(path).ok()?.is_file() {
-        return None;
+/// Whether a point of a body at a position (m) is in the set of the result, which is not one of ids.
+fn is_held(plan: &Plan, body: usize, position: [f64; 3]) -> bool {
+    let set = plan.output.set.as_ref();
+    set.is_none_or(|(set, _)| set::contains(&plan.sets[*set], plan.horizon, 0, position, body))
+}
+
+/// The number of points of the result, from some points of each body.
+fn held(plan: &Plan, bodies: &[Option<LatticeBody>], files: &[Rows], points: &[f64]) -> f64 {
+    let Some((set, _)) = &plan.output.set else {
+        return points.iter().sum();
+    };
+    if let Selector::Ids { ids, .. } = &plan.sets[*set].selector {
+        return ids.len() as f64;
     }
-    let file = File::open(path).ok()?;
-    let length = file.metadata().ok()?.len() as f64;
-    let (mut bytes, mut rows, mut volume) = (0.0, 0.0, 0.0);
-    for line in BufReader::new(file).lines().take(ROWS) {
-        let line = line.ok()?;
-        bytes += line.len() as f64 + 1.0;
-        let entries = line
-            .split([',', ';', ' ', '\t'])
-            .filter(|entry| !entry.is_empty());
-        if let Some(Ok(value)) = entries.map(str::parse::<f64>).nth(dimension) {
-            rows += 1.0;
-            volume += value;
+    let of_body = |(index, body): (usize, &Option<LatticeBody>)| match body {
+        None => files[index].held,
+        Some(lattice) => {
+            let centres = lattice.some_centres(u64::MAX);
+            let held = centres
+                .iter()
+                .filter(|centre| is_held(plan, index, **centre))
+                .count();
+            points[index] * held as f64 / centres.len().max(1) as f64
         }
-    }
-    (rows > 0.0).then(|| (rows * (length / bytes).max(1.0), volume / rows))
+    };
+    bodies.iter().enumerate().map(of_body).sum()
 }

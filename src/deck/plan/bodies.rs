@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::{Calibration, Law, WorkRule};
 use crate::deck::expression::Expression;
 use crate::elastic::Isotropic;
+use crate::points::Polygon;
 
 /// A body, which is a block with its own material and damage.
 #[derive(Debug, Clone)]
@@ -209,8 +210,8 @@ pub enum Shape {
     },
     /// A polygon in x and y, between two values of z.
     Prism {
-        /// Corners in order.
-        vertices: Vec<[f64; 2]>,
+        /// The polygon.
+        base: Polygon,
         /// Lower z; −∞ in the plane.
         bottom: f64,
         /// Upper z; ∞ in the plane.

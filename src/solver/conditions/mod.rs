@@ -105,6 +105,23 @@ fn loaded<const D: usize>(
     (points, Some(shares))
 }
 
+/// Local indices of the owned points that the result holds; `None` for all points. Collective.
+///
+/// # Errors
+/// When the set of the result is empty; the same on all ranks.
+pub fn output_members<const D: usize>(
+    plan: &Plan,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+) -> Result<Option<Vec<u32>>> {
+    let Some((set, span)) = &plan.output.set else {
+        return Ok(None);
+    };
+    let points = members(plan, model, *set);
+    not_empty(plan, comm, *set, &points, ("[output] set", span.clone()))?;
+    Ok(Some(points))
+}
+
 /// An input error if a set that something acts on has no points on any rank.
 pub fn not_empty(
     plan: &Plan,
