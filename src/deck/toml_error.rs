@@ -103,6 +103,11 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
             words,
         );
     }
+    if let (Some(value), "wanted string or table") = (place.value, message) {
+        let written = source.text.get(span.clone()).unwrap_or_default();
+        let words = format!("must be a name in quotes, is {}", given(value, written));
+        return error(&place.path, words);
+    }
     if message.starts_with("wanted exactly 1 element") {
         let section = place.path.first().map_or("", String::as_str);
         let kinds = match section {
@@ -194,7 +199,7 @@ fn label(path: &[String]) -> String {
     let part = |index: usize| path.get(index).map_or("", String::as_str);
     // Number of parts of the path that are between the brackets.
     let count = match (part(0), part(1)) {
-        ("title" | "dimension" | "thickness" | "cross_section", _) => 0,
+        ("title" | "dimension" | "constraint" | "thickness" | "cross_section", _) => 0,
         ("material" | "damage" | "crack", _) => 3,
         ("body" | "set" | "initial" | "condition", _) => 2,
         ("interface", "pair") | ("refinement", "region") => 3,
@@ -392,7 +397,8 @@ imbalance = 1.5
             };
             assert!(error.contains(&expected), "{line}: {error}");
         }
-        assert_eq!(sections, ["cross_section"]);
+        sections.sort_unstable();
+        assert_eq!(sections, ["constraint", "cross_section"]);
     }
 
     #[test]
