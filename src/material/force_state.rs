@@ -21,7 +21,7 @@ pub trait ForceState<const D: usize>: Copy {
     /// A component of T⊗Y, of the part that does not turn the bond.
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
-    /// The work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the [`Rotation`] R of the family; the same to the bit
+    /// The work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family; the same to the bit
     /// from both ends. A central force works on the extension, whatever the rotation.
     fn work<S: Simd>(self, simd: S, bond: &Bond<D>, linear: bool, rotation: &[Lanes; 3]) -> Lanes;
 

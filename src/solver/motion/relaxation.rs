@@ -22,7 +22,7 @@
 //! when the equilibrium is found.
 //!
 //! The equilibrium is found when ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). Without loads and reactions, as in a
-//! free body that is moved, both sides are round-off; so ‖f‖ ≤ [`ROUND_OFF`] ‖V ρ u‖ is an equilibrium, too. ρ bounds
+//! free body that is moved, both sides are round-off; so ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is an equilibrium, too. ρ bounds
 //! the stiffness of a point, hence ε ‖V ρ u‖ the forces that come from rounding u.
 
 use std::time::Instant;
