@@ -3,9 +3,11 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crate::support::command::{Folder, finish, fissure, succeed, text};
+use crate::support::command::{
+    Folder, finish, fissure, is_running, rank_processes, succeed, text, wait,
+};
 use fissure::output::ResultReader;
 
 /// A bar with the given time table; small enough to be quick, with an output at every step.
@@ -203,6 +205,58 @@ fn a_killed_run_leaves_its_complete_steps() {
         assert_eq!(displacement.len(), 3 * 720);
         assert!(displacement.iter().all(|value| value.is_finite()));
     }
+}
+
+#[test]
+fn ranks_end_soon_after_one_of_them_or_mpirun_is_killed() {
+    const RANKS: usize = 7;
+    /// Open MPI sends SIGTERM, waits a second, and sends SIGKILL; the machine may be busy.
+    const SOON: Duration = Duration::from_secs(30);
+
+    let kills: usize = std::env::var("FISSURE_KILLS").map_or(2, |text| text.parse().unwrap());
+    let folder = Folder::new("others");
+    let deck = folder.write(
+        "deck.toml",
+        &(bar("end = 1e5") + "checkpoint.every_steps = 5"),
+    );
+    let out = folder.join("out");
+    let result = out.join("result.vtkhdf");
+    let outputs = || ResultReader::open(&result).map_or(0, |it| it.times().map_or(0, |t| t.len()));
+    let mut longest = Duration::ZERO;
+    for trial in 0..kills {
+        let mut command = fissure(RANKS);
+        command.arg("run").arg(&deck).arg("--overwrite");
+        command.arg("--output").arg(&out).stdout(Stdio::null());
+        let child = command.stderr(Stdio::piped()).spawn().unwrap();
+        let begin = Instant::now();
+        // Every other pair of trials kills while MPI and the run start.
+        let is_time = || match trial % 4 {
+            0 | 1 => outputs() > 3,
+            _ => begin.elapsed() > Duration::from_millis(100 * (trial as u64 % 13)),
+        };
+        while rank_processes(&child, RANKS).len() < RANKS || !is_time() {
+            std::thread::sleep(Duration::from_millis(20));
+            assert!(is_running(child.id()), "the run ended by itself");
+        }
+        let ranks = rank_processes(&child, RANKS);
+        let victim = match trial % 2 {
+            0 => ranks[trial / 2 % RANKS],
+            _ => child.id(),
+        };
+        let kill = Command::new("kill")
+            .args(["-9", &victim.to_string()])
+            .status();
+        assert!(kill.unwrap().success());
+        let killed = Instant::now();
+        while ranks.iter().any(|rank| is_running(*rank)) {
+            std::thread::sleep(Duration::from_millis(20));
+            assert!(killed.elapsed() < SOON, "trial {trial}: ranks still run");
+        }
+        longest = longest.max(killed.elapsed());
+        assert!(!wait(child).status.success());
+        let _ = std::fs::remove_file(&result);
+    }
+    println!("after a kill the last rank ended in {longest:.1?} at most, {kills} trials");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::command::{Folder, finish, fissure, succeed, text, wait};
+use crate::support::command::{Folder, finish, fissure, rank_processes, succeed, text, wait};
 use crate::support::datasets::{datasets, difference, points_left};
 use fissure::output::ResultReader;
 
@@ -48,18 +48,6 @@ fn run(ranks: usize, deck: &Path, out: &Path, extra: &[&str]) -> Command {
 
 fn result(out: &Path) -> PathBuf {
     out.join("result.vtkhdf")
-}
-
-/// Numbers of the processes that mpirun, or the command itself, started for the ranks.
-fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
-    if ranks == 1 {
-        return vec![child.id()];
-    }
-    let children = format!("/proc/{0}/task/{0}/children", child.id());
-    let text = std::fs::read_to_string(children).unwrap_or_default();
-    text.split_whitespace()
-        .filter_map(|id| id.parse().ok())
-        .collect()
 }
 
 fn send(signal: &str, process: u32) {

@@ -509,6 +509,27 @@ fn the_estimated_result_holds_the_set_of_the_output() {
 }
 
 #[test]
+fn the_estimated_checkpoint_holds_the_history_of_bonds() {
+    let remembers = "ordinary_viscoelastic = { density = 2, youngs_modulus = 5, poisson_ratio = 0.2, \
+                     relaxation_time = 1, relaxing_share = 0.5 }";
+    for law in [
+        "pmb = { density = 2, youngs_modulus = 5 }",
+        "elastic_plastic_pmb = { density = 2, youngs_modulus = 5, yield_stretch = 0.1 }",
+        remembers,
+    ] {
+        let text = plate("")
+            .replace("pmb = { density = 2, youngs_modulus = 5 }", law)
+            .replace("upper = [12, 8]", "upper = [120, 80]");
+        let plan = plan(&text);
+        let look = look(&plan, 1, false).unwrap_or_else(|error| panic!("{error}"));
+        let clock = even_clock(&plan, &look.steps);
+        let estimate = Cost::estimate(&plan, &size(&plan).unwrap(), &clock);
+        let off = estimate.checkpoint / look.cost.checkpoint - 1.0;
+        assert!(off.abs() < 0.1, "{law}: {off}");
+    }
+}
+
+#[test]
 fn steps_follow_the_limits_of_an_adaptive_step() {
     // The stable step is about 0.4 s; no bond breaks.
     for (step, largest) in [

@@ -25,11 +25,15 @@ const ON_LATTICE: f64 = 1.0 / 8.0;
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
-/// Bytes a point, and a bond of a list, at the fullest moment of the set-up, where it is not measured.
-const SET_UP: [f64; 2] = [400.0, 10.5];
+/// Bytes of a point, and of a bond of a list, at the peak of the set-up of lists, where it is not measured. The set-up
+/// of lattices takes less memory than the time loop.
+const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 
-/// Copies of a column on its way to the files: by point, by id, and what is in messages.
-const COPIES: f64 = 3.0;
+/// Copies of a field on its way to the result: by point, by id, and what the file takes.
+const FIELD_COPIES: f64 = 3.0;
+
+/// Copies of a column on its way to a checkpoint, on one rank and on several: by point, by id, and in messages.
+const CHECKPOINT_COPIES: [f64; 2] = [2.0, 3.0];
 
 /// Memory of a process with points beside what it had without, bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,8 +49,9 @@ pub struct Measured {
 pub struct Cost {
     /// Memory of all ranks together at the fullest moment of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Memory of all ranks together in the time loop while something is written, without ghosts, bytes.
-    pub time_loop: f64,
+    /// Memory of all ranks together in the time loop while files are written, without ghosts, bytes: on one rank, and
+    /// on several, which exchange messages.
+    pub time_loop: [f64; 2],
     /// Number of outputs.
     pub outputs: u64,
     /// Size of the result at the end, bytes.
@@ -125,12 +130,13 @@ impl Cost {
 
     /// The most memory that one of so many ranks takes, bytes; `ghosts` as a share of its own points.
     pub fn memory_of_a_rank(&self, ranks: u32, ghosts: f64) -> f64 {
-        let points = self.set_up.max(self.time_loop) / f64::from(ranks);
-        BASE[usize::from(ranks > 1)] + points * (1.0 + ghosts)
+        let several = usize::from(ranks > 1);
+        let points = self.set_up.max(self.time_loop[several]) / f64::from(ranks);
+        BASE[several] + points * (1.0 + ghosts)
     }
 }
 
-/// Bytes of history that a law keeps for each bond of a body's points.
+/// Bytes of history of each bond of a body's points, which keeps the numbers of both ends.
 fn history_bytes(plan: &Plan, body: &Body) -> f64 {
     let law = block_laws(plan, &Block::unrefined(body)).law;
     let numbers = match plan.dimension.count() {
@@ -138,7 +144,7 @@ fn history_bytes(plan: &Plan, body: &Body) -> f64 {
         2 => law.counts::<2>().memory,
         _ => law.counts::<3>().memory,
     };
-    (size_of::<f64>() * numbers) as f64
+    (2 * size_of::<f64>() * numbers) as f64
 }
 
 /// Memory of the set-up and after it, by formula.
@@ -148,10 +154,12 @@ fn estimated(plan: &Plan, points: f64, bonds: f64, listed: f64) -> Measured {
     // point and its family; id, block.
     let state = 4 * 8 * dimension + 8 + 2 + 8 + 2;
     let kept = bonds + state as f64 * points;
-    Measured {
-        peak: kept.max(SET_UP[0] * points + SET_UP[1] * listed),
-        kept,
-    }
+    let peak = if listed > 0.0 {
+        kept.max(LIST_SET_UP[0] * points + LIST_SET_UP[1] * listed)
+    } else {
+        kept
+    };
+    Measured { peak, kept }
 }
 
 /// Ghosts of a rank as a share of its own points, if the bodies fill a box with these edges (m) that is cut
@@ -222,15 +230,17 @@ fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
     // While a field is on its way: what is known of the bonds, and its copies.
     let widest = plan.output.fields.iter().map(|field| field.components());
     let widest = widest.max().unwrap_or(0).max(3) as f64;
-    let output = counts.points * 8.0 * (5.0 + COPIES * widest);
+    let output = counts.points * 8.0 * (5.0 + FIELD_COPIES * widest);
     let bonds = counts.bonds;
     let offsets = counts.points * 24.0;
-    let checkpoint = COPIES * bonds.max(counts.points * 8.0);
+    let checkpoint =
+        CHECKPOINT_COPIES.map(|copies| copies * bonds.max(counts.points * 8.0) + offsets);
     // Read whole; then the bonds are dealt out, whose lengths and places take two numbers more.
     let restart = counts.points * 8.0 * (counts.saved as f64 + 2.0) + 2.0 * bonds;
     Cost {
         set_up: counts.memory.peak,
-        time_loop: counts.memory.kept + output.max(checkpoint + offsets).max(restart),
+        time_loop: checkpoint
+            .map(|checkpoint| counts.memory.kept + output.max(checkpoint).max(restart)),
         outputs,
         result: OVERHEAD + counts.points * written + 8.0 * rows * counts.columns,
         checkpoint: OVERHEAD + counts.points * saved + bonds,

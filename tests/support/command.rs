@@ -8,6 +8,10 @@ use std::time::{Duration, Instant};
 /// Longer than any run of a test should take, on a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// How long mpirun may go on after all of its ranks have ended. That of Open MPI 4.1.4 with PMIx 4.2.2 may wait for
+/// ever in its own end (`PMIx_server_finalize`) after a rank was killed.
+const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
+
 /// A folder that is removed with everything in it when dropped.
 pub struct Folder(pub PathBuf);
 
@@ -93,10 +97,42 @@ pub fn finish(command: &mut Command) -> Output {
     wait(child)
 }
 
-/// Waits for the end of a process that writes little.
+/// Numbers of the processes that mpirun, or the command itself, started for the ranks.
+pub fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
+    if ranks == 1 {
+        return vec![child.id()];
+    }
+    children(child)
+}
+
+/// Numbers of the processes that a process started, zombies among them.
+fn children(child: &Child) -> Vec<u32> {
+    let children = format!("/proc/{0}/task/{0}/children", child.id());
+    let text = std::fs::read_to_string(children).unwrap_or_default();
+    text.split_whitespace()
+        .filter_map(|id| id.parse().ok())
+        .collect()
+}
+
+/// Whether a process exists and is no zombie.
+pub fn is_running(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    let state = status.rsplit(") ").next().unwrap_or_default();
+    !(state.is_empty() || state.starts_with(['Z', 'X']))
+}
+
+/// Waits for the end of a process that writes little. Ends an mpirun that does not notice that all of its ranks have
+/// ended.
 pub fn wait(mut child: Child) -> Output {
     let start = Instant::now();
+    let mut last_with_ranks = start;
     while child.try_wait().unwrap().is_none() {
+        let ranks = children(&child);
+        if ranks.is_empty() || ranks.into_iter().any(is_running) {
+            last_with_ranks = Instant::now();
+        } else if last_with_ranks.elapsed() > LAUNCHER_PATIENCE {
+            child.kill().unwrap();
+        }
         if start.elapsed() > PATIENCE {
             child.kill().unwrap();
             panic!(
