@@ -7,14 +7,14 @@
 
 use std::process::ExitCode;
 
-use fissure::deck::plan::{
-    Calibration, Damage, DamageRule, Law, Material, Plan, Sense, Shape, Toughness, WorkMeasure,
-    WorkRule,
-};
 use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
 use fissure::error::Result;
-use fissure::survey::parting_cost;
+use fissure::problem::{
+    Calibration, Damage, DamageRule, Law, Material, Problem, Sense, Shape, Toughness, WorkMeasure,
+    WorkRule,
+};
+use fissure::survey::separation_energy_ratio;
 
 /// Horizon over spacing.
 const RATIO: f64 = 4.0;
@@ -45,8 +45,9 @@ fn print_table() -> Result<()> {
             if law != "ordinary" && criterion != "work" {
                 continue;
             }
-            let plan = body(law, ratio, rule)?;
-            let costs = ANGLES.map(|angle| parting_cost(&plan, 0, angle.to_radians()));
+            let problem = body(law, ratio, rule)?;
+            let costs =
+                ANGLES.map(|angle| separation_energy_ratio(&problem, 0, angle.to_radians()));
             let costs = costs.map(|cost| cost.map_or(String::new(), |cost| format!("{cost:.4}")));
             println!("{law},{ratio},{criterion},{}", costs.join(","));
         }
@@ -71,8 +72,8 @@ fn rules() -> [(&'static str, DamageRule); 3] {
 }
 
 /// A body in plane strain whose bonds break at stretches of about 0.02.
-pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Plan> {
-    let mut plan = Plan::new(Dimension::PlaneStrain { thickness: 1.0 }, RATIO, 1.0);
+pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Problem> {
+    let mut problem = Problem::new(Dimension::PlaneStrain { thickness: 1.0 }, RATIO, 1.0);
     let elastic = Isotropic {
         youngs_modulus: 3e3,
         poisson_ratio,
@@ -84,6 +85,6 @@ pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Plan> {
         lower: [0.0; 3],
         upper: [1.0, 1.0, 0.0],
     };
-    plan.add_body("block", material, Some(damage), cell, 1.0);
-    Ok(plan)
+    problem.add_body("block", material, Some(damage), cell, 1.0);
+    Ok(problem)
 }

@@ -34,11 +34,11 @@ fn main() -> ExitCode {
 /// Runs a deck and writes the result into a folder, in the place of an earlier one.
 pub fn run_deck(deck: &Path, folder: &Path, comm: &dyn Communicator) -> Result<Outcome> {
     let deck = agree(comm, deck::read(deck, &[]))?;
-    let plan = agree(comm, deck.plan())?;
+    let problem = agree(comm, deck.problem())?;
     let mut options = Options::new(folder);
     options.existing = Existing::Replace;
     options.deck = Some(agree(comm, deck.explain())?);
-    fissure::run(&plan, comm, options, &mut Unobserved)
+    fissure::run(&problem, comm, options, &mut Unobserved)
 }
 
 fn print_energies(outcome: &Outcome) {

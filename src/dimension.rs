@@ -44,7 +44,7 @@ impl Dimension {
     }
 
     /// What a length, area or volume is multiplied by to be a volume: m², m or 1.
-    pub fn section(self) -> f64 {
+    pub fn out_of_plane_measure(self) -> f64 {
         match self {
             Self::Line { cross_section, .. } => cross_section,
             Self::PlaneStress { thickness } | Self::PlaneStrain { thickness } => thickness,

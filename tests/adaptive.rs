@@ -3,7 +3,7 @@
 
 use crate::support::command::{Folder, finish, fissure, text};
 use crate::support::saved::{state, whole};
-use crate::support::{plan, simulate, simulate_on};
+use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
@@ -110,16 +110,16 @@ fn ranks_do_not_change_a_bit() {
 
 #[test]
 fn goes_on_from_any_step_to_the_same_bits() {
-    let plan = plan(&torn(&format!("safety = 0.8, {RULE}")));
+    let problem = problem(&torn(&format!("safety = 0.8, {RULE}")));
     let run = |stop: u64| {
         let parts = threads::run(2, |comm: &dyn Communicator| {
-            let mut simulation = Simulation::<2>::new(&plan, comm).unwrap();
+            let mut simulation = Simulation::<2>::new(&problem, comm).unwrap();
             for _ in 0..stop {
                 simulation.advance();
             }
             if stop > 0 {
                 let (order, saved) = state(&simulation);
-                simulation = Simulation::new(&plan, comm).unwrap();
+                simulation = Simulation::new(&problem, comm).unwrap();
                 simulation.restore(&order, &saved).unwrap();
                 assert_eq!(state(&simulation).1, saved);
             }

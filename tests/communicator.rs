@@ -10,7 +10,7 @@ use rayon::ThreadPoolBuilder;
 use crate::support::command::is_rank;
 use crate::support::simulate_on;
 
-/// Numbers of a message that waits for its receiver: larger than what any MPI sends at once.
+/// LaneTuple of a message that waits for its receiver: larger than what any MPI sends at once.
 const LARGE: usize = 1 << 20;
 
 #[test]

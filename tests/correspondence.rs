@@ -1,9 +1,9 @@
 //! Correspondence laws: strains and stresses to rounding, also where families are cut, and motions that the
 //! deformation gradient does not see.
 
-use fissure::deck::plan::Field;
+use fissure::problem::Field;
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 use nalgebra::{DMatrix, Matrix3, Matrix6, Rotation3, Vector3};
 
@@ -335,7 +335,7 @@ fn spectrum<const D: usize>(mut simulation: Simulation<D>) -> Vec<f64> {
     for column in 0..count {
         for sign in [1.0, -1.0] {
             simulation.fields.displacement[column % D][column / D] = sign * step;
-            simulation.evaluate(Evolution::None);
+            simulation.evaluate(BondUpdate::None);
             for (point, force) in forces(&simulation).into_iter().enumerate() {
                 for d in 0..D {
                     let slope = -sign * force[d] * simulation.model.volume[point] / (2.0 * step);

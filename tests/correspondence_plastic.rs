@@ -1,8 +1,8 @@
 //! J2 plasticity in correspondence: against one-dimensional curves, under rotation, and in motion.
 
-use fissure::deck::plan::Field;
+use fissure::problem::Field;
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 use crate::support::{forces, simulate};
@@ -35,7 +35,7 @@ fn deck(dimension: &str, more: &str) -> String {
 fn strain<const D: usize>(
     simulation: &mut Simulation<D>,
     gradient: [[f64; 3]; 3],
-    evolution: Evolution,
+    evolution: BondUpdate,
 ) {
     for point in 0..simulation.model.volume.len() {
         let place = simulation.model.position(point);
@@ -122,7 +122,7 @@ fn follow<const D: usize>(
                 strain(
                     &mut simulation,
                     motion(share * yields, across),
-                    Evolution::None,
+                    BondUpdate::None,
                 );
                 same(&mut simulation, Field::Stress)[1]
             };
@@ -140,7 +140,7 @@ fn follow<const D: usize>(
         strain(
             &mut simulation,
             motion(share * yields, across),
-            Evolution::Step(0.0),
+            BondUpdate::Step(0.0),
         );
         let stress = seen(&same(&mut simulation, Field::Stress));
         assert!(
@@ -219,7 +219,7 @@ fn in_plane_strain_the_stress_across_is_that_of_the_body_that_has_flowed() {
         for (number, share) in cycle().enumerate() {
             let along = share * YIELD / YOUNG;
             let gradient = [[2.0 * along, 0.0, 0.0], [0.0, -along, 0.0], [0.0; 3]];
-            strain(&mut simulation, gradient, Evolution::Step(0.0));
+            strain(&mut simulation, gradient, BondUpdate::Step(0.0));
             let mises = same(&mut simulation, Field::VonMisesStress)[0];
             let flowed = same(&mut simulation, Field::PlasticStrainEquivalent)[0];
             let limit = YIELD + HARDENING * flowed;
@@ -250,16 +250,16 @@ fn forces_that_are_only_looked_at_change_nothing() {
                 fields.plastic_work.clone(),
             )
         };
-        strain(&mut simulation, pulled(9.0), Evolution::Step(0.0));
+        strain(&mut simulation, pulled(9.0), BondUpdate::Step(0.0));
         let (before, kept) = (forces(&simulation), state(&simulation));
         assert!(kept.1.as_ref().unwrap()[0] > 0.0);
-        strain(&mut simulation, pulled(-40.0), Evolution::None);
+        strain(&mut simulation, pulled(-40.0), BondUpdate::None);
         assert_ne!(forces(&simulation), before);
         assert_eq!(state(&simulation), kept);
-        strain(&mut simulation, pulled(9.0), Evolution::None);
+        strain(&mut simulation, pulled(9.0), BondUpdate::None);
         assert_eq!(forces(&simulation), before);
         // Nor does a step that brings nothing new.
-        strain(&mut simulation, pulled(9.0), Evolution::Step(0.0));
+        strain(&mut simulation, pulled(9.0), BondUpdate::Step(0.0));
         assert_eq!(forces(&simulation), before);
         assert_eq!(state(&simulation), kept);
     });
@@ -276,7 +276,7 @@ fn a_body_that_has_flowed_does_not_flow_when_it_turns() {
             let turned = nalgebra::Rotation3::new(axis * turn) * stretched;
             let gradient = turned - nalgebra::Matrix3::identity();
             let gradient = std::array::from_fn(|a| std::array::from_fn(|b| gradient[(a, b)]));
-            strain(&mut simulation, gradient, Evolution::Step(0.0));
+            strain(&mut simulation, gradient, BondUpdate::Step(0.0));
             [Field::PlasticStrainEquivalent, Field::VonMisesStress]
                 .map(|field| same(&mut simulation, field)[0])
         };

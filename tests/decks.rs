@@ -8,8 +8,9 @@
 use std::path::{Path, PathBuf};
 
 use fissure::comm::threads;
-use fissure::deck::{self, Deck, Plan, Source};
+use fissure::deck::{self, Deck, Source};
 use fissure::error::{ErrorKind, Result};
+use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::survey::look;
 use proptest::prelude::*;
@@ -40,9 +41,9 @@ fn right_decks() -> Vec<Source> {
     sources
 }
 
-/// Number of points, and first step (s) and number of steps of each stage, of the run that a plan makes.
-fn prepare(plan: &Plan) -> Result<(u64, Vec<(f64, f64)>)> {
-    let look = look(plan, 1, false)?;
+/// Number of points, and first step (s) and number of steps of each stage, of the run that a problem makes.
+fn prepare(problem: &Problem) -> Result<(u64, Vec<(f64, f64)>)> {
+    let look = look(problem, 1, false)?;
     Ok((look.points, look.steps))
 }
 
@@ -80,7 +81,7 @@ fn a_wrong_deck_gets_the_message_beside_its_mistake() {
     for path in &paths {
         let source = Source::read(path).unwrap();
         let expected = expected(path, &source.text);
-        match deck::parse(&source).and_then(|plan| prepare(&plan)) {
+        match deck::parse(&source).and_then(|problem| prepare(&problem)) {
             Ok(_) => failures.push(format!("{}: no error", path.display())),
             Err(error) => {
                 assert_eq!(error.kind, ErrorKind::Input, "{}", path.display());
@@ -98,8 +99,8 @@ fn a_wrong_deck_gets_the_message_beside_its_mistake() {
 #[test]
 fn a_right_deck_makes_a_run() {
     for source in right_decks() {
-        let plan = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
-        let (points, stages) = prepare(&plan).unwrap_or_else(|error| panic!("{error}"));
+        let problem = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
+        let (points, stages) = prepare(&problem).unwrap_or_else(|error| panic!("{error}"));
         let all_step = stages
             .iter()
             .all(|(step, steps)| *step > 0.0 && *steps >= 1.0);
@@ -140,7 +141,7 @@ enum Token {
     Text(String),
 }
 
-/// Numbers at the borders of what numbers can be, and openings of everything.
+/// LaneTuple at the borders of what numbers can be, and openings of everything.
 const ODD: &[&str] = &[
     "0",
     "-1",
@@ -315,7 +316,7 @@ proptest! {
 
 #[test]
 fn defaults_are_the_accurate_ones() {
-    use fissure::deck::plan::VolumeCorrection;
+    use fissure::problem::VolumeCorrection;
 
     let deck = |grid: &str, body: &str| {
         let text = format!(
@@ -332,13 +333,13 @@ fn defaults_are_the_accurate_ones() {
             text,
         };
         let deck = Deck::new(source).unwrap();
-        let plan = deck.plan().unwrap();
-        (deck.explain().unwrap(), plan)
+        let problem = deck.problem().unwrap();
+        (deck.explain().unwrap(), problem)
     };
     let shape = "shape.box = { lower = [0, 0], upper = [0.06, 0.03] }";
-    let (full, plan) = deck("spacing = 1e-3, horizon = 3e-3", shape);
-    assert_eq!(plan.volume_correction, VolumeCorrection::Exact);
-    assert_eq!(plan.bodies[0].damage.as_ref().unwrap().alpha, 0.0);
+    let (full, problem) = deck("spacing = 1e-3, horizon = 3e-3", shape);
+    assert_eq!(problem.volume_correction, VolumeCorrection::Exact);
+    assert_eq!(problem.bodies[0].damage.as_ref().unwrap().alpha, 0.0);
     assert!(full.contains("volume_correction = \"exact\""), "{full}");
     // Points that are no centres of cells have no cells to share.
     for (grid, body) in [
@@ -349,8 +350,8 @@ fn defaults_are_the_accurate_ones() {
         ),
         ("horizon = 3e-3", "points.file = 'points.csv'"),
     ] {
-        let (full, plan) = deck(grid, body);
-        assert_eq!(plan.volume_correction, VolumeCorrection::None, "{grid}");
+        let (full, problem) = deck(grid, body);
+        assert_eq!(problem.volume_correction, VolumeCorrection::None, "{grid}");
         assert!(full.contains("volume_correction = \"none\""), "{full}");
     }
 }
@@ -370,17 +371,18 @@ fn filled(grid: &str, bodies: &str) -> (Vec<usize>, Vec<[f64; 3]>, bool) {
         path: "deck.toml".into(),
         text,
     };
-    let plan = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
+    let problem = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
     let comm = threads::alone();
-    let simulation = Simulation::<2>::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}"));
+    let simulation =
+        Simulation::<2>::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}"));
     let (model, forces) = (&simulation.model, &simulation.forces);
     let of = |body: usize| {
         let blocks = model.block.iter();
         blocks
-            .filter(|block| plan.body_of(usize::from(**block)) == body)
+            .filter(|block| problem.body_of(usize::from(**block)) == body)
             .count()
     };
-    let counts = (0..plan.bodies.len()).map(of).collect();
+    let counts = (0..problem.bodies.len()).map(of).collect();
     let places = (0..model.owned())
         .map(|point| model.position(point))
         .collect();

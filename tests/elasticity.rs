@@ -2,7 +2,7 @@
 //! forms and against sums over lattice offsets made here.
 
 use crate::support::{displace, simulate};
-use fissure::deck::plan::Field;
+use fissure::problem::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 

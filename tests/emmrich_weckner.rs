@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use crate::support::simulate_input;
-use fissure::deck::plan::Field;
 use fissure::points::distance_squared;
+use fissure::problem::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 

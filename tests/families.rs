@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use crate::support::command::{Folder, finish, fissure, succeed, text};
 use crate::support::datasets::{datasets, difference};
-use crate::support::{plan, simulate_on};
-use fissure::deck::plan::Field;
+use crate::support::{problem, simulate_on};
+use fissure::problem::Field;
 use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 
@@ -119,7 +119,7 @@ fn measure<const D: usize>(ranks: usize, deck: &str) -> Vec<(Field, Vec<f64>)> {
 
 fn compare<const D: usize>(deck: &str) {
     let with = |family: &str| deck.replace("[grid]", &format!("[grid]\nfamily = '{family}'"));
-    plan(&with("lattice"));
+    problem(&with("lattice"));
     let list = measure::<D>(1, &with("list"));
     let lattice = measure::<D>(1, &with("lattice"));
     let broken: f64 = list[2].1.iter().sum();

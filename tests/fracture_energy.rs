@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use fissure::comm::threads::alone;
 use fissure::solver::Simulation;
-use fissure::survey::{calibrated, parting_cost};
+use fissure::survey::{calibrated, separation_energy_ratio};
 
-use crate::support::{displace, plan, simulate};
+use crate::support::{displace, problem, simulate};
 
 /// G0, J/m².
 const FRACTURE_ENERGY: f64 = 2.0;
@@ -297,8 +297,8 @@ fn by_the_energy_of_bonds_of_the_ordinary_law() {
 fn what_a_survey_says_of_parting() {
     for (law, bound) in [(PMB, 1e-3), (&*ordinary(0.4, "constant"), 0.01)] {
         let found = |dimension, ratio, angle: f64| {
-            let plan = plan(&text(dimension, ratio, law, ENERGY));
-            parting_cost(&plan, 0, angle.to_radians()).unwrap()
+            let problem = problem(&text(dimension, ratio, law, ENERGY));
+            separation_energy_ratio(&problem, 0, angle.to_radians()).unwrap()
         };
         let pairs = [
             (
@@ -314,12 +314,12 @@ fn what_a_survey_says_of_parting() {
             );
         }
     }
-    let line = plan(&text("1d", 3, PMB, STRETCH));
+    let line = problem(&text("1d", 3, PMB, STRETCH));
     let wanted = cost::<1>("1d", 3, PMB, STRETCH, 0.01);
-    assert!((parting_cost(&line, 0, 0.0).unwrap() / wanted - 1.0).abs() < 1e-3);
+    assert!((separation_energy_ratio(&line, 0, 0.0).unwrap() / wanted - 1.0).abs() < 1e-3);
     // A critical stretch is not measured by an energy.
     let stretch = text("1d", 3, PMB, STRETCH).replace("fracture_energy", "critical_stretch");
-    assert_eq!(parting_cost(&plan(&stretch), 0, 0.0), None);
+    assert_eq!(separation_energy_ratio(&problem(&stretch), 0, 0.0), None);
 }
 
 #[test]
@@ -328,22 +328,22 @@ fn calibrated_by_opening() {
     // The order in which bonds of correspondence break moves its cost by some per cent.
     for (law, bound) in [(CORRESPONDENCE, 0.05), (&*ordinary(0.4, "constant"), 0.01)] {
         for (dimension, ratio) in [("plane-strain", 3), ("plane-stress", 4), ("3d", 2)] {
-            let plan = plan(&text(dimension, ratio, law, rule));
-            let plan = calibrated(&plan).unwrap();
-            let cost = parting_cost(&plan, 0, 0.0).unwrap();
+            let problem = problem(&text(dimension, ratio, law, rule));
+            let problem = calibrated(&problem).unwrap();
+            let cost = separation_energy_ratio(&problem, 0, 0.0).unwrap();
             assert!((cost - 1.0).abs() < bound, "{law} {dimension}: {cost}");
         }
     }
     // Nothing to do.
-    let plain = plan(&text("plane-strain", 3, PMB, ENERGY));
+    let plain = problem(&text("plane-strain", 3, PMB, ENERGY));
     assert!(matches!(calibrated(&plain), Ok(Cow::Borrowed(_))));
-    let large = plan(&text("3d", 9, CORRESPONDENCE, rule));
+    let large = problem(&text("3d", 9, CORRESPONDENCE, rule));
     let error = calibrated(&large).unwrap_err();
     let wanted =
         "test.toml:14:9: [body.block] damage: what opening this body costs cannot be measured";
     assert!(error.message.starts_with(wanted), "{error}");
     let (unmeasured, comm) = (
-        plan(&text("plane-strain", 3, CORRESPONDENCE, rule)),
+        problem(&text("plane-strain", 3, CORRESPONDENCE, rule)),
         alone(),
     );
     let error = Simulation::<2>::new(&unmeasured, &comm).err().unwrap();

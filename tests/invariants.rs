@@ -3,11 +3,11 @@
 //! however it is run.
 
 use crate::support::saved::{state, whole};
-use crate::support::{displace, force, forces, largest_force, plan, simulate, simulate_on};
+use crate::support::{displace, force, forces, largest_force, problem, simulate, simulate_on};
 use fissure::dimension::{Constraint, Dimension};
 use fissure::material::{Declaration, Invariants, declarations};
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 use fissure::solver::motion::{Kept, Saved, SavedBonds};
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
@@ -38,12 +38,12 @@ impl Case {
 
     /// Whether the law has a 1-D form.
     fn has_line(self) -> bool {
-        let plan = plan(&deck("plane-stress", &self.table(), "none", ""));
+        let problem = problem(&deck("plane-stress", &self.table(), "none", ""));
         let line = Dimension::Line {
             cross_section: 1.0,
             constraint: Constraint::UniaxialStress,
         };
-        plan.bodies[0].material.law.fault(line).is_none()
+        problem.bodies[0].material.law.fault(line).is_none()
     }
 
     fn can_break(&self) -> bool {
@@ -70,8 +70,8 @@ impl Case {
     }
 
     fn invariants(&self) -> Invariants {
-        let plan = plan(&deck("plane-stress", &self.table(), "none", ""));
-        (self.law.invariants)(&plan.bodies[0].material.law.values)
+        let problem = problem(&deck("plane-stress", &self.table(), "none", ""));
+        (self.law.invariants)(&problem.bodies[0].material.law.values)
     }
 
     fn is_conservative(&self) -> bool {
@@ -184,7 +184,7 @@ fn a_body_that_is_turned_has_its_forces_turned() {
                 let wanted = turn::<D>(angle, whole);
                 for (after, wanted) in after.iter().zip(wanted) {
                     let error = (after - wanted).abs();
-                    let deck = &simulation.plan.source.text;
+                    let deck = &simulation.problem.source.text;
                     assert!(error < 1e-11 * scale, "{after} {wanted}: {deck}");
                 }
             }
@@ -208,7 +208,7 @@ fn nothing_under_finite_rotation() {
         for angle in ANGLES {
             displace(&mut simulation, |x| turn::<D>(angle, x));
             let largest = largest_force(&simulation);
-            let deck = &simulation.plan.source.text;
+            let deck = &simulation.problem.source.text;
             assert!(largest < 1e-12 * scale, "{largest} of {scale}: {deck}");
         }
     }
@@ -230,7 +230,7 @@ fn no_bond_breaks_under_rigid_rotation_of_any_size() {
         let strained = |[x, y, z]: [f64; 3]| [1.001 * x, 0.9995 * y + 5e-4 * x, 0.9997 * z];
         for angle in [0.0, 0.01, 0.3, 1.0, 2.5, std::f64::consts::PI] {
             displace(&mut simulation, |x| turn::<D>(angle, strained(x)));
-            let deck = &simulation.plan.source.text;
+            let deck = &simulation.problem.source.text;
             assert_eq!(simulation.forces.broken().len(), 0, "{angle}: {deck}");
         }
         assert_eq!(count_intact(&mut simulation), before);
@@ -270,7 +270,7 @@ fn wave(x: [f64; 3]) -> [f64; 3] {
 /// The moments of all forces about the axes, and the sums of their sizes, N m; arms are those of the
 /// bonds, deformed, except where forces act along undeformed ones.
 fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
-    let bodies = &simulation.plan.bodies;
+    let bodies = &simulation.problem.bodies;
     let linear = (bodies.iter()).any(|body| body.material.law.declaration.linear);
     let model = &simulation.model;
     let mut sums = [[0.0; 2]; 3];
@@ -296,7 +296,11 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
 /// Forces add up to nothing, and do not turn the body where the law says so.
 fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
     displace(&mut simulation, wave);
-    let laws = simulation.plan.bodies.iter().map(|body| &body.material.law);
+    let laws = simulation
+        .problem
+        .bodies
+        .iter()
+        .map(|body| &body.material.law);
     let mut kept = laws.map(|law| (law.declaration.invariants)(&law.values));
     let bound = if kept.all(|invariants| invariants.angular_momentum) {
         1e-12
@@ -379,7 +383,7 @@ fn two_blocks() -> Vec<String> {
 
 /// Strain energy of the whole body, J.
 fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
-    simulation.evaluate(Evolution::None);
+    simulation.evaluate(BondUpdate::None);
     let stored = simulation.forces.stored(&simulation.model);
     let energy = stored.energy.iter().zip(simulation.model.volume.iter());
     energy.map(|(density, volume)| density * volume).sum()
@@ -402,7 +406,7 @@ fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
             simulation.fields.displacement[d][point] = place;
             let slope = -(above - below) / (2.0 * step);
             let scale = force.abs().max(1e-3);
-            let deck = &simulation.plan.source.text;
+            let deck = &simulation.problem.source.text;
             assert!(
                 (force - slope).abs() < 1e-5 * scale,
                 "{force} {slope}: {deck}"
@@ -461,7 +465,7 @@ fn check_slope_after_loading<const D: usize>(mut simulation: Simulation<D>) {
             let moved = wave(x);
             std::array::from_fn(|k| x[k] + share * (moved[k] - x[k]))
         });
-        simulation.evaluate(Evolution::Step(0.05));
+        simulation.evaluate(BondUpdate::Step(0.05));
     }
     check_slope(simulation);
 }
@@ -781,7 +785,7 @@ fn a_pre_crack_shows_as_damage_and_cuts_forces() {
             row.broken, 0,
             "bonds that start broken do not count as broken by the run"
         );
-        let damage = snapshot.field(&mut simulation, fissure::deck::plan::Field::Damage);
+        let damage = snapshot.field(&mut simulation, fissure::problem::Field::Damage);
         for (point, damage) in damage.iter().enumerate() {
             let [x, y, _] = simulation.model.position(point);
             match ((y - 9.0).abs(), x) {

@@ -1,13 +1,13 @@
-//! What follows from the laws' declarations: the README's table, and laws for plans made in Rust.
+//! What follows from the laws' declarations: the README's table, and laws for problems made in Rust.
 
 use fissure::comm::threads;
-use fissure::deck::expression::Expression;
-use fissure::deck::plan::{
-    Damage, DamageRule, Law, Material, Plan, Shape, StepRule, Toughness, VolumeCorrection,
-};
 use fissure::dimension::{Constraint, Dimension};
 use fissure::elastic::Isotropic;
+use fissure::expression::Expression;
 use fissure::material::{Declaration, Key, Kind, declarations};
+use fissure::problem::{
+    Damage, DamageRule, Law, Material, Problem, Shape, StepRule, Toughness, VolumeCorrection,
+};
 use fissure::solver::Simulation;
 
 fn key(key: &Key) -> String {
@@ -78,11 +78,11 @@ fn names_of_laws_and_keys_are_said_once_and_have_a_meaning() {
     }
 }
 
-/// A plan of a small body with a law, built in Rust.
-fn body(dimension: Dimension, law: Law, damage: Option<Damage>) -> Plan {
-    let mut plan = Plan::new(dimension, 3.0, 1.0);
-    plan.time.step = StepRule::Fixed(0.01);
-    plan.volume_correction = VolumeCorrection::Linear;
+/// A problem of a small body with a law, built in Rust.
+fn body(dimension: Dimension, law: Law, damage: Option<Damage>) -> Problem {
+    let mut problem = Problem::new(dimension, 3.0, 1.0);
+    problem.time.step = StepRule::Fixed(0.01);
+    problem.volume_correction = VolumeCorrection::Linear;
     let elastic = Isotropic {
         youngs_modulus: 5.0,
         poisson_ratio: 0.25,
@@ -91,19 +91,19 @@ fn body(dimension: Dimension, law: Law, damage: Option<Damage>) -> Plan {
         lower: [0.0; 3],
         upper: [6.0; 3],
     };
-    plan.add_body("cube", Material::new(law, 2.0, elastic), damage, cube, 1.0);
-    plan
+    problem.add_body("cube", Material::new(law, 2.0, elastic), damage, cube, 1.0);
+    problem
 }
 
-/// What is wrong with a plan in `D` dimensions.
-fn fault<const D: usize>(plan: &Plan) -> Option<String> {
+/// What is wrong with a problem in `D` dimensions.
+fn fault<const D: usize>(problem: &Problem) -> Option<String> {
     let comm = threads::alone();
-    let made = Simulation::<D>::new(plan, &comm);
+    let made = Simulation::<D>::new(problem, &comm);
     made.err().map(|error| error.message)
 }
 
 #[test]
-fn a_law_of_a_plan_in_rust_is_checked_before_the_run() {
+fn a_law_of_a_problem_in_rust_is_checked_before_the_run() {
     let law = |name| Law::named(name).unwrap();
     let line = Dimension::Line {
         cross_section: 1.0,

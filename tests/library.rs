@@ -6,19 +6,19 @@ use std::time::Duration;
 use crate::support::command::{Folder, fissure, succeed};
 use crate::support::datasets::{datasets, difference};
 use fissure::comm::threads;
-use fissure::deck::plan::{Interval, Plan, StepRule};
 use fissure::error::ErrorKind;
 use fissure::output::ResultReader;
+use fissure::problem::{Interval, Problem, StepRule};
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Row, Unobserved, View};
 
 #[allow(dead_code, reason = "the test calls what the example's main calls")]
-#[path = "../examples/plan_in_rust.rs"]
-mod plan_in_rust;
+#[path = "../examples/problem_in_rust.rs"]
+mod problem_in_rust;
 #[allow(dead_code, reason = "as above")]
 #[path = "../examples/run_deck.rs"]
 mod run_deck;
 
-/// The plate of `examples/plan_in_rust.rs` as a deck.
+/// The plate of `examples/problem_in_rust.rs` as a deck.
 const PLATE: &str = "title = 'A plate built in Rust'
     dimension = 'plane-stress'
     thickness = 1e-3
@@ -79,14 +79,14 @@ impl Observer for Notes {
     }
 }
 
-fn run(plan: &Plan, options: Options, observer: &mut dyn Observer) -> Outcome {
-    fissure::run(plan, &threads::alone(), options, observer)
+fn run(problem: &Problem, options: Options, observer: &mut dyn Observer) -> Outcome {
+    fissure::run(problem, &threads::alone(), options, observer)
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
 fn a_plan_built_in_rust_gives_the_bits_of_its_deck() {
-    let folder = Folder::new("plan-in-rust");
+    let folder = Folder::new("problem-in-rust");
     let deck = folder.write("plate.toml", PLATE);
     let by_command = folder.join("command");
     let mut command = fissure(1);
@@ -106,10 +106,10 @@ fn a_plan_built_in_rust_gives_the_bits_of_its_deck() {
     };
     assert_eq!(attributes(&by_deck), attributes(&by_command));
 
-    let plan = plan_in_rust::plate(3e-5).unwrap();
+    let problem = problem_in_rust::plate(3e-5).unwrap();
     let built = folder.join("built");
     let mut notes = Notes::default();
-    let built_outcome = run(&plan, Options::new(&built), &mut notes);
+    let built_outcome = run(&problem, Options::new(&built), &mut notes);
     assert_eq!(difference(&expected, &result(&built)), None);
 
     let last = outcome.last;
@@ -141,29 +141,29 @@ fn a_plan_built_in_rust_gives_the_bits_of_its_deck() {
 #[test]
 fn a_run_from_rust_that_was_stopped_goes_on() {
     let folder = Folder::new("stopped-in-rust");
-    let mut plan = plan_in_rust::plate(2e-5).unwrap();
-    plan.time.step = StepRule::Fixed(5e-8);
+    let mut problem = problem_in_rust::plate(2e-5).unwrap();
+    problem.time.step = StepRule::Fixed(5e-8);
     let whole = folder.join("whole");
-    let outcome = run(&plan, Options::new(&whole), &mut Unobserved);
+    let outcome = run(&problem, Options::new(&whole), &mut Unobserved);
     assert_eq!(outcome.last, 400);
 
     let parts = folder.join("parts");
     let mut options = Options::new(&parts);
     options.wall_time = Some(Duration::ZERO);
     let mut notes = Notes::default();
-    let outcome = run(&plan, options, &mut notes);
+    let outcome = run(&problem, options, &mut notes);
     assert_eq!(outcome.stopped, Some(Reason::WallTime));
     assert_eq!(notes.complete, Some(false));
     assert!(outcome.number < 400 && outcome.summary.checkpoints == 1);
 
-    let attempt = |plan: &Plan, existing: Existing, observer: &mut dyn Observer| {
+    let attempt = |problem: &Problem, existing: Existing, observer: &mut dyn Observer| {
         let mut options = Options::new(&parts);
         options.existing = existing;
-        fissure::run(plan, &threads::alone(), options, observer)
+        fissure::run(problem, &threads::alone(), options, observer)
     };
-    let error = attempt(&plan, Existing::Refuse, &mut Unobserved).unwrap_err();
+    let error = attempt(&problem, Existing::Refuse, &mut Unobserved).unwrap_err();
     assert_eq!(error.kind, ErrorKind::Input);
-    let mut other = plan.clone();
+    let mut other = problem.clone();
     other.bodies[0].material.density = 2500.0;
     let error = attempt(&other, Existing::Continue, &mut Unobserved).unwrap_err();
     assert_eq!(error.kind, ErrorKind::Input);
@@ -175,9 +175,9 @@ fn a_run_from_rust_that_was_stopped_goes_on() {
     );
 
     // Other intervals are no other physics.
-    plan.checkpoint = fissure::deck::plan::CheckpointRule::Simulation(Interval::Steps(100));
+    problem.checkpoint = fissure::problem::CheckpointRule::Simulation(Interval::Steps(100));
     let mut notes = Notes::default();
-    let continued = attempt(&plan, Existing::Continue, &mut notes).unwrap();
+    let continued = attempt(&problem, Existing::Continue, &mut notes).unwrap();
     assert!(notes.messages.contains(&Message::Continued {
         number: outcome.number,
         time: outcome.time,

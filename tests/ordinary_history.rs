@@ -1,8 +1,8 @@
 //! Ordinary laws with memory: relaxation and yielding against closed forms.
 
-use fissure::deck::plan::Field;
+use fissure::problem::Field;
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 use crate::support::simulate;
@@ -39,7 +39,7 @@ fn strain<const D: usize>(
         let place = simulation.model.position(point);
         simulation.fields.displacement[0][point] = strain * over(place);
     }
-    simulation.evaluate(Evolution::Step(step));
+    simulation.evaluate(BondUpdate::Step(step));
 }
 
 /// Shears the body to γ in a step (s).

@@ -189,7 +189,7 @@ fn work_goes_into_energy_and_dissipation() {
                 let size = 1e-6;
                 let mut after = |step: f64| {
                     simulation.fields.displacement[d][point] += step;
-                    simulation.evaluate(fissure::solver::bonds::Evolution::Step(0.0));
+                    simulation.evaluate(fissure::solver::bonds::BondUpdate::Step(0.0));
                     let after = total(&mut simulation);
                     simulation.undo(&kept);
                     after

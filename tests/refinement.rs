@@ -5,7 +5,7 @@ use fissure::solver::Simulation;
 use fissure::solver::observers::Snapshot;
 use fissure::solver::refinement::Regridded;
 
-use crate::support::{displace, plan, simulate, simulate_on};
+use crate::support::{displace, problem, simulate, simulate_on};
 
 /// A plate with a hole, refined twice around a place on its edge and once elsewhere.
 fn plate(more: &str) -> String {
@@ -137,8 +137,8 @@ fn action_and_reaction_cancel_across_levels() {
 #[test]
 fn horizons_follow_their_rule() {
     let horizons = |more: &str| {
-        let plan = plan(&plate(more));
-        let mut horizons: Vec<f64> = plan.blocks().map(|block| block.horizon).collect();
+        let problem = problem(&plate(more));
+        let mut horizons: Vec<f64> = problem.blocks().map(|block| block.horizon).collect();
         horizons.dedup();
         horizons
     };
@@ -151,8 +151,8 @@ fn horizons_follow_their_rule() {
         .replace("refinement.levels = 2", own)
         .replace("rule", "levels = 2, rule");
     let own = own.replace("refinement.region", "# ");
-    let plan = plan(&own);
-    let horizons: Vec<f64> = plan.blocks().map(|block| block.horizon).collect();
+    let problem = problem(&own);
+    let horizons: Vec<f64> = problem.blocks().map(|block| block.horizon).collect();
     assert_eq!(horizons, [3.0, 3.0, 3.0, 3.0, 3.0, 6.0, 2.0, 2.0, 4.0]);
 }
 
@@ -499,7 +499,7 @@ fn points_are_triggers_only_where_they_may_be() {
         let model = &simulation.model;
         let fine = |point: &usize| {
             simulation
-                .plan
+                .problem
                 .block(usize::from(model.block[*point]))
                 .level
                 > 0
@@ -608,7 +608,7 @@ fn points_near_a_crack_stay() {
         let model = &simulation.model;
         let [x, y] = [0, 1].map(|d| model.reference[d].as_slice());
         // Where it was cut the finest points are still there, and nothing has grown together.
-        let finest = |k: &usize| simulation.plan.block(usize::from(model.block[*k])).level == 2;
+        let finest = |k: &usize| simulation.problem.block(usize::from(model.block[*k])).level == 2;
         let stay = (0..model.owned()).filter(finest).filter(|k| x[*k] > 15e-3);
         assert!(stay.count() > 100);
         let mut joined = 0;
@@ -669,7 +669,7 @@ fn a_crack_of_the_coarse_grid_stays_when_finer_ones_have_come_and_gone() {
             simulation.refine().unwrap();
             let model = &simulation.model;
             let levels = model.block.iter();
-            let levels = levels.map(|block| simulation.plan.block(usize::from(*block)).level);
+            let levels = levels.map(|block| simulation.problem.block(usize::from(*block)).level);
             finest = finest.max(levels.max().unwrap());
             let [x, y] = [0, 1].map(|d| model.reference[d].as_slice());
             let mut joined = 0;

@@ -3,11 +3,11 @@
 //! within a load step and goes on to the same bits.
 
 use crate::support::saved::{state, whole};
-use crate::support::{plan, simulate, simulate_on};
+use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
-use fissure::deck::Plan;
+use fissure::problem::Problem;
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
 
 /// Makes all load steps.
@@ -635,17 +635,17 @@ fn ranks_do_not_change_a_bit() {
 
 #[test]
 fn goes_on_from_within_a_load_step_to_the_same_bits() {
-    let plan: Plan = plan(&torn("lattice"));
+    let problem: Problem = problem(&torn("lattice"));
     let run = |stop: usize| {
         let parts = threads::run(2, |comm: &dyn Communicator| {
-            let mut simulation = Simulation::<2>::new(&plan, comm).unwrap();
+            let mut simulation = Simulation::<2>::new(&problem, comm).unwrap();
             for _ in 0..stop {
                 simulation.advance();
             }
             let settled = simulation.load_step.is_settled;
             if stop > 0 {
                 let (order, saved) = state(&simulation);
-                simulation = Simulation::new(&plan, comm).unwrap();
+                simulation = Simulation::new(&problem, comm).unwrap();
                 simulation.restore(&order, &saved).unwrap();
                 assert_eq!(state(&simulation).1, saved);
             }
@@ -699,7 +699,7 @@ fn bonds_that_flow_are_in_equilibrium_after_any_number_of_load_steps() {
             assert!((pull / 8.76 - 1.0).abs() < 5e-3, "{steps}: {pull} N");
             // The forces that go with the stored history are those of the equilibrium.
             let before = fields.internal_force.clone();
-            simulation.evaluate(Evolution::None);
+            simulation.evaluate(BondUpdate::None);
             assert_eq!(simulation.fields.internal_force, before, "{steps}");
         });
     }

@@ -2,7 +2,7 @@
 
 use crate::support::simulate;
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -83,7 +83,7 @@ fn largest_frequency<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     for column in 0..D * points {
         let [plus, minus] = [SHIFT, -SHIFT].map(|shift| {
             simulation.fields.displacement[column % D][column / D] = shift;
-            simulation.evaluate(Evolution::None);
+            simulation.evaluate(BondUpdate::None);
             simulation.fields.displacement[column % D][column / D] = 0.0;
             simulation.fields.internal_force.clone()
         });

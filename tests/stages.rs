@@ -2,7 +2,7 @@
 //! back when the load is taken off; and bodies of another density move as they must.
 
 use crate::support::saved::{state, whole};
-use crate::support::{plan, simulate, simulate_on};
+use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
@@ -242,7 +242,7 @@ fn a_change_of_density_keeps_momentum_and_books_energy() {
     for (damping, support, free) in [(0.0, "", true), (0.02, "", false), (0.02, GUIDE, false)] {
         let deck = flying(damping, support);
         assert_eq!(
-            plan_warnings(&deck),
+            problem_warnings(&deck),
             [
                 "density_scale: changes from 1 to 4 at t = 4 s",
                 "density_scale: changes from 4 to 0.5 at t = 8 s",
@@ -284,27 +284,27 @@ fn a_change_of_density_keeps_momentum_and_books_energy() {
 }
 
 /// The warnings of a deck, without places and from the key on up to the first semicolon.
-fn plan_warnings(deck: &str) -> Vec<String> {
+fn problem_warnings(deck: &str) -> Vec<String> {
     let short = |warning: &String| {
         let text = warning
             .split_once("]] ")
             .map_or(&warning[..], |(_, text)| text);
         text.split(';').next().unwrap_or_default().to_owned()
     };
-    plan(deck).warnings.iter().map(short).collect()
+    problem(deck).warnings.iter().map(short).collect()
 }
 
 #[test]
 fn a_change_of_density_is_the_same_on_any_ranks_and_after_a_restart() {
     let deck = flying(0.02, GUIDE);
-    let plan = plan(&deck);
+    let problem = problem(&deck);
     let run = |ranks: usize, stop: u64| {
         whole(threads::run(ranks, |comm: &dyn Communicator| {
-            let mut simulation = Simulation::<2>::new(&plan, comm).unwrap();
+            let mut simulation = Simulation::<2>::new(&problem, comm).unwrap();
             while !simulation.is_over() {
                 if simulation.clock.number() == stop {
                     let (order, saved) = state(&simulation);
-                    simulation = Simulation::new(&plan, comm).unwrap();
+                    simulation = Simulation::new(&problem, comm).unwrap();
                     simulation.restore(&order, &saved).unwrap();
                 }
                 simulation.advance();

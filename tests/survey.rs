@@ -2,9 +2,9 @@
 //! allows but most likely does not mean.
 
 use crate::support::command::Folder;
-use crate::support::{plan, simulate, simulate_on};
-use fissure::deck::plan::VolumeCorrection;
+use crate::support::{problem, simulate, simulate_on};
 use fissure::families::CellShare;
+use fissure::problem::VolumeCorrection;
 use fissure::solver::steps::even_clock;
 use fissure::survey::{Cost, Survey, interior, look, size};
 
@@ -302,7 +302,7 @@ fn areas_for_volumes() {
 #[test]
 fn a_point_inside_is_as_stiff_as_the_lattice_makes_it() {
     let body = |dimension: &str, law: &str, corners: &str, grid: &str| {
-        plan(&format!(
+        problem(&format!(
             "dimension = '{dimension}'
             grid = {{ spacing = 0.1, horizon = 0.3{grid} }}
             material.solid.{law} = {{ density = 2, youngs_modulus = 5 {} }}
@@ -402,7 +402,7 @@ fn the_size_of_a_run_without_making_it() {
         plate("").replace("shape.box = { lower = [0, 0], upper = [12, 8] }", "shape.union = [ { box = { lower = [0, 0], upper = [40, 40] } }, { box = { lower = [1e5, 0], upper = [100040, 40] } } ]"),
     ];
     for text in &decks {
-        let estimate = size(&plan(text)).unwrap();
+        let estimate = size(&problem(text)).unwrap();
         simulate::<2, _>(text, |simulation| {
             let points = simulation.model.total as f64;
             let bonds = simulation.forces.directed_bonds() as f64;
@@ -418,14 +418,14 @@ fn the_size_of_a_run_without_making_it() {
     }
     // A horizon far beyond the body is no more work than the body.
     let wide = plate("").replace("horizon = 3", "horizon = 3e12");
-    let found = size(&plan(&wide)).unwrap();
+    let found = size(&problem(&wide)).unwrap();
     assert_eq!(found.directed_bonds(), 96.0 * 95.0);
     let large = "dimension = '3d'
         grid = { volume_correction = 'none', spacing = 5e-4, horizon = 1.5e-3 }
         material.glass.pmb = { density = 2, youngs_modulus = 5 }
         body.cube = { material = 'glass', shape.box = { lower = [0, 0, 0], upper = [1, 1, 1] } }
         time.end = 1";
-    let found = size(&plan(large)).unwrap();
+    let found = size(&problem(large)).unwrap();
     assert_eq!(found.all_points(), 8e9);
     assert!(
         (found.directed_bonds() / (122.0 * 8e9) - 1.0).abs() < 0.01,
@@ -462,7 +462,7 @@ fn each_body_counts_its_own_rows_of_a_file() {
             time.end = 1
             "
         );
-        let found = size(&plan(&text)).unwrap();
+        let found = size(&problem(&text)).unwrap();
         assert_eq!(found.points.len(), blocks as usize);
         let near = |found: f64, expected: f64, off: f64| (found / expected - 1.0).abs() <= off;
         for points in &found.points {
@@ -497,10 +497,10 @@ fn the_estimated_result_holds_the_set_of_the_output() {
                 history.reactions = ['some']
                 body.block = {{ material = 'glass', shape.box = {{ lower = [12, 0], upper = [112, 100] }} }}"
             ));
-            let plan = plan(&text);
-            let look = look(&plan, 1, false).unwrap_or_else(|error| panic!("{error}"));
-            let clock = even_clock(&plan, &look.steps);
-            let estimate = Cost::estimate(&plan, &size(&plan).unwrap(), &clock);
+            let problem = problem(&text);
+            let look = look(&problem, 1, false).unwrap_or_else(|error| panic!("{error}"));
+            let clock = even_clock(&problem, &look.steps);
+            let estimate = Cost::estimate(&problem, &size(&problem).unwrap(), &clock);
             assert_eq!(estimate.outputs, look.cost.outputs);
             let off = estimate.result / look.cost.result - 1.0;
             assert!(off.abs() < 0.02, "{output} {set}: {off}");
@@ -520,10 +520,10 @@ fn the_estimated_checkpoint_holds_the_history_of_bonds() {
         let text = plate("")
             .replace("pmb = { density = 2, youngs_modulus = 5 }", law)
             .replace("upper = [12, 8]", "upper = [120, 80]");
-        let plan = plan(&text);
-        let look = look(&plan, 1, false).unwrap_or_else(|error| panic!("{error}"));
-        let clock = even_clock(&plan, &look.steps);
-        let estimate = Cost::estimate(&plan, &size(&plan).unwrap(), &clock);
+        let problem = problem(&text);
+        let look = look(&problem, 1, false).unwrap_or_else(|error| panic!("{error}"));
+        let clock = even_clock(&problem, &look.steps);
+        let estimate = Cost::estimate(&problem, &size(&problem).unwrap(), &clock);
         let off = estimate.checkpoint / look.cost.checkpoint - 1.0;
         assert!(off.abs() < 0.1, "{law}: {off}");
     }
@@ -539,7 +539,7 @@ fn steps_follow_the_limits_of_an_adaptive_step() {
     ] {
         let time = format!("time = {{ end = 4, {step}adaptive.largest = {largest} }}");
         let text = plate("").replace("time.end = 1", &time);
-        let look = look(&plan(&text), 1, false).unwrap();
+        let look = look(&problem(&text), 1, false).unwrap();
         let made = simulate::<2, _>(&text, |mut simulation| {
             while !simulation.is_over() {
                 simulation.advance();

@@ -168,8 +168,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         path: "benchmark.toml".into(),
         text: deck(arguments),
     };
-    let plan = deck::parse(&source)?;
-    let speed = speed(&plan, world, warm_up(arguments), arguments.steps)?;
+    let problem = deck::parse(&source)?;
+    let speed = speed(&problem, world, warm_up(arguments), arguments.steps)?;
 
     let total = |value: u64| comm::total(world, value) as f64;
     let largest = |value: f64| {

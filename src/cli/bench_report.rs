@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::cli::say;
+use crate::cli::outln;
 
 use super::bench::{Family, Law};
 use super::format::{bytes, count, si};
@@ -109,21 +109,21 @@ impl Figures {
     /// Prints a table, or one line of JSON.
     pub fn print(&self, json: bool) {
         if json {
-            say!("{}", self.json())
+            outln!("{}", self.json())
         } else {
             self.table()
         }
     }
 
     fn table(&self) {
-        let line = |name: &str, value: String| say!("  {name:<17}{value}");
+        let line = |name: &str, value: String| outln!("  {name:<17}{value}");
         let failure = if self.failure {
             "bonds can break"
         } else {
             "bonds cannot break"
         };
         let family = self.family.name();
-        say!("benchmark: {}, {failure}, family {family}", self.law_name());
+        outln!("benchmark: {}, {failure}, family {family}", self.law_name());
         let [x, y, z] = self.edges;
         let points = count(self.points as u64);
         line("points", format!("{points}   ({x} × {y} × {z})"));
@@ -136,12 +136,12 @@ impl Figures {
         line("instructions", self.instructions.name().to_owned());
         let (steps, warm_up) = (self.steps, self.warm_up);
         line("steps", format!("{steps} after {warm_up} to warm up"));
-        say!("speed");
+        outln!("speed");
         let updates = si(self.updates(), "/s");
         let each = si(self.updates() / self.cores, "/s");
         line("bond updates", format!("{updates}   ({each} a core)"));
         line("set-up", si(self.set_up, "s"));
-        say!("time by phase      mean of ranks   slowest");
+        outln!("time by phase      mean of ranks   slowest");
         for Phase {
             name,
             mean,
@@ -149,14 +149,14 @@ impl Figures {
         } in &self.phases
         {
             let share = 100.0 * mean / self.seconds();
-            say!("  {name:<12}{mean:9.3} s {share:5.1} %{slowest:8.3} s");
+            outln!("  {name:<12}{mean:9.3} s {share:5.1} %{slowest:8.3} s");
         }
-        say!("memory             of all ranks   a point");
+        outln!("memory             of all ranks   a point");
         for (name, all) in &self.memory {
             let each = all / self.points;
-            say!("  {name:<17}{:>12}   {each:.0} B", bytes(*all));
+            outln!("  {name:<17}{:>12}   {each:.0} B", bytes(*all));
         }
-        say!("halo, each step");
+        outln!("halo, each step");
         let most = self.most_messages;
         line(
             "messages",
@@ -178,7 +178,7 @@ impl Figures {
             format!("{}   (at most {most} of a rank)", count(self.ghosts as u64)),
         );
         if let Some(limits) = &self.limits {
-            say!("limits of these cores, measured");
+            outln!("limits of these cores, measured");
             let reached = |part: f64, whole: f64| format!("reached: {:.0} %", 100.0 * part / whole);
             let share = reached(limits.moved, limits.bandwidth);
             line(

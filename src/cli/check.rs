@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use fissure::deck::{self, Plan};
+use fissure::deck;
 use fissure::error::Result;
+use fissure::problem::Problem;
 use fissure::solver::assign::cutoffs;
 use fissure::solver::size::is_feasible;
 use fissure::solver::steps::{choose_steps, even_clock};
@@ -31,23 +32,23 @@ pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
 }
 
 fn check_one(deck: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
-    let plan = deck::read(deck, &arguments.set)?.plan()?;
+    let problem = deck::read(deck, &arguments.set)?.problem()?;
     let asked = Asked {
         deck,
         ranks: arguments.ranks,
         // Nobody reads the speed of a deck that is only to be right.
         trial: verbosity != Verbosity::Quiet,
     };
-    is_feasible(&plan, &cutoffs(&plan), arguments.ranks as usize)?;
-    let plan = calibrated(&plan)?;
-    let size = size(&plan)?;
+    is_feasible(&problem, &cutoffs(&problem), arguments.ranks as usize)?;
+    let problem = calibrated(&problem)?;
+    let size = size(&problem)?;
     let few = size.cells <= MOST_CELLS
         && size.all_points() <= MOST_POINTS
         && size.directed_bonds() <= MOST_BONDS;
     let report = if few {
-        look_at(&plan, &asked)?
+        look_at(&problem, &asked)?
     } else {
-        estimate(&plan, &asked, &size)?
+        estimate(&problem, &asked, &size)?
     };
     if verbosity == Verbosity::Quiet {
         return Ok(());
@@ -64,41 +65,41 @@ struct Asked<'a> {
 }
 
 /// What a point inside each body is like, where that can be found.
-fn interiors(plan: &Plan) -> Vec<Option<Interior>> {
-    (0..plan.bodies.len())
-        .map(|body| interior(plan, body))
+fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
+    (0..problem.bodies.len())
+        .map(|body| interior(problem, body))
         .collect()
 }
 
 /// Makes points and bonds and looks at them.
-fn look_at(plan: &Plan, asked: &Asked) -> Result<Report> {
-    let look = look(plan, asked.ranks, asked.trial)?;
-    let (survey, dimension) = (&look.survey, plan.dimension.count());
-    let interiors = interiors(plan);
+fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
+    let look = look(problem, asked.ranks, asked.trial)?;
+    let (survey, dimension) = (&look.survey, problem.dimension.count());
+    let interiors = interiors(problem);
     let mut report = Report::default();
-    say::heading(&mut report, plan, asked.deck);
-    for (index, body) in plan.bodies.iter().enumerate() {
-        say::body(&mut report, plan, body);
+    say::heading(&mut report, problem, asked.deck);
+    for (index, body) in problem.bodies.iter().enumerate() {
+        say::body(&mut report, problem, body);
         say::figures(&mut report, body, &survey.bodies[index], dimension);
-        say::interior(&mut report, plan, interiors[index].as_ref());
+        say::interior(&mut report, problem, interiors[index].as_ref());
         if asked.trial {
-            say::parting(&mut report, plan, index);
+            say::parting(&mut report, problem, index);
         }
     }
-    say::joints(&mut report, plan, survey);
-    say::places(&mut report, plan, survey, dimension);
-    say::sets(&mut report, plan, survey);
+    say::joints(&mut report, problem, survey);
+    say::places(&mut report, problem, survey, dimension);
+    say::sets(&mut report, problem, survey);
     report.say("size");
-    say::size(&mut report, plan, look.points, look.bonds);
+    say::size(&mut report, problem, look.points, look.bonds);
     report.line(
         "of them as lattice",
         super::format::count(look.lattice_bonds),
     );
     say::cost(&mut report, &look.cost, asked.ranks, look.ghosts);
-    say::time(&mut report, plan, look.stable_step);
-    say::steps(&mut report, plan, &look.steps);
+    say::time(&mut report, problem, look.stable_step);
+    say::steps(&mut report, problem, &look.steps);
     if let Some(seconds) = look.seconds {
-        say::run_time(&mut report, plan, &look.steps, seconds, asked.ranks);
+        say::run_time(&mut report, problem, &look.steps, seconds, asked.ranks);
     }
     for warning in &survey.warnings {
         report.say(format_args!("warning: {warning}"));
@@ -107,14 +108,14 @@ fn look_at(plan: &Plan, asked: &Asked) -> Result<Report> {
 }
 
 /// Says by formula what there is too much of to make.
-fn estimate(plan: &Plan, asked: &Asked, size: &Size) -> Result<Report> {
-    let interiors = interiors(plan);
+fn estimate(problem: &Problem, asked: &Asked, size: &Size) -> Result<Report> {
+    let interiors = interiors(problem);
     let mut report = Report::default();
-    say::heading(&mut report, plan, asked.deck);
-    for (index, body) in plan.bodies.iter().enumerate() {
-        say::body(&mut report, plan, body);
+    say::heading(&mut report, problem, asked.deck);
+    for (index, body) in problem.bodies.iter().enumerate() {
+        say::body(&mut report, problem, body);
         report.line("points", format_args!("about {:.3e}", size.points[index]));
-        say::interior(&mut report, plan, interiors[index].as_ref());
+        say::interior(&mut report, problem, interiors[index].as_ref());
     }
     report.say("size, estimated: there is too much of it to be made here");
     report.line("points", format_args!("{:.3e}", size.all_points()));
@@ -126,15 +127,15 @@ fn estimate(plan: &Plan, asked: &Asked, size: &Size) -> Result<Report> {
         .fold(f64::INFINITY, f64::min);
     // Where all points come from files nothing is known of the step.
     if stable.is_finite() {
-        let steps = choose_steps(plan, stable)?;
-        let clock = even_clock(plan, &steps);
-        let cost = Cost::estimate(plan, size, &clock);
+        let steps = choose_steps(problem, stable)?;
+        let clock = even_clock(problem, &steps);
+        let cost = Cost::estimate(problem, size, &clock);
         say::cost(&mut report, &cost, asked.ranks, 0.0);
-        say::time(&mut report, plan, stable);
-        say::steps(&mut report, plan, &steps);
+        say::time(&mut report, problem, stable);
+        say::steps(&mut report, problem, &steps);
     }
     report.say("sets, cracks and probes are not looked at");
-    for warning in &plan.warnings {
+    for warning in &problem.warnings {
         report.say(format_args!("warning: {warning}"));
     }
     Ok(report)

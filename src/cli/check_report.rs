@@ -4,31 +4,31 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use fissure::damage::DamageLaw;
-use fissure::deck::Plan;
-use fissure::deck::plan::{Block, Body, DamageRule, PointSource, Sense, Time};
 use fissure::dimension::Dimension;
+use fissure::problem::Problem;
+use fissure::problem::{Block, Body, DamageRule, PointSource, Sense, Time};
 use fissure::solver::assign::block_laws;
-use fissure::survey::{BodyFigures, Cost, Interior, Survey, parting_cost};
+use fissure::survey::{BodyFigures, Cost, Interior, Survey, separation_energy_ratio};
 
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
 /// The deck as a whole.
-pub fn heading(report: &mut Report, plan: &Plan, deck: &Path) {
+pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.say(format_args!(
         "{} is a valid deck: {}",
         deck.display(),
-        plan.title
+        problem.title
     ));
-    report.line("dimension", plan.dimension.name());
-    if let Some(constraint) = plan.dimension.constraint() {
+    report.line("dimension", problem.dimension.name());
+    if let Some(constraint) = problem.dimension.constraint() {
         report.line("constraint", constraint);
     }
-    report.line("horizon", si(plan.horizon, "m"));
+    report.line("horizon", si(problem.horizon, "m"));
 }
 
 /// What the deck says of a body.
-pub fn body(report: &mut Report, plan: &Plan, body: &Body) {
+pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     report.say(format_args!("body {}", body.name));
     report.line("material", &body.material_name);
     report.line("density", format_args!("{} kg/m³", body.material.density));
@@ -38,7 +38,7 @@ pub fn body(report: &mut Report, plan: &Plan, body: &Body) {
         "Poisson's ratio",
         format_args!("{:.4}", elastic.poisson_ratio),
     );
-    let laws = block_laws(plan, &Block::unrefined(body));
+    let laws = block_laws(problem, &Block::unrefined(body));
     for (name, value) in laws.law.described() {
         report.line(name, value);
     }
@@ -57,7 +57,7 @@ pub fn body(report: &mut Report, plan: &Plan, body: &Body) {
         }
     }
     if let PointSource::Lattice { spacing, .. } = body.points {
-        let multiples = spacing[..plan.dimension.count()]
+        let multiples = spacing[..problem.dimension.count()]
             .iter()
             .map(|edge| format!("{:.3}", body.horizon / edge));
         let mut multiples: Vec<String> = multiples.collect();
@@ -98,14 +98,14 @@ fn place(position: &[f64]) -> String {
 }
 
 /// What a point within a body has, beside what is wanted.
-pub fn interior(report: &mut Report, plan: &Plan, interior: Option<&Interior>) {
+pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interior>) {
     let Some(interior) = interior else {
         return;
     };
     report.line("neighbours inside", interior.neighbours);
     let share = |found: f64, wanted: f64| format!("{:+.1} %", 100.0 * (found / wanted - 1.0));
     let [bulk, shear] = interior.wanted;
-    let name = match plan.dimension {
+    let name = match problem.dimension {
         Dimension::Space => "bulk modulus inside",
         _ => "expansion inside",
     };
@@ -134,27 +134,27 @@ pub fn interior(report: &mut Report, plan: &Plan, interior: Option<&Interior>) {
 }
 
 /// What it costs to part a body whose bonds break by their work.
-pub fn parting(report: &mut Report, plan: &Plan, body: usize) {
-    let Some(damage) = &plan.bodies[body].damage else {
+pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
+    let Some(damage) = &problem.bodies[body].damage else {
         return;
     };
     let DamageRule::Energy { work, .. } = damage.rule else {
         return;
     };
     let mut ways = vec![("cost of opening", 0.0)];
-    if work.sense == Sense::Either && plan.dimension.count() > 1 {
+    if work.sense == Sense::Either && problem.dimension.count() > 1 {
         ways.push(("cost of sliding", FRAC_PI_2));
     }
     for (name, angle) in ways {
-        if let Some(cost) = parting_cost(plan, body, angle) {
+        if let Some(cost) = separation_energy_ratio(problem, body, angle) {
             report.line(name, format_args!("{cost:.3} of the fracture energy"));
         }
     }
 }
 
 /// The bonds between bodies.
-pub fn joints(report: &mut Report, plan: &Plan, survey: &Survey) {
-    if plan.bodies.len() < 2 {
+pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
+    if problem.bodies.len() < 2 {
         return;
     }
     report.say("bonds between bodies");
@@ -162,23 +162,23 @@ pub fn joints(report: &mut Report, plan: &Plan, survey: &Survey) {
         report.line("none", "");
     }
     for (pair, bonds) in &survey.joints {
-        let [a, b] = pair.map(|body| &plan.bodies[body].name);
+        let [a, b] = pair.map(|body| &problem.bodies[body].name);
         report.line(&format!("{a} and {b}"), count(*bonds));
     }
 }
 
 /// Cracks and probes.
-pub fn places(report: &mut Report, plan: &Plan, survey: &Survey, dimension: usize) {
-    if !plan.cracks.is_empty() {
+pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
+    if !problem.cracks.is_empty() {
         report.say("cracks");
     }
-    for (crack, cut) in plan.cracks.iter().zip(&survey.cuts) {
+    for (crack, cut) in problem.cracks.iter().zip(&survey.cuts) {
         report.line(&crack.name, format_args!("cuts {} bonds", count(*cut)));
     }
-    if !plan.history.probes.is_empty() {
+    if !problem.history.probes.is_empty() {
         report.say("probes");
     }
-    for (probe, found) in plan.history.probes.iter().zip(&survey.probes) {
+    for (probe, found) in problem.history.probes.iter().zip(&survey.probes) {
         report.line(
             &probe.name,
             format_args!(
@@ -192,17 +192,17 @@ pub fn places(report: &mut Report, plan: &Plan, survey: &Survey, dimension: usiz
 }
 
 /// The sets.
-pub fn sets(report: &mut Report, plan: &Plan, survey: &Survey) {
+pub fn sets(report: &mut Report, problem: &Problem, survey: &Survey) {
     report.say("sets");
-    for (set, size) in plan.sets.iter().zip(&survey.sets) {
+    for (set, size) in problem.sets.iter().zip(&survey.sets) {
         let note = if *size == 0 { "  (empty!)" } else { "" };
         report.line(&set.name, format_args!("{} points{note}", count(*size)));
     }
 }
 
 /// Points and bonds.
-pub fn size(report: &mut Report, plan: &Plan, points: u64, bonds: u64) {
-    let trigger = plan
+pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
+    let trigger = problem
         .refinement
         .as_ref()
         .map(|refinement| &refinement.trigger);
@@ -237,15 +237,15 @@ pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
 }
 
 /// End and stable step.
-pub fn time(report: &mut Report, plan: &Plan, stable: f64) {
+pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
     report.say("time");
-    report.line("end", si(plan.time.end, "s"));
+    report.line("end", si(problem.time.end, "s"));
     report.line("stable step", si(stable, "s"));
 }
 
 /// First step and number of steps of each stage.
-pub fn steps(report: &mut Report, plan: &Plan, steps: &[(f64, f64)]) {
-    let stages = plan.all_stages();
+pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
+    let stages = problem.all_stages();
     if let ([stage], [(step, steps)]) = (&stages[..], steps) {
         let steps = count(*steps as u64);
         if stage.time.is_relaxation() {
@@ -290,11 +290,17 @@ fn note_on_steps(time: &Time) -> &'static str {
 }
 
 /// Run time of the steps, and of an iteration of a load step, from the wall-clock time (s) of one on this rank.
-pub fn run_time(report: &mut Report, plan: &Plan, steps: &[(f64, f64)], seconds: f64, ranks: u32) {
+pub fn run_time(
+    report: &mut Report,
+    problem: &Problem,
+    steps: &[(f64, f64)],
+    seconds: f64,
+    ranks: u32,
+) {
     let threads = rayon::current_num_threads();
     let on = format!("{ranks} rank(s) × {threads} thread(s) like these");
     let seconds = seconds / f64::from(ranks);
-    let stages = plan.all_stages();
+    let stages = problem.all_stages();
     let explicit = stages.iter().zip(steps);
     let explicit = explicit.filter(|(stage, _)| !stage.time.is_relaxation());
     let explicit: f64 = explicit.map(|(_, (_, steps))| steps).sum();
@@ -305,7 +311,7 @@ pub fn run_time(report: &mut Report, plan: &Plan, steps: &[(f64, f64)], seconds:
             format_args!("about {whole} for the steps, {on}"),
         );
     }
-    if plan.relaxes() {
+    if problem.relaxes() {
         let iteration = duration(seconds);
         report.line(
             "run time",

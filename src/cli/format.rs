@@ -1,4 +1,4 @@
-//! Numbers for people.
+//! LaneTuple for people.
 
 /// Values from here on have no prefix.
 const TOO_LARGE: f64 = 1e16;

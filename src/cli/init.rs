@@ -1,6 +1,6 @@
 //! `fissure init`: a commented example deck.
 
-use crate::cli::say;
+use crate::cli::outln;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 
@@ -30,7 +30,7 @@ pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
         .map_err(|error| file_error(&path, "write", &error))?;
     if verbosity > Verbosity::Quiet {
         let name = path.display();
-        say!("wrote {name}; next: fissure check {name}, then fissure run {name}");
+        outln!("wrote {name}; next: fissure check {name}, then fissure run {name}");
     }
     Ok(())
 }

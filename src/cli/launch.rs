@@ -9,7 +9,7 @@ use fissure::comm::{self, Communicator};
 use fissure::error::{Error, Result};
 use fissure::run::start_mpi;
 
-use super::{finish, tell};
+use super::{errln, finish};
 
 /// Threads that no host is asked too much with.
 const MOST_THREADS: usize = 64;
@@ -149,7 +149,7 @@ pub fn cores_in(list: &str) -> usize {
 /// Says what is wrong with the way that threads and cores fit together, if anything.
 pub fn warn(threads: usize) {
     if let Some(warning) = warning(threads) {
-        tell!("warning: {warning}");
+        errln!("warning: {warning}");
     }
 }
 

@@ -19,22 +19,22 @@ mod version;
 mod wall_time;
 
 /// Prints a line. A reader that has closed the output must not end a run.
-macro_rules! say {
+macro_rules! outln {
     ($($words:tt)*) => {{
         use std::io::Write as _;
         let _ = writeln!(std::io::stdout(), $($words)*);
     }};
 }
-pub(crate) use say;
+pub(crate) use outln;
 
-/// As [`say`], for warnings and errors.
-macro_rules! tell {
+/// As [`outln`], for warnings and errors.
+macro_rules! errln {
     ($($words:tt)*) => {{
         use std::io::Write as _;
         let _ = writeln!(std::io::stderr(), $($words)*);
     }};
 }
-pub(crate) use tell;
+pub(crate) use errln;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -357,7 +357,7 @@ fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<
         if done.is_err()
             && let Err(error) = std::mem::replace(&mut latest, done)
         {
-            tell!("error: {error}");
+            errln!("error: {error}");
         }
     }
     latest
@@ -388,7 +388,7 @@ fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
         Err(error) => {
             if speaks {
                 let label = if error.is_stop() { "" } else { "error: " };
-                tell!("{label}{error}");
+                errln!("{label}{error}");
             }
             ExitCode::from(error.exit_code())
         }

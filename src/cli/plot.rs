@@ -1,6 +1,6 @@
 //! `fissure plot`: a picture of a result.
 
-use crate::cli::say;
+use crate::cli::outln;
 use std::path::{Path, PathBuf};
 
 use fissure::error::{Error, Result};
@@ -39,7 +39,7 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
         };
         look.draw(*index, times[*index], factor, &path)?;
         if verbosity > Verbosity::Quiet {
-            say!("wrote {}", path.display());
+            outln!("wrote {}", path.display());
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! How far a run has come: a moving bar on a terminal, a line now and then elsewhere (mpirun and Slurm
 //! pass output through pipes and files).
 
-use crate::cli::tell;
+use crate::cli::errln;
 use std::io::IsTerminal;
 use std::time::Instant;
 
@@ -83,7 +83,7 @@ impl Progress {
                 *due = next_line(elapsed);
                 let full = (step as usize * WIDTH) / *last as usize;
                 let left = elapsed * (*last - step) as f64 / (step - *first).max(1) as f64;
-                tell!(
+                errln!(
                     "[{}{}] {:>3} %  step {step}/{last}  t = {}  eta {left:.0} s",
                     "█".repeat(full),
                     "·".repeat(WIDTH - full),

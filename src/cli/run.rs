@@ -1,6 +1,6 @@
 //! `fissure run`: from a deck to a result.
 
-use crate::cli::{say, tell};
+use crate::cli::{errln, outln};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -43,7 +43,7 @@ fn run_deck(
     (started, signals): (Instant, Signals),
 ) -> Result<Outcome> {
     let deck = agree(world, deck::read(&arguments.deck, &arguments.set))?;
-    let plan = agree(world, deck.plan())?;
+    let problem = agree(world, deck.problem())?;
     let explained = agree(world, deck.explain())?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;
@@ -73,7 +73,7 @@ fn run_deck(
         ],
         ..Options::new(folder.unwrap_or_else(|| Path::new("out").join(stem)))
     };
-    let constraint = plan.dimension.constraint();
+    let constraint = problem.dimension.constraint();
     let constraint = constraint.map_or(String::new(), |words| format!("1-D, {words}\n"));
     let mut log = Log {
         rank: world.rank(),
@@ -81,14 +81,18 @@ fn run_deck(
         verbose: verbosity == Verbosity::Verbose,
         title: format!(
             "{}\n{constraint}{} ranks × {threads} threads on {hosts} host(s)",
-            plan.title,
+            problem.title,
             world.size()
         ),
-        bodies: plan.bodies.iter().map(|body| body.name.clone()).collect(),
+        bodies: problem
+            .bodies
+            .iter()
+            .map(|body| body.name.clone())
+            .collect(),
         started,
         progress: Progress::Silent,
     };
-    let outcome = fissure::run(&plan, world, options, &mut log)?;
+    let outcome = fissure::run(&problem, world, options, &mut log)?;
     if speaks {
         report(&outcome, threads, verbosity);
     }
@@ -115,14 +119,14 @@ struct Log {
 impl Observer for Log {
     fn message(&mut self, message: &Message) {
         match message {
-            Message::Started if self.speaks => say!("{}", self.title),
+            Message::Started if self.speaks => outln!("{}", self.title),
             Message::SetUp { survey, .. } if self.speaks => {
                 for (pair, bonds) in &survey.joints {
                     let [a, b] = pair.map(|body| &self.bodies[body]);
-                    say!("{} bonds join {a} and {b}", count(*bonds));
+                    outln!("{} bonds join {a} and {b}", count(*bonds));
                 }
                 for warning in &survey.warnings {
-                    tell!("warning: {warning}");
+                    errln!("warning: {warning}");
                 }
             }
             Message::Continued {
@@ -130,9 +134,9 @@ impl Observer for Log {
                 time,
                 complete,
             } if self.speaks => {
-                say!("continued after step {number} (t = {})", si(*time, "s"));
+                outln!("continued after step {number} (t = {})", si(*time, "s"));
                 if *complete {
-                    say!("the run was complete already");
+                    outln!("the run was complete already");
                 }
             }
             Message::SetAside { why, kept } if self.rank == 0 => {
@@ -143,12 +147,12 @@ impl Observer for Log {
                 } else {
                     format!("; it is kept as {}", kept.join(" and "))
                 };
-                tell!("warning: {why}: a new result begins here{kept}");
+                errln!("warning: {why}: a new result begins here{kept}");
             }
             Message::Decided(decided) if self.speaks && self.verbose => {
-                say!("decided");
+                outln!("decided");
                 for (name, what) in decided {
-                    say!("  {name:<17}{what}");
+                    outln!("  {name:<17}{what}");
                 }
             }
             Message::Refined {
@@ -163,7 +167,7 @@ impl Observer for Log {
                     String::new()
                 };
                 self.progress.aside(|| {
-                    say!("after step {number}: {born} new points{left}, {points} in all");
+                    outln!("after step {number}: {born} new points{left}, {points} in all");
                 });
             }
             Message::Repartitioned { number, what } if self.speaks && self.verbose => {
@@ -174,14 +178,14 @@ impl Observer for Log {
                 } = what;
                 let (moved, seconds) = (count(*moved), si(*seconds, "s"));
                 self.progress.aside(|| {
-                    say!(
+                    outln!(
                         "after step {number} the slowest rank took {imbalance:.2} times the mean: \
                          {moved} points changed their rank in {seconds}"
                     );
                 });
             }
             Message::Warning(text) if self.rank == 0 => {
-                self.progress.aside(|| tell!("warning: {text}"));
+                self.progress.aside(|| errln!("warning: {text}"));
             }
             _ => {}
         }
@@ -192,7 +196,7 @@ impl Observer for Log {
         if self.speaks && left > 0 {
             let step = si(now.step(), "s");
             let set_up = si(self.started.elapsed().as_secs_f64(), "s");
-            say!("{} steps of {step} to go, after {set_up}", count(left));
+            outln!("{} steps of {step} to go, after {set_up}", count(left));
         }
         self.progress = Progress::new(self.speaks, now.number(), now.last());
     }
@@ -216,15 +220,15 @@ fn report(outcome: &Outcome, threads: usize, verbosity: Verbosity) {
         summary::print(outcome, threads);
     }
     match outcome.no_collective_cause {
-        0 if verbosity == Verbosity::Verbose => say!("all writes were collective"),
+        0 if verbosity == Verbosity::Verbose => outln!("all writes were collective"),
         0 => {}
-        cause => say!("warning: some writes were not collective (HDF5 cause {cause:#x})"),
+        cause => outln!("warning: some writes were not collective (HDF5 cause {cause:#x})"),
     }
     let (result, history) = (&outcome.files.result, &outcome.files.history);
     let (result, history) = (result.display(), history.display());
-    say!("result   {result}   (ParaView 5.12 or later; result.xdmf for older ones)");
-    say!("history  {history}");
-    say!("picture  fissure plot {result}");
+    outln!("result   {result}   (ParaView 5.12 or later; result.xdmf for older ones)");
+    outln!("history  {history}");
+    outln!("picture  fissure plot {result}");
 }
 
 fn tell_stopped(outcome: &Outcome, reason: Reason) {
@@ -234,7 +238,7 @@ fn tell_stopped(outcome: &Outcome, reason: Reason) {
     };
     let (number, last) = (outcome.number, outcome.last);
     let time = si(outcome.time, "s");
-    tell!(
+    errln!(
         "stopped {because} after step {number} of {last} (t = {time}); a checkpoint is written, \
          --restart continues"
     );

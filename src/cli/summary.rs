@@ -1,6 +1,6 @@
 //! What a run did, for the reader of the log.
 
-use crate::cli::say;
+use crate::cli::outln;
 use fissure::run::{Outcome, Phases, Summary};
 
 use super::format::{count, si};
@@ -12,8 +12,8 @@ pub fn print(outcome: &Outcome, threads: usize) {
         Some(row) => (row.energies, row.broken),
         None => Default::default(),
     };
-    let line = |name: &str, value: String| say!("  {name:<17}{value}");
-    say!("summary");
+    let line = |name: &str, value: String| outln!("  {name:<17}{value}");
+    outln!("summary");
     line("points", count(summary.points));
     line("bonds", count(summary.bonds));
     line("broken bonds", count(broken));
@@ -34,13 +34,13 @@ pub fn print(outcome: &Outcome, threads: usize) {
     if !regrids {
         line("bond updates", si(bond_updates(summary), "/s"));
     }
-    say!("time by phase");
+    outln!("time by phase");
     let phases = phases(&summary.seconds).into_iter();
     for (name, seconds) in phases.filter(|(name, _)| regrids || *name != REGRIDDING) {
         let share = 100.0 * seconds / summary.seconds.whole;
-        say!("  {name:<17}{seconds:8.3} s {share:5.1} %");
+        outln!("  {name:<17}{seconds:8.3} s {share:5.1} %");
     }
-    say!("energy");
+    outln!("energy");
     line("kinetic", si(energies.kinetic, "J"));
     line("strain", si(energies.strain, "J"));
     line("fracture", si(energies.fracture, "J"));

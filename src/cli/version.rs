@@ -1,6 +1,6 @@
 //! `fissure --version`: what this program is made of, for the reader of a bug report.
 
-use crate::cli::say;
+use crate::cli::outln;
 use fissure::comm::mpi;
 use fissure::lanes::instructions::{BUILT, Instructions};
 use fissure::output;
@@ -9,9 +9,9 @@ use fissure::output;
 pub fn print() {
     let best = Instructions::of_this_machine();
     let all = BUILT.join(", ");
-    say!("fissure {}", fissure::version());
-    say!("  MPI           {}", mpi::library());
-    say!("  HDF5          {}", output::library());
+    outln!("fissure {}", fissure::version());
+    outln!("  MPI           {}", mpi::library());
+    outln!("  HDF5          {}", output::library());
     let best = best.map_or("none", Instructions::name);
-    say!("  instructions  {best}, of {all}");
+    outln!("  instructions  {best}, of {all}");
 }

@@ -31,7 +31,7 @@ pub struct Traffic {
     pub time: Duration,
 }
 
-/// The plan with its message buffers, all allocated once.
+/// The problem with its message buffers, all allocated once.
 #[derive(Debug, Default)]
 pub struct Halo {
     neighbours: Vec<Neighbour>,

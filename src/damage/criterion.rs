@@ -30,7 +30,7 @@ pub type HorizonRatios = [[f64; 2]; 2];
 pub struct WorkRule {
     /// Which bonds break.
     pub sense: Sense,
-    /// The share, from 0 to 1, of what bonds hold [more](Law::overload) where families are not whole that their
+    /// The share, from 0 to 1, of what bonds hold [more](Law::truncation_factor) where families are not whole that their
     /// threshold grows by.
     pub family_correction: f64,
     /// Which relative displacement the force states work on.
@@ -74,8 +74,8 @@ pub struct Ends<'a, L, P> {
 pub struct Limits {
     /// The stretches or works (J/m⁶) at which their bonds break.
     pub thresholds: Lanes,
-    /// Their [`Law::overload`].
-    pub overloads: Lanes,
+    /// Their [`Law::truncation_factor`].
+    pub truncation_factors: Lanes,
     /// Their [`Rotation`](crate::material::Rotation); 0 is none.
     pub rotations: [Lanes; 3],
 }
@@ -86,7 +86,7 @@ impl Limits {
     pub fn unread() -> Self {
         Self {
             thresholds: Lanes::splat(0.0),
-            overloads: Lanes::splat(1.0),
+            truncation_factors: Lanes::splat(1.0),
             rotations: [Lanes::splat(0.0); 3],
         }
     }
@@ -99,7 +99,7 @@ impl Criterion {
         matches!(self, Self::Thresholds(_) | Self::WorkThresholds(..))
     }
 
-    /// Whether it depends on the overloads of the ends.
+    /// Whether it depends on the truncation_factors of the ends.
     #[inline(always)]
     pub fn reads_overloads(self) -> bool {
         match self {
@@ -158,22 +158,23 @@ impl Criterion {
         match self {
             Self::Never => 0,
             // A bond that breaks is marked.
-            Self::Stretch(_) if !L::SCALED && bond.marked == 0 => 0,
-            Self::Stretch(critical) if !L::SCALED => {
-                simd.at_least(bond.growth, Lanes::splat(growth_of(critical)))
-            }
+            Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
+            Self::Stretch(critical) if !L::SCALED => simd.at_least(
+                bond.relative_square_extension,
+                Lanes::splat(growth_of(critical)),
+            ),
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
                 let [i, j] = ends.acting;
                 let spent = simd.at_least(work, self.threshold(simd, ends)) & (i | j);
                 match rule.sense {
-                    Sense::Pulled => spent & bond.growth.above(0.0),
+                    Sense::Pulled => spent & bond.relative_square_extension.above(0.0),
                     Sense::Either => spent,
                 }
             }
             Self::Stretch(_) | Self::Thresholds(_) => {
                 let threshold = self.threshold(simd, ends);
                 let threshold = threshold * (Lanes::splat(2.0) + threshold);
-                simd.at_least(bond.growth, threshold)
+                simd.at_least(bond.relative_square_extension, threshold)
             }
         }
     }
@@ -273,7 +274,7 @@ impl WorkRule {
             return takes;
         }
         let share = self.family_correction;
-        takes * (end.overloads * share + Lanes::splat(1.0 - share))
+        takes * (end.truncation_factors * share + Lanes::splat(1.0 - share))
     }
 }
 

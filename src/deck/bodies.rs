@@ -6,12 +6,12 @@ use indexmap::IndexMap;
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck};
-use super::number::shown;
-use super::plan;
 use super::resolve::{Scope, resolve_each};
 use super::shapes;
 use super::validate;
 use crate::error::Result;
+use crate::message::format_number;
+use crate::problem;
 
 /// The square of this number of bond lists is looked through in every step.
 const MOST_BODIES: usize = 256;
@@ -24,9 +24,9 @@ pub fn bodies(
     scope: &Scope,
     deck: &Deck,
     spacing: Option<[f64; 3]>,
-    materials: &IndexMap<String, plan::Material>,
-    damages: &IndexMap<String, plan::Damage>,
-) -> Result<Vec<plan::Body>> {
+    materials: &IndexMap<String, problem::Material>,
+    damages: &IndexMap<String, problem::Damage>,
+) -> Result<Vec<problem::Body>> {
     if deck.body.len() > MOST_BODIES {
         let message = format!(
             "[body]: the deck has {} bodies; {MOST_BODIES} at most, each a block with its own \
@@ -71,11 +71,11 @@ pub fn bodies(
         };
         let fault = damage
             .as_ref()
-            .and_then(|damage: &plan::Damage| materials[material].law.damage_fault(damage));
+            .and_then(|damage: &problem::Damage| materials[material].law.damage_fault(damage));
         if let (Some(name), Some(fault)) = (&body.damage, fault) {
             return Err(scope.error(name.span(), format!("{key} damage: {fault}")));
         }
-        Ok(plan::Body {
+        Ok(problem::Body {
             name: name.to_owned(),
             span: table.span(),
             material_name: body.material.get_ref().clone(),
@@ -98,10 +98,10 @@ pub fn bodies(
 /// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their points
 /// stay aligned. In each direction it is 0, unless the first body whose flat faces are whole cells apart would not be
 /// filled exactly; then it is the lower face of that body.
-fn anchor(bodies: &mut [plan::Body], dimension: usize) {
+fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
-        let plan::PointSource::Lattice { spacing, .. } = bodies[index].points else {
+        let problem::PointSource::Lattice { spacing, .. } = bodies[index].points else {
             continue;
         };
         let known = anchors.iter().find(|(of, _)| *of == spacing);
@@ -115,17 +115,19 @@ fn anchor(bodies: &mut [plan::Body], dimension: usize) {
             |(_, anchor)| *anchor,
         );
         anchors.push((spacing, anchor));
-        if let plan::PointSource::Lattice { origin, .. } = &mut bodies[index].points {
+        if let problem::PointSource::Lattice { origin, .. } = &mut bodies[index].points {
             *origin = anchor;
         }
     }
 }
 
 /// The shapes of the bodies with cells of these edges (m).
-fn same_cells(bodies: &[plan::Body], edges: [f64; 3]) -> impl Iterator<Item = &plan::Shape> {
+fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item = &problem::Shape> {
     bodies.iter().filter_map(move |body| match &body.points {
-        plan::PointSource::Lattice { shape, spacing, .. } => (*spacing == edges).then_some(shape),
-        plan::PointSource::File { .. } => None,
+        problem::PointSource::Lattice { shape, spacing, .. } => {
+            (*spacing == edges).then_some(shape)
+        }
+        problem::PointSource::File { .. } => None,
     })
 }
 
@@ -134,7 +136,7 @@ const WHOLE: f64 = 1e-6;
 
 /// Where cells with an edge (m) begin that fill a shape exactly along an axis, m: 0 if they may begin there. `None` for a
 /// shape that is not a whole number of cells long between two flat faces.
-fn anchor_along(shape: &plan::Shape, edge: f64, axis: usize) -> Option<f64> {
+fn anchor_along(shape: &problem::Shape, edge: f64, axis: usize) -> Option<f64> {
     let [lower, upper] = flat_faces(shape, axis)?;
     let is_whole = |length: f64| {
         let cells = length / edge;
@@ -144,32 +146,34 @@ fn anchor_along(shape: &plan::Shape, edge: f64, axis: usize) -> Option<f64> {
 }
 
 /// Where a shape begins and ends along an axis, m, if it does so with flat faces.
-fn flat_faces(shape: &plan::Shape, axis: usize) -> Option<[f64; 2]> {
+fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     match shape {
-        plan::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
-        plan::Shape::Prism { bottom, top, .. } if axis == 2 => Some([*bottom, *top]),
-        plan::Shape::Prism { base, .. } => {
+        problem::Shape::Box { lower, upper } => Some([lower[axis], upper[axis]]),
+        problem::Shape::Prism { bottom, top, .. } if axis == 2 => Some([*bottom, *top]),
+        problem::Shape::Prism { base, .. } => {
             let (lower, upper) = base.bounds();
             Some([lower[axis], upper[axis]])
         }
-        plan::Shape::Cylinder { from, to, .. } => {
+        problem::Shape::Cylinder { from, to, .. } => {
             let is_along = (0..3).all(|k| k == axis || from[k] == to[k]);
             is_along.then_some([from[axis].min(to[axis]), from[axis].max(to[axis])])
         }
-        plan::Shape::Ball { .. } => None,
-        plan::Shape::Union(parts) => parts
+        problem::Shape::Ball { .. } => None,
+        problem::Shape::Union(parts) => parts
             .iter()
             .map(|part| flat_faces(part, axis))
             .reduce(|a, b| Some([a?[0].min(b?[0]), a?[1].max(b?[1])]))?,
-        plan::Shape::Difference(parts) => flat_faces(&parts[0], axis),
+        problem::Shape::Difference(parts) => flat_faces(&parts[0], axis),
     }
 }
 
 /// An error if a body asks for rows of a point file that an earlier one takes.
-fn rows_are_taken_once(scope: &Scope, bodies: Vec<plan::Body>) -> Result<Vec<plan::Body>> {
-    let rows = |body: &plan::Body| match &body.points {
-        plan::PointSource::File { path, block, span } => Some((path.clone(), *block, span.clone())),
-        plan::PointSource::Lattice { .. } => None,
+fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
+    let rows = |body: &problem::Body| match &body.points {
+        problem::PointSource::File { path, block, span } => {
+            Some((path.clone(), *block, span.clone()))
+        }
+        problem::PointSource::Lattice { .. } => None,
     };
     for (index, body) in bodies.iter().enumerate() {
         let Some((path, block, span)) = rows(body) else {
@@ -200,7 +204,7 @@ fn point_source(
     body: &grammar::Body,
     grid_spacing: Option<[f64; 3]>,
     horizon: f64,
-) -> Result<plan::PointSource> {
+) -> Result<problem::PointSource> {
     let given = [
         ("shape", body.shape.as_ref().map(Spanned::span)),
         (
@@ -227,8 +231,8 @@ fn point_source(
                 let message = format!(
                     "{key} horizon: {} m is smaller than the spacing {} m, so no point would have \
                      a neighbour",
-                    shown(horizon),
-                    shown(longest)
+                    format_number(horizon),
+                    format_number(longest)
                 );
                 return Err(scope.error(number.span(), message));
             }
@@ -236,7 +240,7 @@ fn point_source(
                 Some(origin) => scope.vector(origin, "[grid] origin")?,
                 None => [0.0; 3],
             };
-            Ok(plan::PointSource::Lattice {
+            Ok(problem::PointSource::Lattice {
                 shape: shapes::shape(scope, &format!("{key} shape"), shape)?,
                 spacing,
                 origin,
@@ -249,7 +253,7 @@ fn point_source(
                 return Err(scope.error(spacing.span(), message));
             }
             let folder = scope.source.path.parent().unwrap_or("".as_ref());
-            Ok(plan::PointSource::File {
+            Ok(problem::PointSource::File {
                 path: folder.join(points.file.get_ref()),
                 block: points.block.as_ref().map(|block| *block.get_ref()),
                 span: points.file.span(),

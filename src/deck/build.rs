@@ -1,25 +1,25 @@
 //! Plans made in Rust, without a deck.
 
-use super::expression::{Expression, Variable};
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS, STEPS_A_ROW};
-use super::plan::{
-    Action, Body, Calibration, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule,
-    History, Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places,
-    Plan, PointSource, PreCrack, Quadrature, Selector, Set, Shape, Stage, StepRule, Time,
-    Toughness, VolumeCorrection,
-};
 use super::resolve::ALL_VARIABLES;
 use super::source::Source;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
+use crate::expression::{Expression, Variable};
+use crate::problem::{
+    Action, Body, Calibration, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule,
+    History, Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places,
+    PointSource, PreCrack, Problem, Quadrature, Selector, Set, Shape, Stage, StepRule, Time,
+    Toughness, VolumeCorrection,
+};
 
 /// Share of the stable step that is taken if nothing else is said.
 const DEFAULT_SAFETY: f64 = 0.8;
 
-impl Plan {
-    /// A plan without bodies, with a horizon (m) and an end (s), and everything else as in a deck that
+impl Problem {
+    /// A problem without bodies, with a horizon (m) and an end (s), and everything else as in a deck that
     /// does not say more.
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
@@ -170,7 +170,7 @@ impl Plan {
             Interval::Seconds(seconds)
         } else {
             let steps = STEPS_A_ROW;
-            Interval::Seldom { seconds, steps }
+            Interval::SecondsAtSteps { seconds, steps }
         };
         self.history.every.unwrap_or(default)
     }

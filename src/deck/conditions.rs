@@ -2,19 +2,23 @@
 
 use serde_spanned::Spanned;
 
-use super::expression::Expression;
 use super::grammar::{self, Deck};
 use super::number::Vector;
-use super::plan::{self, Action};
 use super::resolve::{ALL_VARIABLES, POSITION, Scope};
 use super::sets::find_set;
 use crate::error::Result;
+use crate::expression::Expression;
+use crate::problem::{self, Action};
 
 /// Validates the initial values.
 ///
 /// # Errors
 /// On an unknown set, a wrong expression, or a table that sets nothing.
-pub fn initials(scope: &Scope, deck: &Deck, sets: &[plan::Set]) -> Result<Vec<plan::Initial>> {
+pub fn initials(
+    scope: &Scope,
+    deck: &Deck,
+    sets: &[problem::Set],
+) -> Result<Vec<problem::Initial>> {
     deck.initial
         .iter()
         .map(|(name, table)| {
@@ -32,7 +36,7 @@ pub fn initials(scope: &Scope, deck: &Deck, sets: &[plan::Set]) -> Result<Vec<pl
                 };
                 vector.as_ref().map(resolve).transpose()
             };
-            Ok(plan::Initial {
+            Ok(problem::Initial {
                 name: name.clone(),
                 set: find_set(scope, &initial.set, sets, &format!("{key} set"))?,
                 span: initial.set.span(),
@@ -50,9 +54,9 @@ pub fn initials(scope: &Scope, deck: &Deck, sets: &[plan::Set]) -> Result<Vec<pl
 pub fn conditions(
     scope: &Scope,
     deck: &Deck,
-    sets: &[plan::Set],
+    sets: &[problem::Set],
     spacing: Option<f64>,
-) -> Result<Vec<plan::Condition>> {
+) -> Result<Vec<problem::Condition>> {
     deck.condition
         .iter()
         .map(|(name, table)| {
@@ -68,7 +72,7 @@ pub fn conditions(
                 ("force", vector(&condition.force)),
             ];
             let (quantity, place) = &given[scope.exactly_one(table.span(), &key, &given)?];
-            Ok(plan::Condition {
+            Ok(problem::Condition {
                 name: name.clone(),
                 set: find_set(scope, &condition.set, sets, &format!("{key} set"))?,
                 span: condition.set.span(),

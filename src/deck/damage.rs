@@ -4,10 +4,10 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Text};
 use super::number::Number;
-use super::plan::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
 use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::error::Result;
+use crate::problem::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
 
 /// A key that says how much it takes for bonds to break, and what it means.
 type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
@@ -18,10 +18,10 @@ type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
 /// On a wrong number, an unknown set, or anything but one measure of toughness.
 pub fn damage(
     scope: &Scope,
-    sets: &[plan::Set],
+    sets: &[problem::Set],
     name: &str,
     table: &Spanned<grammar::Damage>,
-) -> Result<plan::Damage> {
+) -> Result<problem::Damage> {
     match table.get_ref() {
         grammar::Damage::CriticalStretch(spanned) => {
             let law = spanned.get_ref();
@@ -33,7 +33,7 @@ pub fn damage(
             );
             let [energy, toughness] = of_crack(&law.fracture_energy, &law.fracture_toughness);
             let all = [energy, toughness, stretch];
-            Ok(plan::Damage {
+            Ok(problem::Damage {
                 rule: DamageRule::CriticalStretch,
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
@@ -61,7 +61,7 @@ pub fn damage(
                     Calibration::Energy | Calibration::Opening(_) => WorkMeasure::Objective,
                 },
             };
-            Ok(plan::Damage {
+            Ok(problem::Damage {
                 rule: DamageRule::Energy { calibration, work },
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
@@ -109,6 +109,11 @@ fn family_correction(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
     scope.within(number, &key, range, "from 0 to 1")
 }
 
-fn no_failure(scope: &Scope, sets: &[plan::Set], names: &[Text], key: &str) -> Result<Vec<usize>> {
+fn no_failure(
+    scope: &Scope,
+    sets: &[problem::Set],
+    names: &[Text],
+    key: &str,
+) -> Result<Vec<usize>> {
     find_sets(scope, names, sets, &format!("{key} no_failure"))
 }

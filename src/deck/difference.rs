@@ -4,11 +4,11 @@ use serde_spanned::Spanned;
 use toml::{Table, Value};
 
 use super::Deck;
-use super::expression::Expression;
 use super::number::Written;
 use super::resolve::{ALL_VARIABLES, Scope};
 use super::source::Source;
 use crate::error::{Error, Result};
+use crate::expression::Expression;
 
 /// Sections that a restart may change. Parameters count where they are used.
 const FREE: [&str; 6] = [

@@ -5,26 +5,26 @@ use super::grammar::{
     VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
-use super::plan::{self, CheckpointRule, HorizonRule, Interval, Plan};
 use crate::dimension::{Constraint, Dimension};
 use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
+use crate::problem::{self, CheckpointRule, HorizonRule, Interval, Problem};
 use serde_spanned::Spanned;
 
 /// The deck as TOML with every default written out.
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn explain(deck: &Deck, plan: &Plan) -> Result<String> {
+pub fn explain(deck: &Deck, problem: &Problem) -> Result<String> {
     let mut deck = deck.clone();
-    fill(&mut deck, plan);
+    fill(&mut deck, problem);
     toml::to_string(&deck).map_err(|error| Error::run(format!("cannot write the deck: {error}")))
 }
 
 /// Writes into the deck whatever it leaves to a default that depends on other values.
-fn fill(deck: &mut Deck, plan: &Plan) {
+fn fill(deck: &mut Deck, problem: &Problem) {
     let number = |value| Some(default_number(value));
-    match plan.dimension {
+    match problem.dimension {
         Dimension::Line {
             cross_section,
             constraint,
@@ -42,14 +42,14 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         Dimension::Space => {}
     }
     let grid = deck.grid.get_mut();
-    let correction = match plan.volume_correction {
-        plan::VolumeCorrection::None => VolumeCorrection::None,
-        plan::VolumeCorrection::Linear => VolumeCorrection::Linear,
-        plan::VolumeCorrection::Exact => VolumeCorrection::Exact,
+    let correction = match problem.volume_correction {
+        problem::VolumeCorrection::None => VolumeCorrection::None,
+        problem::VolumeCorrection::Linear => VolumeCorrection::Linear,
+        problem::VolumeCorrection::Exact => VolumeCorrection::Exact,
     };
     grid.volume_correction
         .get_or_insert(Spanned::new(0..0, correction));
-    let zeros = vec![default_number(0.0); plan.dimension.count()];
+    let zeros = vec![default_number(0.0); problem.dimension.count()];
     grid.origin = grid.origin.take().or(Some(Spanned::new(0..0, zeros)));
     for body in deck.body.values_mut().map(|body| body.get_mut()) {
         if body.shape.is_some() {
@@ -57,7 +57,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         }
         body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
     }
-    if let (Some(table), Some(refinement)) = (&mut deck.refinement, &plan.refinement) {
+    if let (Some(table), Some(refinement)) = (&mut deck.refinement, &problem.refinement) {
         let table = table.get_mut();
         let factor = number(refinement.interface_factor);
         table.interface_factor = table.interface_factor.take().or(factor);
@@ -71,7 +71,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         }
     }
     for material in deck.material.values_mut() {
-        fill_material(material.get_mut(), plan.dimension);
+        fill_material(material.get_mut(), problem.dimension);
     }
     for condition in deck.condition.values_mut().map(|table| table.get_mut()) {
         if condition.traction.is_some() || condition.pressure.is_some() {
@@ -79,7 +79,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
         }
     }
     let time = deck.time.get_mut();
-    if plan.relaxes() {
+    if problem.relaxes() {
         let default = || Spanned::new(0..0, Relaxation::default());
         time.relaxation.get_or_insert_with(default);
     }
@@ -87,23 +87,23 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     fill_interval(
         &mut output.every,
         output.every_steps.is_some(),
-        plan.output.every,
+        problem.output.every,
     );
     output.fields.get_or_insert_with(|| {
-        let names = plan.output.fields.iter().map(|field| field.name());
+        let names = problem.output.fields.iter().map(|field| field.name());
         names
             .map(|name| Spanned::new(0..0, name.to_owned()))
             .collect()
     });
     let checkpoint = deck.checkpoint.get_mut();
-    if let CheckpointRule::WallClock(seconds) = plan.checkpoint {
+    if let CheckpointRule::WallClock(seconds) = problem.checkpoint {
         let text = || Spanned::new(0..0, format!("{seconds} s"));
         checkpoint.every.get_or_insert_with(text);
     }
     let history = deck.history.get_mut();
-    let rows = plan.row_interval();
+    let rows = problem.row_interval();
     fill_interval(&mut history.every, history.every_steps.is_some(), rows);
-    if let Interval::Seldom { seconds, steps } = rows {
+    if let Interval::SecondsAtSteps { seconds, steps } = rows {
         history.every.get_or_insert_with(|| default_number(seconds));
         let steps = || Spanned::new(0..0, Count::new(steps));
         history.every_steps.get_or_insert_with(steps);
@@ -111,7 +111,7 @@ fn fill(deck: &mut Deck, plan: &Plan) {
     history.damage_threshold = history
         .damage_threshold
         .take()
-        .or(number(plan.history.damage_threshold));
+        .or(number(problem.history.damage_threshold));
     for front in history.front.values_mut().map(|table| table.get_mut()) {
         front.radius = front.radius.take().or(Some(grid.horizon.clone()));
     }

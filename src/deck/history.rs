@@ -5,10 +5,10 @@ use serde_spanned::Spanned;
 use super::grammar::{self, Deck, Text};
 use super::names::suits_a_column;
 use super::number::{Number, Vector};
-use super::plan::{self, Field, Interval};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::find_set;
 use crate::error::Result;
+use crate::problem::{self, Field, Interval};
 
 /// Damage above which a point counts as cracked if the deck does not say.
 pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
@@ -20,9 +20,9 @@ pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 pub fn history(
     scope: &Scope,
     deck: &Deck,
-    sets: &[plan::Set],
+    sets: &[problem::Set],
     horizon: f64,
-) -> Result<plan::History> {
+) -> Result<problem::History> {
     let history = deck.history.get_ref();
     let damage_threshold = match &history.damage_threshold {
         None => DEFAULT_DAMAGE_THRESHOLD,
@@ -43,14 +43,14 @@ pub fn history(
     })?;
     let probes = resolve_each(&history.probe, |name, probe| {
         let key = column_name(scope, "probe", name, probe)?;
-        Ok(plan::Probe {
+        Ok(problem::Probe {
             name: name.to_owned(),
             span: probe.span(),
             at: scope.vector(&probe.get_ref().at, &format!("{key} at"))?,
         })
     })?;
     let reaction = |name: &Text| {
-        Ok(plan::Reaction {
+        Ok(problem::Reaction {
             set: find_set(scope, name, sets, "[history] reactions")?,
             span: name.span(),
         })
@@ -64,7 +64,7 @@ pub fn history(
     let tips = resolve_each(&history.tip, |name, table| {
         tip(scope, name, table, sets, damage_threshold)
     })?;
-    Ok(plan::History {
+    Ok(problem::History {
         every: rows(scope, history)?,
         reactions: history
             .reactions
@@ -91,7 +91,7 @@ fn rows(scope: &Scope, history: &grammar::History) -> Result<Option<Interval>> {
         (None, None) => None,
         (None, Some(steps)) => Some(Interval::Steps(steps)),
         (Some(every), None) => Some(Interval::Seconds(seconds(every)?)),
-        (Some(every), Some(steps)) => Some(Interval::Seldom {
+        (Some(every), Some(steps)) => Some(Interval::SecondsAtSteps {
             seconds: seconds(every)?,
             steps,
         }),
@@ -109,8 +109,8 @@ fn damage(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
     scope.within(number, key, 0.0..1.0, "at least 0 and below 1")
 }
 
-fn line(scope: &Scope, key: &str, from: &Vector, direction: &Vector) -> Result<plan::Line> {
-    Ok(plan::Line {
+fn line(scope: &Scope, key: &str, from: &Vector, direction: &Vector) -> Result<problem::Line> {
+    Ok(problem::Line {
         from: scope.vector(from, &format!("{key} from"))?,
         direction: scope.direction(direction, &format!("{key} direction"))?,
     })
@@ -121,7 +121,7 @@ fn front(
     name: &str,
     table: &Spanned<grammar::Front>,
     horizon: f64,
-) -> Result<plan::Front> {
+) -> Result<problem::Front> {
     let key = column_name(scope, "front", name, table)?;
     let front = table.get_ref();
     let length_or = |number: &Option<Number>, name, default| match number {
@@ -133,7 +133,7 @@ fn front(
     let fields: Vec<Field> = fields.collect();
     let names = fields.iter().map(|field| field.name());
     let field = fields[find(scope.source, &front.field, names, &format!("{key} field"))?];
-    Ok(plan::Front {
+    Ok(problem::Front {
         name: name.to_owned(),
         span: table.span(),
         line: line(scope, &key, &front.from, &front.direction)?,
@@ -223,11 +223,11 @@ fn support_force(
     scope: &Scope,
     name: &str,
     table: &Spanned<grammar::SupportForce>,
-    sets: &[plan::Set],
-) -> Result<plan::SupportForce> {
+    sets: &[problem::Set],
+) -> Result<problem::SupportForce> {
     let key = column_name(scope, "force", name, table)?;
     let force = table.get_ref();
-    Ok(plan::SupportForce {
+    Ok(problem::SupportForce {
         name: name.to_owned(),
         span: table.span(),
         set: find_set(scope, &force.set, sets, &format!("{key} set"))?,
@@ -239,9 +239,9 @@ fn crack(
     scope: &Scope,
     name: &str,
     table: &Spanned<grammar::CrackPath>,
-    sets: &[plan::Set],
+    sets: &[problem::Set],
     damage_threshold: f64,
-) -> Result<plan::CrackPath> {
+) -> Result<problem::CrackPath> {
     let key = column_name(scope, "crack", name, table)?;
     if scope.dimension != 2 {
         let message = format!(
@@ -252,7 +252,7 @@ fn crack(
         return Err(scope.error(table.span(), message));
     }
     let crack = table.get_ref();
-    Ok(plan::CrackPath {
+    Ok(problem::CrackPath {
         name: name.to_owned(),
         span: table.span(),
         from: scope.vector(&crack.from, &format!("{key} from"))?,
@@ -268,12 +268,12 @@ fn tip(
     scope: &Scope,
     name: &str,
     table: &Spanned<grammar::Tip>,
-    sets: &[plan::Set],
+    sets: &[problem::Set],
     damage_threshold: f64,
-) -> Result<plan::Tip> {
+) -> Result<problem::Tip> {
     let key = column_name(scope, "tip", name, table)?;
     let tip = table.get_ref();
-    Ok(plan::Tip {
+    Ok(problem::Tip {
         name: name.to_owned(),
         span: table.span(),
         line: line(scope, &key, &tip.from, &tip.direction)?,

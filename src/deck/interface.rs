@@ -3,18 +3,22 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Rule};
-use super::plan;
 use super::resolve::{Scope, find};
 use crate::error::Result;
+use crate::problem;
 
 /// Validates the rules of the bonds between bodies.
 ///
 /// # Errors
 /// On bodies whose laws no bond can have, a rule that the laws of a pair do not allow, and on pairs that
 /// are none or are given twice.
-pub fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<plan::Interface> {
+pub fn interface(
+    scope: &Scope,
+    deck: &Deck,
+    bodies: &[problem::Body],
+) -> Result<problem::Interface> {
     let mut pairs: Vec<(String, [usize; 2], &Spanned<Rule>)> = Vec::new();
-    let mut interface = plan::Interface {
+    let mut interface = problem::Interface {
         rule: rule(&deck.interface.rule),
         pairs: Vec::new(),
     };
@@ -50,12 +54,12 @@ pub fn interface(scope: &Scope, deck: &Deck, bodies: &[plan::Body]) -> Result<pl
     Ok(interface)
 }
 
-fn rule(rule: &Spanned<Rule>) -> plan::InterfaceRule {
+fn rule(rule: &Spanned<Rule>) -> problem::InterfaceRule {
     match rule.get_ref() {
-        Rule::None => plan::InterfaceRule::None,
-        Rule::Own => plan::InterfaceRule::Own,
-        Rule::Average => plan::InterfaceRule::Average,
-        Rule::Minimum => plan::InterfaceRule::Minimum,
+        Rule::None => problem::InterfaceRule::None,
+        Rule::Own => problem::InterfaceRule::Own,
+        Rule::Average => problem::InterfaceRule::Average,
+        Rule::Minimum => problem::InterfaceRule::Minimum,
     }
 }
 
@@ -64,7 +68,7 @@ fn pair(
     scope: &Scope,
     key: &str,
     table: &grammar::Pair,
-    bodies: &[plan::Body],
+    bodies: &[problem::Body],
 ) -> Result<[usize; 2]> {
     let key = format!("{key} bodies");
     let [first, second] = &table.bodies.get_ref()[..] else {
@@ -86,8 +90,8 @@ fn pair(
 }
 
 /// An error if the laws of two bodies exert forces in different directions on their bonds.
-fn one_direction(scope: &Scope, pair: [&plan::Body; 2]) -> Result<()> {
-    let law = |body: &plan::Body| body.material.law.declaration;
+fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
+    let law = |body: &problem::Body| body.material.law.declaration;
     let linear = pair.into_iter().find(|body| law(body).linear);
     let other = pair.into_iter().find(|body| !law(body).linear);
     let (Some(linear), Some(other)) = (linear, other) else {
@@ -108,17 +112,17 @@ fn one_micromodulus(
     scope: &Scope,
     key: &str,
     rule: &Spanned<Rule>,
-    pair: [&plan::Body; 2],
+    pair: [&problem::Body; 2],
 ) -> Result<()> {
     let [first, second] = pair.map(|body| body.material.law.declaration.name);
-    let has_micromodulus = |body: &plan::Body| {
+    let has_micromodulus = |body: &problem::Body| {
         let law = &body.material.law;
         !law.declaration.any_poisson_ratio && law.key_of_length().is_none()
     };
     if *rule.get_ref() == Rule::Own || first == second && pair.into_iter().all(has_micromodulus) {
         return Ok(());
     }
-    let with_key = |body: &plan::Body| {
+    let with_key = |body: &problem::Body| {
         let key = body.material.law.key_of_length();
         key.map_or(String::new(), |key| format!(" with a `{key}`"))
     };

@@ -4,17 +4,17 @@ use std::ops::Range;
 
 use serde_spanned::Spanned;
 
-use super::expression::Variable;
 use super::grammar::{self, DAMPING, DENSITY, ELASTIC_CONSTANTS, LawTable, common_keys};
-use super::law;
 use super::number::{Number, Written};
-use super::plan;
 use super::resolve::Scope;
-use super::source::suggestion;
 use crate::dimension::Dimension;
 use crate::elastic::{Constant, Isotropic};
 use crate::error::Result;
+use crate::expression::Variable;
 use crate::material::{Declaration, Key, Kind, Value, declarations};
+use crate::message::suggestion;
+use crate::problem;
+use crate::problem::law;
 
 /// Validates a material.
 ///
@@ -26,7 +26,7 @@ pub fn material(
     dimension: Dimension,
     name: &str,
     material: &Spanned<grammar::Material>,
-) -> Result<plan::Material> {
+) -> Result<problem::Material> {
     let grammar::Material { law, table } = material.get_ref();
     let declaration = law::find(law.get_ref())
         .map_err(|message| scope.error(law.span(), format!("[material.{name}]: {message}")))?;
@@ -42,7 +42,7 @@ pub fn material(
         return Err(section.error(None, format!("needs `{DENSITY}`")));
     };
     let law = section.law(dimension)?;
-    Ok(plan::Material {
+    Ok(problem::Material {
         density: scope.positive(density, &section.key_of(DENSITY))?,
         elastic: section.elastic(&law, dimension)?,
         law,
@@ -103,8 +103,8 @@ impl Section<'_> {
     }
 
     /// The law with the values of its own keys.
-    fn law(&self, dimension: Dimension) -> Result<plan::Law> {
-        let mut law = plan::Law::of(self.declaration);
+    fn law(&self, dimension: Dimension) -> Result<problem::Law> {
+        let mut law = problem::Law::of(self.declaration);
         for key in self.declaration.keys {
             if let Some(written) = self.table.get(key.name) {
                 law.values.set(key.name, self.value(key, written)?);
@@ -136,7 +136,7 @@ impl Section<'_> {
     /// The elastic constants; those of a bond-based law have its own Poisson ratio, but for a bar under uniaxial
     /// stress, and a law may have
     /// keys that stand for them.
-    fn elastic(&self, law: &plan::Law, dimension: Dimension) -> Result<Isotropic> {
+    fn elastic(&self, law: &problem::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
         if let Some(own) = own {
             return match self.elastic_constants().first() {

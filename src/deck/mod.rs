@@ -1,24 +1,20 @@
-//! Decks: the TOML file that describes a run, from its text to a validated [`Plan`].
+//! Decks: the TOML file that describes a run, from its text to a validated [`Problem`].
 
-mod blocks;
 mod bodies;
 mod build;
 mod conditions;
 mod damage;
 mod difference;
-mod doubts;
 mod explain;
-pub mod expression;
 pub mod grammar;
 mod history;
 mod interface;
-mod law;
+mod lints;
 mod materials;
 mod names;
 mod number;
 mod outputs;
 mod parameters;
-pub mod plan;
 mod refinement;
 mod resolve;
 mod sets;
@@ -31,11 +27,10 @@ mod validate;
 use std::path::Path;
 
 pub use difference::{differences, history_differences};
-pub use number::shown;
-pub use plan::Plan;
 pub use source::Source;
 
 use crate::error::Result;
+use crate::problem::Problem;
 use resolve::Scope;
 
 /// The commented deck that `fissure init` writes.
@@ -74,11 +69,11 @@ impl Deck {
     ///
     /// # Errors
     /// As [`read`].
-    pub fn plan(&self) -> Result<Plan> {
+    pub fn problem(&self) -> Result<Problem> {
         let scope = Scope::of(&self.source, &self.grammar)?;
-        let mut plan = validate::validate(&scope, &self.grammar)?;
-        plan.warnings = doubts::doubts(&scope, &self.grammar, &plan)?;
-        Ok(plan)
+        let mut problem = validate::validate(&scope, &self.grammar)?;
+        problem.warnings = lints::lints(&scope, &self.grammar, &problem)?;
+        Ok(problem)
     }
 
     /// The deck as TOML with every default written out.
@@ -86,7 +81,7 @@ impl Deck {
     /// # Errors
     /// As [`read`].
     pub fn explain(&self) -> Result<String> {
-        explain::explain(&self.grammar, &self.plan()?)
+        explain::explain(&self.grammar, &self.problem()?)
     }
 }
 
@@ -94,8 +89,8 @@ impl Deck {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(source: &Source) -> Result<Plan> {
-    Deck::new(source.clone())?.plan()
+pub fn parse(source: &Source) -> Result<Problem> {
+    Deck::new(source.clone())?.problem()
 }
 
 /// A deck's text with every default written out.

@@ -1,4 +1,4 @@
-//! Numbers as they stand in a deck: an integer, a float, or an expression in a string.
+//! LaneTuple as they stand in a deck: an integer, a float, or an expression in a string.
 
 use std::fmt;
 
@@ -33,15 +33,6 @@ pub enum Edges {
 /// A number that stands nowhere: a default.
 pub fn default_number(value: f64) -> Number {
     Spanned::new(0..0, Written::Value(value))
-}
-
-/// A value for an error: with an exponent where it would be a long row of digits.
-pub fn shown(value: f64) -> String {
-    match value.abs() {
-        0.0 | 1e-3..1e6 => value.to_string(),
-        size if size.is_finite() => format!("{value:e}"),
-        _ => value.to_string(),
-    }
 }
 
 impl<'de> Deserialize<'de> for Written {

@@ -3,25 +3,30 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Balance, Deck};
-use super::plan;
 use super::resolve::{Scope, find};
 use super::sets::find_set;
 use crate::error::Result;
+use crate::problem;
 
 /// Validates what is written to the result; `end` (s) is the end of the run.
 ///
 /// # Errors
 /// On an unknown field or set and on a wrong interval.
-pub fn output(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Result<plan::Output> {
+pub fn output(
+    scope: &Scope,
+    deck: &Deck,
+    sets: &[problem::Set],
+    end: f64,
+) -> Result<problem::Output> {
     let output = deck.output.get_ref();
-    let names = plan::Field::ALL.map(plan::Field::name);
+    let names = problem::Field::ALL.map(problem::Field::name);
     let fields = match &output.fields {
         None => DEFAULT_FIELDS.to_vec(),
         Some(fields) => fields
             .iter()
             .map(|field| {
                 let index = find(scope.source, field, names.into_iter(), "[output] fields")?;
-                Ok(plan::Field::ALL[index])
+                Ok(problem::Field::ALL[index])
             })
             .collect::<Result<Vec<_>>>()?,
     };
@@ -33,7 +38,7 @@ pub fn output(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Resul
         let message = format!("[output] fields: `{}` is named twice", fields[twice].name());
         return Err(scope.error(place, message));
     }
-    Ok(plan::Output {
+    Ok(problem::Output {
         every: every(scope, output, end)?,
         fields,
         single: output.precision == grammar::Precision::Single,
@@ -45,22 +50,22 @@ pub fn output(scope: &Scope, deck: &Deck, sets: &[plan::Set], end: f64) -> Resul
 }
 
 /// The fields of a result whose deck names none.
-pub const DEFAULT_FIELDS: [plan::Field; 4] = [
-    plan::Field::Displacement,
-    plan::Field::Velocity,
-    plan::Field::Damage,
-    plan::Field::StrainEnergyDensity,
+pub const DEFAULT_FIELDS: [problem::Field; 4] = [
+    problem::Field::Displacement,
+    problem::Field::Velocity,
+    problem::Field::Damage,
+    problem::Field::StrainEnergyDensity,
 ];
 
 /// When outputs are written.
-fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<plan::Interval> {
+fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<problem::Interval> {
     match (&output.every, &output.every_steps) {
-        (None, None) => Ok(plan::Interval::Seconds(end / OUTPUTS)),
+        (None, None) => Ok(problem::Interval::Seconds(end / OUTPUTS)),
         (Some(every), None) => {
             let seconds = scope.positive(every, "[output] every")?;
-            Ok(plan::Interval::Seconds(seconds))
+            Ok(problem::Interval::Seconds(seconds))
         }
-        (None, Some(steps)) => Ok(plan::Interval::Steps(steps.get_ref().get())),
+        (None, Some(steps)) => Ok(problem::Interval::Steps(steps.get_ref().get())),
         (Some(_), Some(steps)) => {
             let message = "[output] every_steps: give either `every` or `every_steps`";
             Err(scope.error(steps.span(), message))
@@ -80,11 +85,11 @@ pub const STEPS_A_ROW: u64 = 20;
 ///
 /// # Errors
 /// On a bound that every partition exceeds.
-pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<plan::Balance>> {
+pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<problem::Balance>> {
     let rule = |table: &Spanned<Balance>| {
         let table = table.get_ref();
         let key = "[balance] imbalance";
-        Ok(plan::Balance {
+        Ok(problem::Balance {
             every_steps: table.every_steps.get_ref().get(),
             imbalance: scope.within(&table.imbalance, key, 1.0..f64::INFINITY, "1 or more")?,
         })
@@ -99,8 +104,8 @@ pub const DEFAULT_CHECKPOINT: f64 = 600.0;
 ///
 /// # Errors
 /// On a wrong interval or more than one.
-pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<plan::CheckpointRule> {
-    use plan::{CheckpointRule, Interval};
+pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<problem::CheckpointRule> {
+    use problem::{CheckpointRule, Interval};
     let table = deck.checkpoint.get_ref();
     match (&table.every, &table.every_steps, &table.every_time) {
         (None, None, None) => Ok(CheckpointRule::WallClock(DEFAULT_CHECKPOINT)),

@@ -3,12 +3,13 @@
 use indexmap::IndexMap;
 use serde_spanned::Spanned;
 
-use super::expression::Expression;
 use super::grammar::Text;
 use super::number::{Number, Written};
 use super::resolve::Scope;
-use super::source::{Source, suggestion};
+use super::source::Source;
 use crate::error::{Error, Result};
+use crate::expression::Expression;
+use crate::message::suggestion;
 
 /// Words that mean something else in an expression or in its place.
 const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free"];

@@ -3,10 +3,11 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, HorizonRule, LevelBonds};
-use super::number::{Number, shown};
-use super::plan::{self, InterfaceRule, PointSource};
+use super::number::Number;
 use super::resolve::{ALL_VARIABLES, POSITION, Scope};
 use crate::error::Result;
+use crate::message::format_number;
+use crate::problem::{self, InterfaceRule, PointSource};
 
 /// The finest level; there the spacing is a 64th.
 const FINEST: u64 = 6;
@@ -24,8 +25,8 @@ const RISE: f64 = 1.0;
 pub fn refinement(
     scope: &Scope,
     deck: &Deck,
-    bodies: &[plan::Body],
-) -> Result<Option<plan::Refinement>> {
+    bodies: &[problem::Body],
+) -> Result<Option<problem::Refinement>> {
     let Some(table) = &deck.refinement else {
         return Ok(None);
     };
@@ -34,7 +35,7 @@ pub fn refinement(
         let message = "[refinement]: needs `quadrature = \"midpoint\"`, one point a cell";
         return Err(scope.error(table.span(), message));
     }
-    let lattice = |body: &&plan::Body| matches!(body.points, PointSource::Lattice { .. });
+    let lattice = |body: &&problem::Body| matches!(body.points, PointSource::Lattice { .. });
     let Some(first) = bodies.iter().find(lattice) else {
         let message = "[refinement]: only bodies given as shapes are refined, and there is none";
         return Err(scope.error(table.span(), message));
@@ -51,8 +52,8 @@ pub fn refinement(
             let range = 1.0..4.0;
             scope.within(factor, "[refinement] interface_factor", range, "1 to 4")?
         }
-        (None, plan::HorizonRule::Delta) => std::f64::consts::SQRT_2,
-        (None, plan::HorizonRule::DeltaM(_)) => 1.0,
+        (None, problem::HorizonRule::Delta) => std::f64::consts::SQRT_2,
+        (None, problem::HorizonRule::DeltaM(_)) => 1.0,
     };
     let regions = refinement.region.iter().map(|(name, table)| {
         let key = format!("[refinement.region.{name}]");
@@ -65,14 +66,14 @@ pub fn refinement(
                 return Err(scope.error(level.span(), message));
             }
         };
-        Ok(plan::RefinedRegion {
+        Ok(problem::RefinedRegion {
             name: name.clone(),
             span: table.span(),
             level,
             condition: scope.expression(&region.condition, &format!("{key} where"), &POSITION)?,
         })
     });
-    Ok(Some(plan::Refinement {
+    Ok(Some(problem::Refinement {
         span: table.span(),
         levels: finest,
         rule,
@@ -89,8 +90,8 @@ pub fn refinement(
 fn trigger(
     scope: &Scope,
     refinement: &grammar::Refinement,
-    bodies: &[plan::Body],
-) -> Result<Option<plan::Trigger>> {
+    bodies: &[problem::Body],
+) -> Result<Option<problem::Trigger>> {
     let Some(table) = &refinement.trigger else {
         return Ok(None);
     };
@@ -108,7 +109,7 @@ fn trigger(
                 let message = format!(
                     "{key}: the horizon of [body.{}] must reach across a cell's diagonal, {} m",
                     body.name,
-                    shown(diagonal)
+                    format_number(diagonal)
                 );
                 return Err(scope.error(table.span(), message));
             }
@@ -133,7 +134,7 @@ fn trigger(
         .coarsen_after
         .as_ref()
         .map(|number| scope.positive(number, &format!("{key} coarsen_after")));
-    Ok(Some(plan::Trigger {
+    Ok(Some(problem::Trigger {
         span: table.span(),
         every_steps: trigger.every_steps.get_ref().get(),
         energy: share(&trigger.energy, "energy")?,
@@ -147,12 +148,12 @@ fn trigger(
 fn rule(
     scope: &Scope,
     refinement: &grammar::Refinement,
-    body: &plan::Body,
+    body: &problem::Body,
     finest: u32,
-) -> Result<plan::HorizonRule> {
+) -> Result<problem::HorizonRule> {
     let key = "[refinement] m";
     match (refinement.rule, &refinement.m) {
-        (HorizonRule::Delta, None) => Ok(plan::HorizonRule::Delta),
+        (HorizonRule::Delta, None) => Ok(problem::HorizonRule::Delta),
         (HorizonRule::Delta, Some(ratios)) => {
             let message = format!("{key}: goes with `rule = \"delta-m\"`; \"delta\" keeps m");
             Err(scope.error(ratios.span(), message))
@@ -163,7 +164,9 @@ fn rule(
             };
             let coarsest = body.horizon / spacing[0];
             let ratio = |level: u32| coarsest + RISE * f64::from(level);
-            Ok(plan::HorizonRule::DeltaM((1..=finest).map(ratio).collect()))
+            Ok(problem::HorizonRule::DeltaM(
+                (1..=finest).map(ratio).collect(),
+            ))
         }
         (HorizonRule::DeltaM, Some(ratios)) => {
             let given: &[Number] = ratios.get_ref();
@@ -176,7 +179,7 @@ fn rule(
             }
             let ratio = |number: &Spanned<_>| scope.within(number, key, 1.0..100.0, "1 to 100");
             let ratios = given.iter().map(ratio).collect::<Result<_>>()?;
-            Ok(plan::HorizonRule::DeltaM(ratios))
+            Ok(problem::HorizonRule::DeltaM(ratios))
         }
     }
 }

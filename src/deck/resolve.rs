@@ -1,4 +1,4 @@
-//! Numbers, vectors and expressions of a deck, evaluated against its parameters.
+//! LaneTuple, vectors and expressions of a deck, evaluated against its parameters.
 
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -7,12 +7,14 @@ use indexmap::{IndexMap, IndexSet};
 use nalgebra::Vector3;
 use serde_spanned::Spanned;
 
-use super::expression::{Expression, Variable};
 use super::grammar::{Deck, DimensionName, Tables, Text};
-use super::number::{Number, Vector, Written, shown};
+use super::number::{Number, Vector, Written};
 use super::parameters;
-use super::source::{Source, suggestion};
+use super::source::Source;
 use crate::error::{Error, Result};
+use crate::expression::{Expression, Variable};
+use crate::message::format_number;
+use crate::message::suggestion;
 
 /// Lengths from those far below atoms to those far above galaxies, m.
 const LENGTHS: RangeInclusive<f64> = 1e-30..=1e30;
@@ -93,7 +95,7 @@ impl<'a> Scope<'a> {
             "{key}: must be between {:e} and {:e} m, is {}",
             LENGTHS.start(),
             LENGTHS.end(),
-            shown(length)
+            format_number(length)
         );
         Err(self.error(number.span(), message))
     }
@@ -112,7 +114,7 @@ impl<'a> Scope<'a> {
         } else {
             Err(self.error(
                 number.span(),
-                format!("{key}: must be {words}, is {}", shown(value)),
+                format!("{key}: must be {words}, is {}", format_number(value)),
             ))
         }
     }

@@ -3,30 +3,30 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Text};
-use super::plan;
 use super::resolve::{POSITION, Scope};
 use super::shapes;
 use crate::error::Result;
+use crate::problem;
 
-/// The sets of a plan: `all`, the bodies, those of the deck.
+/// The sets of a problem: `all`, the bodies, those of the deck.
 ///
 /// # Errors
 /// On a name that is taken and on a wrong selector.
-pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<plan::Set>> {
-    let mut sets = vec![plan::Set {
+pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Set>> {
+    let mut sets = vec![problem::Set {
         name: "all".to_owned(),
         span: 0..0,
-        selector: plan::Selector::All,
+        selector: problem::Selector::All,
     }];
     for (index, (name, body)) in deck.body.iter().enumerate() {
         if name == "all" {
             let message = "[body.all]: `all` is the set of all points; choose another name";
             return Err(scope.error(body.span(), message));
         }
-        sets.push(plan::Set {
+        sets.push(problem::Set {
             name: name.clone(),
             span: body.span(),
-            selector: plan::Selector::Body(index),
+            selector: problem::Selector::Body(index),
         });
     }
     for (name, table) in &deck.set {
@@ -37,7 +37,7 @@ pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<plan::Set>> {
             );
             return Err(scope.error(table.span(), message));
         }
-        sets.push(plan::Set {
+        sets.push(problem::Set {
             name: name.clone(),
             span: table.span(),
             selector: selector(scope, name, table)?,
@@ -46,7 +46,7 @@ pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<plan::Set>> {
     Ok(sets)
 }
 
-fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<plan::Selector> {
+fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<problem::Selector> {
     let key = format!("[set.{name}]");
     let set = table.get_ref();
     let given = [
@@ -58,9 +58,9 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
     if let Some(condition) = &set.condition {
         scope
             .expression(condition, &format!("{key} where"), &POSITION)
-            .map(plan::Selector::Where)
+            .map(problem::Selector::Where)
     } else if let Some(shape) = &set.shape {
-        shapes::shape(scope, &format!("{key} shape"), shape).map(plan::Selector::Within)
+        shapes::shape(scope, &format!("{key} shape"), shape).map(problem::Selector::Within)
     } else {
         let given = set.ids.as_ref().map_or(&[][..], |ids| ids.get_ref());
         if let Some(id) = given.iter().find(|id| *id.get_ref() > i64::MAX as u64) {
@@ -71,7 +71,7 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
         ids.sort_unstable();
         ids.dedup();
         let largest = given.iter().max_by_key(|id| *id.get_ref());
-        Ok(plan::Selector::Ids {
+        Ok(problem::Selector::Ids {
             ids,
             largest: largest.map_or(table.span(), Spanned::span),
         })
@@ -82,7 +82,7 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
 ///
 /// # Errors
 /// On an unknown set.
-pub fn find_set(scope: &Scope, name: &Text, sets: &[plan::Set], key: &str) -> Result<usize> {
+pub fn find_set(scope: &Scope, name: &Text, sets: &[problem::Set], key: &str) -> Result<usize> {
     let names = sets.iter().map(|set| set.name.as_str());
     scope.find_used("set", name, names, key)
 }
@@ -94,7 +94,7 @@ pub fn find_set(scope: &Scope, name: &Text, sets: &[plan::Set], key: &str) -> Re
 pub fn find_sets(
     scope: &Scope,
     names: &[Text],
-    sets: &[plan::Set],
+    sets: &[problem::Set],
     key: &str,
 ) -> Result<Vec<usize>> {
     names

@@ -6,17 +6,18 @@ use nalgebra::Vector3;
 use serde_spanned::Spanned;
 
 use super::grammar;
-use super::number::{Number, Vector, shown};
-use super::plan;
+use super::number::{Number, Vector};
 use super::resolve::Scope;
 use crate::error::Result;
+use crate::message::format_number;
 use crate::points::Polygon;
+use crate::problem;
 
 /// Validates a shape.
 ///
 /// # Errors
 /// On a shape of another dimension, an empty one, or a wrong number.
-pub fn shape(scope: &Scope, key: &str, shape: &Spanned<grammar::Shape>) -> Result<plan::Shape> {
+pub fn shape(scope: &Scope, key: &str, shape: &Spanned<grammar::Shape>) -> Result<problem::Shape> {
     resolve(scope, key, shape.get_ref(), shape.span())
 }
 
@@ -25,7 +26,7 @@ fn resolve(
     key: &str,
     shape: &grammar::Shape,
     span: Range<usize>,
-) -> Result<plan::Shape> {
+) -> Result<problem::Shape> {
     use grammar::Shape;
     let only_in = |dimension: usize, name: &str, instead: &str| {
         if scope.dimension == dimension {
@@ -49,26 +50,26 @@ fn resolve(
             if let Some(k) = (0..scope.dimension).find(|k| low[*k] >= high[*k]) {
                 let message = format!(
                     "{key} upper: must be above `lower` in every component, but {} is not above {}",
-                    shown(high[k]),
-                    shown(low[k])
+                    format_number(high[k]),
+                    format_number(low[k])
                 );
                 return Err(scope.error(upper.get_ref()[k].span(), message));
             }
-            Ok(plan::Shape::Box {
+            Ok(problem::Shape::Box {
                 lower: low,
                 upper: high,
             })
         }
         Shape::Disc { centre, radius } => {
             only_in(2, "disc", "`cylinder` or `sphere`")?;
-            Ok(plan::Shape::Ball {
+            Ok(problem::Shape::Ball {
                 centre: scope.vector(centre, &format!("{key} centre"))?,
                 radius: scope.positive(radius, &format!("{key} radius"))?,
             })
         }
         Shape::Sphere { centre, radius } => {
             only_in(3, "sphere", "`disc`")?;
-            Ok(plan::Shape::Ball {
+            Ok(problem::Shape::Ball {
                 centre: scope.vector(centre, &format!("{key} centre"))?,
                 radius: scope.positive(radius, &format!("{key} radius"))?,
             })
@@ -81,7 +82,7 @@ fn resolve(
                 let message = format!("{key} to: must differ from `from`");
                 return Err(scope.error(to.span(), message));
             }
-            Ok(plan::Shape::Cylinder {
+            Ok(problem::Shape::Cylinder {
                 from: start,
                 to: end,
                 radius: scope.positive(radius, &format!("{key} radius"))?,
@@ -89,7 +90,7 @@ fn resolve(
         }
         Shape::Polygon { vertices } => {
             only_in(2, "polygon", "`prism`")?;
-            Ok(plan::Shape::Prism {
+            Ok(problem::Shape::Prism {
                 base: corners(scope, key, vertices)?,
                 bottom: f64::NEG_INFINITY,
                 top: f64::INFINITY,
@@ -107,15 +108,15 @@ fn resolve(
                 let message = format!("{key} top: must be above `bottom`");
                 return Err(scope.error(top.span(), message));
             }
-            Ok(plan::Shape::Prism {
+            Ok(problem::Shape::Prism {
                 base: corners(scope, key, vertices)?,
                 bottom: low,
                 top: high,
             })
         }
-        Shape::Union(parts) => several(scope, key, parts, "union").map(plan::Shape::Union),
+        Shape::Union(parts) => several(scope, key, parts, "union").map(problem::Shape::Union),
         Shape::Difference(parts) => {
-            several(scope, key, parts, "difference").map(plan::Shape::Difference)
+            several(scope, key, parts, "difference").map(problem::Shape::Difference)
         }
     }
 }
@@ -125,7 +126,7 @@ fn several(
     key: &str,
     parts: &Spanned<Vec<Spanned<grammar::Shape>>>,
     name: &str,
-) -> Result<Vec<plan::Shape>> {
+) -> Result<Vec<problem::Shape>> {
     if parts.get_ref().len() < 2 {
         let message = format!("{key} {name}: needs at least two shapes");
         return Err(scope.error(parts.span(), message));
@@ -155,15 +156,19 @@ fn corners(scope: &Scope, key: &str, vertices: &Spanned<Vec<Vector>>) -> Result<
 ///
 /// # Errors
 /// On a crack of another dimension or one without extent.
-pub fn crack(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<plan::PreCrack> {
-    Ok(plan::PreCrack {
+pub fn crack(
+    scope: &Scope,
+    name: &str,
+    crack: &Spanned<grammar::Crack>,
+) -> Result<problem::PreCrack> {
+    Ok(problem::PreCrack {
         name: name.to_owned(),
         span: crack.span(),
         surface: surface(scope, name, crack)?,
     })
 }
 
-fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<plan::Crack> {
+fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result<problem::Crack> {
     use grammar::Crack;
     let (kind, dimension) = match crack.get_ref() {
         Crack::Segment { .. } => ("segment", 2),
@@ -195,7 +200,7 @@ fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result
                 let message = format!("{key} to: must differ from `from`");
                 return Err(scope.error(to.span(), message));
             }
-            Ok(plan::Crack::Segment {
+            Ok(problem::Crack::Segment {
                 from: start,
                 to: end,
                 width: width_of(width)?,
@@ -214,7 +219,7 @@ fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result
                 let message = format!("{key} edge_b: must be neither 0 nor along `edge_a`");
                 return Err(scope.error(edge_b.span(), message));
             }
-            Ok(plan::Crack::Rectangle {
+            Ok(problem::Crack::Rectangle {
                 corner,
                 edge_a: a,
                 edge_b: b,
@@ -226,7 +231,7 @@ fn surface(scope: &Scope, name: &str, crack: &Spanned<grammar::Crack>) -> Result
             normal,
             radius,
             width,
-        } => Ok(plan::Crack::Disc {
+        } => Ok(problem::Crack::Disc {
             centre: scope.vector(centre, &format!("{key} centre"))?,
             normal: scope.direction(normal, &format!("{key} normal"))?,
             radius: scope.positive(radius, &format!("{key} radius"))?,

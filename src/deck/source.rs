@@ -19,10 +19,7 @@ const MOST_SAID: usize = 230;
 /// Characters of a line that are shown in any case.
 const NARROWEST: usize = 24;
 
-/// Names longer than this are like no other.
-const LONGEST_NAME: usize = 64;
-
-/// A deck's file name and text; both are empty for a plan that was made without a deck.
+/// A deck's file name and text; both are empty for a problem that was made without a deck.
 #[derive(Debug, Clone, Default)]
 pub struct Source {
     /// Where it was read from.
@@ -169,32 +166,6 @@ fn shortened(message: &str, most: usize) -> String {
     }
 }
 
-/// The entry of `known` that is most like `name`, if any is like it at all.
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
-        .into_iter()
-        .filter(|candidate| name.len().max(candidate.len()) <= LONGEST_NAME)
-        .map(|candidate| {
-            let likeness = strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase());
-            (likeness, candidate)
-        })
-        .filter(|(likeness, _)| *likeness > 0.75)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
-}
-
-/// `; did you mean …? known: …`, for an error on an unknown name.
-pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known.into_iter().collect();
-    let mean = nearest(name, known.iter().copied())
-        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    if known.is_empty() {
-        format!("{mean} (none is defined)")
-    } else {
-        format!("{mean} (known: {})", known.join(", "))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -273,14 +244,5 @@ mod tests {
             error.contains(":2:11: is not UTF-8 text from here on"),
             "{error}"
         );
-    }
-
-    #[test]
-    fn a_suggestion_names_the_nearest() {
-        assert_eq!(
-            suggestion("horizn", ["spacing", "horizon"]),
-            "; did you mean `horizon`? (known: spacing, horizon)"
-        );
-        assert_eq!(suggestion("a", []), " (none is defined)");
     }
 }

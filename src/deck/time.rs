@@ -3,16 +3,17 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Text};
-use super::number::{Number, shown};
-use super::plan::{self, Method, StepRule};
+use super::number::Number;
 use super::resolve::{Scope, find};
 use crate::error::Result;
+use crate::message::format_number;
+use crate::problem::{self, Method, StepRule};
 
 /// The share by which times that are computed in different ways may differ.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
 /// A stretch of time with the keys of `[time]` or of a stage.
-struct Stretch<'a> {
+struct TimeSegment<'a> {
     /// The table, as messages name it.
     key: &'static str,
     /// Length, s.
@@ -31,7 +32,7 @@ struct Stretch<'a> {
 ///
 /// # Errors
 /// On a wrong number, and on keys of a method that nothing uses.
-pub fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {
+pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     let time = deck.time.get_ref();
     let end = scope.positive(&time.end, "[time] end")?;
     let method = *time.method.get_ref();
@@ -49,7 +50,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {
     if methods[0] == grammar::Method::Relaxation {
         at_rest(scope, deck)?;
     }
-    let stretch = Stretch {
+    let stretch = TimeSegment {
         key: "[time]",
         length: end,
         end,
@@ -72,7 +73,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<plan::Time> {
 ///
 /// # Errors
 /// On ends that do not follow one another up to that of the run, on unknown names and on wrong numbers.
-pub fn stages(scope: &Scope, deck: &Deck, whole: &plan::Time) -> Result<Vec<plan::Stage>> {
+pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;
     let mut stages = Vec::new();
@@ -88,7 +89,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &plan::Time) -> Result<Vec<plan
         }
         let inherited_step = time.step.as_ref().filter(|_| !relaxes);
         let inherited_rule = time.adaptive.as_ref().filter(|_| !relaxes);
-        let stretch = Stretch {
+        let stretch = TimeSegment {
             key: "[[stage]]",
             length: end - start,
             end,
@@ -99,7 +100,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &plan::Time) -> Result<Vec<plan
             density_scale: stage.density_scale.as_ref().unwrap_or(&time.density_scale),
             adaptive: stage.adaptive.as_ref().or(inherited_rule),
         };
-        stages.push(plan::Stage {
+        stages.push(problem::Stage {
             time: stretch.time(scope)?,
             acting: acting(scope, deck, stage)?,
         });
@@ -131,16 +132,19 @@ fn stage_end(
     let end = scope.positive(number, "[[stage]] end")?;
     let about = |other: f64| (end - other).abs() <= UP_TO_ROUNDING * whole;
     let words = if end <= start || about(start) {
-        format!("must be after its start, {} s", shown(start))
+        format!("must be after its start, {} s", format_number(start))
     } else if is_last && !about(whole) {
-        let whole = shown(whole);
+        let whole = format_number(whole);
         format!("the last stage ends with the run, [time] end = {whole} s; leave it out here")
     } else if !is_last && (end >= whole || about(whole)) {
-        format!("must be before the end of the run, {} s", shown(whole))
+        format!(
+            "must be before the end of the run, {} s",
+            format_number(whole)
+        )
     } else {
         return Ok(if is_last { whole } else { end });
     };
-    let message = format!("[[stage]] end: {words}, is {} s", shown(end));
+    let message = format!("[[stage]] end: {words}, is {} s", format_number(end));
     Err(scope.error(number.span(), message))
 }
 
@@ -163,8 +167,8 @@ fn acting(scope: &Scope, deck: &Deck, stage: &grammar::Stage) -> Result<Vec<bool
     Ok(acting)
 }
 
-impl Stretch<'_> {
-    fn time(&self, scope: &Scope) -> Result<plan::Time> {
+impl TimeSegment<'_> {
+    fn time(&self, scope: &Scope) -> Result<problem::Time> {
         let named = |key: &str| format!("{} {key}", self.key);
         let safety = scope.within(
             self.safety,
@@ -185,7 +189,7 @@ impl Stretch<'_> {
             }
         };
         let adaptive = self.adaptive.map(|table| self.adaptive(scope, table));
-        Ok(plan::Time {
+        Ok(problem::Time {
             end: self.end,
             step,
             method,
@@ -201,7 +205,7 @@ impl Stretch<'_> {
         let words = if self.method == grammar::Method::Relaxation {
             "relaxation has load steps, `relaxation.load_steps` of them".to_owned()
         } else if step > self.length * (1.0 + UP_TO_ROUNDING) {
-            let (step, length) = (shown(step), shown(self.length));
+            let (step, length) = (format_number(step), format_number(self.length));
             let whole = if self.key == "[time]" { "run" } else { "stage" };
             format!("{step} s is longer than the {whole}, {length} s")
         } else {
@@ -214,7 +218,7 @@ impl Stretch<'_> {
         &self,
         scope: &Scope,
         table: &Spanned<grammar::Adaptive>,
-    ) -> Result<plan::Adaptive> {
+    ) -> Result<problem::Adaptive> {
         let key = format!("{} adaptive", self.key);
         if self.method == grammar::Method::Relaxation {
             let message = format!("{key}: relaxation has no time steps");
@@ -235,7 +239,7 @@ impl Stretch<'_> {
         if let (Some(low), Some(high), Some(number)) = (smallest, largest, &rule.smallest)
             && low > high * (1.0 + UP_TO_ROUNDING)
         {
-            let (low, high) = (shown(low), shown(high));
+            let (low, high) = (format_number(low), format_number(high));
             let message = format!("{key} smallest: {low} s is more than `largest`, {high} s");
             return Err(scope.error(number.span(), message));
         }
@@ -249,7 +253,7 @@ impl Stretch<'_> {
         }
         let shorter = f64::MIN_POSITIVE..1.0;
         let longer = 1.0 + f64::EPSILON..f64::INFINITY;
-        Ok(plan::Adaptive {
+        Ok(problem::Adaptive {
             most_broken: rule.most_broken.get(),
             stable_broken: *rule.stable_broken.get_ref(),
             steps: rule.steps.get(),
@@ -265,10 +269,14 @@ impl Stretch<'_> {
         })
     }
 
-    fn relaxation(&self, scope: &Scope, table: &grammar::Relaxation) -> Result<plan::Relaxation> {
+    fn relaxation(
+        &self,
+        scope: &Scope,
+        table: &grammar::Relaxation,
+    ) -> Result<problem::Relaxation> {
         let key = format!("{} relaxation tolerance", self.key);
         let range = f64::MIN_POSITIVE..1.0;
-        Ok(plan::Relaxation {
+        Ok(problem::Relaxation {
             load_steps: table.load_steps.get(),
             tolerance: scope.within(&table.tolerance, &key, range, "above 0 and below 1")?,
             iterations: table.iterations.get(),

@@ -8,10 +8,11 @@ use serde::de::value::{Error as NameError, StrDeserializer};
 use toml::de::{DeTable, DeValue};
 
 use super::grammar::{Crack, Damage, DimensionName, Shape};
-use super::law;
-use super::source::{Source, suggestion};
+use super::source::Source;
 use crate::error::Error;
 use crate::material::declarations;
+use crate::message::suggestion;
+use crate::problem::law;
 
 /// The error that the deck deserves for what the TOML reader found.
 pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {

@@ -1,12 +1,11 @@
-//! From the grammar to the plan: every value checked, every name resolved.
+//! From the grammar to the problem: every value checked, every name resolved.
 
 use serde_spanned::Spanned;
 
 use super::grammar::{
     ConstraintName, Deck, DimensionName, Family, Grid, Quadrature, VolumeCorrection,
 };
-use super::number::{Edges, Number, shown};
-use super::plan::{self, Plan};
+use super::number::{Edges, Number};
 use super::resolve::{Scope, resolve_each};
 use super::{
     bodies, conditions, damage, history, interface, materials, names, outputs, refinement, sets,
@@ -14,12 +13,14 @@ use super::{
 };
 use crate::dimension::{Constraint, Dimension};
 use crate::error::Result;
+use crate::message::format_number;
+use crate::problem::{self, Problem};
 
 /// Validates a parsed deck, whose values are resolved against `scope`.
 ///
 /// # Errors
 /// The first mistake, with its place in the deck, the key and what would be right.
-pub fn validate(scope: &Scope, deck: &Deck) -> Result<Plan> {
+pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     names::names(scope, deck)?;
     let dimension = dimension(scope, deck)?;
     let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;
@@ -42,7 +43,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Plan> {
     let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
     let time = time::time(scope, deck)?;
     let stages = time::stages(scope, deck, &time)?;
-    Ok(Plan {
+    Ok(Problem {
         source: scope.source.clone(),
         warnings: Vec::new(),
         title: deck.title.get_ref().clone(),
@@ -51,8 +52,8 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Plan> {
         horizon,
         volume_correction,
         quadrature: match deck.grid.get_ref().quadrature {
-            Quadrature::Midpoint => plan::Quadrature::Midpoint,
-            Quadrature::Gauss => plan::Quadrature::Gauss,
+            Quadrature::Midpoint => problem::Quadrature::Midpoint,
+            Quadrature::Gauss => problem::Quadrature::Gauss,
         },
         family,
         interface,
@@ -71,11 +72,11 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Plan> {
     })
 }
 
-fn places(deck: &Deck) -> plan::Places {
+fn places(deck: &Deck) -> problem::Places {
     let time = deck.time.get_ref();
     let of_stages = deck.stage.iter().map(|stage| &stage.get_ref().adaptive);
     let mut adaptive = std::iter::once(&time.adaptive).chain(of_stages).flatten();
-    plan::Places {
+    problem::Places {
         horizon: deck.grid.get_ref().horizon.span(),
         end: time.end.span(),
         step: time.step.as_ref().unwrap_or(&time.end).span(),
@@ -135,8 +136,8 @@ pub fn spacing(scope: &Scope, edges: &Spanned<Edges>, key: &str, horizon: f64) -
             let message = format!(
                 "{key}: {} m is larger than the horizon {} m, so no point would have a neighbour; \
                  the horizon is usually 3 to 6 spacings",
-                shown(*edge),
-                shown(horizon)
+                format_number(*edge),
+                format_number(horizon)
             );
             return Err(scope.error(number.span(), message));
         }
@@ -155,20 +156,20 @@ fn single(grid: &Spanned<Grid>, spacing: Option<[f64; 3]>) -> Option<f64> {
 fn volume_correction(
     scope: &Scope,
     deck: &Deck,
-    bodies: &[plan::Body],
-) -> Result<plan::VolumeCorrection> {
+    bodies: &[problem::Body],
+) -> Result<problem::VolumeCorrection> {
     let grid = deck.grid.get_ref();
     let given = grid.volume_correction.as_ref();
     let correction = match given.map(|given| given.get_ref()) {
-        Some(VolumeCorrection::None) => return Ok(plan::VolumeCorrection::None),
-        Some(VolumeCorrection::Linear) => plan::VolumeCorrection::Linear,
-        Some(VolumeCorrection::Exact) | None => plan::VolumeCorrection::Exact,
+        Some(VolumeCorrection::None) => return Ok(problem::VolumeCorrection::None),
+        Some(VolumeCorrection::Linear) => problem::VolumeCorrection::Linear,
+        Some(VolumeCorrection::Exact) | None => problem::VolumeCorrection::Exact,
     };
     let gauss = grid.quadrature == Quadrature::Gauss;
-    let without_cells = |body: &plan::Body| match &body.points {
-        plan::PointSource::File { .. } => Some("has its points from a file"),
-        plan::PointSource::Lattice { .. } if gauss => Some("has Gauss points"),
-        plan::PointSource::Lattice { spacing, .. } => {
+    let without_cells = |body: &problem::Body| match &body.points {
+        problem::PointSource::File { .. } => Some("has its points from a file"),
+        problem::PointSource::Lattice { .. } if gauss => Some("has Gauss points"),
+        problem::PointSource::Lattice { spacing, .. } => {
             let edges = &spacing[..scope.dimension];
             let alike = edges.iter().all(|edge| *edge == edges[0]);
             (!alike).then_some("has cells with edges of different lengths")
@@ -181,7 +182,7 @@ fn volume_correction(
         return Ok(correction);
     };
     let Some(given) = given else {
-        return Ok(plan::VolumeCorrection::None);
+        return Ok(problem::VolumeCorrection::None);
     };
     let message = format!(
         "[grid] volume_correction: only points at the centres of square or cubic lattice cells have \
@@ -190,12 +191,14 @@ fn volume_correction(
     Err(scope.error(given.span(), message))
 }
 
-fn family(scope: &Scope, deck: &Deck) -> Result<plan::FamilyRule> {
+fn family(scope: &Scope, deck: &Deck) -> Result<problem::FamilyRule> {
     let grid = deck.grid.get_ref();
     match grid.family.get_ref() {
-        Family::Auto => Ok(plan::FamilyRule::Auto),
-        Family::List => Ok(plan::FamilyRule::List),
-        Family::Lattice if grid.quadrature == Quadrature::Midpoint => Ok(plan::FamilyRule::Lattice),
+        Family::Auto => Ok(problem::FamilyRule::Auto),
+        Family::List => Ok(problem::FamilyRule::List),
+        Family::Lattice if grid.quadrature == Quadrature::Midpoint => {
+            Ok(problem::FamilyRule::Lattice)
+        }
         Family::Lattice => {
             let message = "[grid] family: Gauss points do not have the same neighbours all over, \
                            as those of a lattice do; take \"auto\" or \"list\"";

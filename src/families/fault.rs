@@ -1,10 +1,11 @@
 //! What can be wrong with points so that they cannot be bonded.
 
-use crate::deck::plan::{Body, PointSource};
-use crate::deck::{Plan, shown};
 use crate::error::Error;
 use crate::memory::Shortage;
+use crate::message::format_number;
 use crate::points::Point;
+use crate::problem::Problem;
+use crate::problem::{Body, PointSource};
 
 /// The most neighbours of a point; a horizon of 16 spacings has as many in 3-D, one of 80 in the plane.
 pub const MOST_NEIGHBOURS: f64 = 20_000.0;
@@ -36,16 +37,16 @@ pub enum Fault {
 
 impl Fault {
     /// The error, with the place in the deck that it is about.
-    pub fn error(&self, plan: &Plan) -> Error {
+    pub fn error(&self, problem: &Problem) -> Error {
         match self {
-            Self::SamePlace(points) => same_place(plan, points),
+            Self::SamePlace(points) => same_place(problem, points),
             Self::TooManyNeighbours {
                 blocks,
                 neighbours,
                 spacings,
-            } => too_many_neighbours(plan, *blocks, *neighbours, *spacings),
+            } => too_many_neighbours(problem, *blocks, *neighbours, *spacings),
             Self::TooLittleMemory { blocks, shortage } => {
-                too_little_memory(plan, *blocks, *shortage)
+                too_little_memory(problem, *blocks, *shortage)
             }
             Self::TooManyHoles => Error::run(
                 "a rank's part of a grid has too many holes for a lattice (2³¹ places at most); \
@@ -55,11 +56,11 @@ impl Fault {
     }
 }
 
-fn same_place(plan: &Plan, points: &[Point; 2]) -> Error {
+fn same_place(problem: &Problem, points: &[Point; 2]) -> Error {
     let [a, b] = *points;
     let [first, second] = if a.id < b.id { [a, b] } else { [b, a] };
-    let [body, other] = [second, first].map(|point| plan.block(point.block as usize).body);
-    let place = &first.position[..plan.dimension.count()];
+    let [body, other] = [second, first].map(|point| problem.block(point.block as usize).body);
+    let place = &first.position[..problem.dimension.count()];
     let message = if body.name == other.name {
         format!(
             "[body.{}]: its points {} and {} lie at the same place, {place:?} m",
@@ -72,26 +73,26 @@ fn same_place(plan: &Plan, points: &[Point; 2]) -> Error {
             body.name, second.id, first.id, other.name
         )
     };
-    plan.source.error(body.span.clone(), message)
+    problem.source.error(body.span.clone(), message)
 }
 
 /// A large number for a message, to two digits.
 fn rounded(value: f64) -> String {
     let unit = libm::pow(10_f64, libm::log10(value).floor() - 1.0);
-    shown((value / unit).round() * unit)
+    format_number((value / unit).round() * unit)
 }
 
 /// The key that gives a body its horizon.
-fn horizon_key(plan: &Plan, body: &Body) -> String {
-    if body.horizon_place == plan.places.horizon {
+fn horizon_key(problem: &Problem, body: &Body) -> String {
+    if body.horizon_place == problem.places.horizon {
         "[grid] horizon".to_owned()
     } else {
         format!("[body.{}] horizon", body.name)
     }
 }
 
-fn too_little_memory(plan: &Plan, blocks: [usize; 2], shortage: Shortage) -> Error {
-    let [near, other] = blocks.map(|block| plan.block(block));
+fn too_little_memory(problem: &Problem, blocks: [usize; 2], shortage: Shortage) -> Error {
+    let [near, other] = blocks.map(|block| problem.block(block));
     let (body, other) = (near.body, other.body);
     let spacings = match &body.points {
         PointSource::Lattice { spacing, .. } => {
@@ -108,21 +109,21 @@ fn too_little_memory(plan: &Plan, blocks: [usize; 2], shortage: Shortage) -> Err
     let message = format!(
         "{}: with {} m{spacings} bonds, most of them {ends}, take {needed:.2} GB of memory on a rank, where \
          {available:.2} GB are left; take a shorter horizon, a larger spacing or more nodes",
-        horizon_key(plan, body),
-        shown(near.horizon),
+        horizon_key(problem, body),
+        format_number(near.horizon),
     );
-    plan.source.error(body.horizon_place.clone(), message)
+    problem.source.error(body.horizon_place.clone(), message)
 }
 
 fn too_many_neighbours(
-    plan: &Plan,
+    problem: &Problem,
     blocks: [usize; 2],
     neighbours: Option<f64>,
     spacings: Option<f64>,
 ) -> Error {
-    let [near, other] = blocks.map(|block| plan.block(block));
+    let [near, other] = blocks.map(|block| problem.block(block));
     let (body, other) = (near.body, other.body);
-    let key = horizon_key(plan, body);
+    let key = horizon_key(problem, body);
     // The horizon itself, where the longest bond may be longer: cells are shared.
     let spacings = match &other.points {
         PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),
@@ -139,8 +140,8 @@ fn too_many_neighbours(
     let message = format!(
         "{key}: {} m{is}, so a point of [body.{}] would have {count} neighbours there \
          ({MOST_NEIGHBOURS} at most); is the horizon in metres?",
-        shown(near.horizon),
+        format_number(near.horizon),
         body.name
     );
-    plan.source.error(body.horizon_place.clone(), message)
+    problem.source.error(body.horizon_place.clone(), message)
 }

@@ -284,7 +284,7 @@ impl BondLattice {
     }
 
     /// See [`super::BlockBonds::together`].
-    pub fn together(&self, point: usize) -> Range<usize> {
+    pub fn lane_group(&self, point: usize) -> Range<usize> {
         self.vector_of(point)
             .map_or(point..point + 1, |vector| self.points_of(vector))
     }

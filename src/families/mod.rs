@@ -29,7 +29,7 @@ pub use offset::{Offset, most_neighbours};
 pub use search::cutoff;
 use search::search;
 pub use store::{Groups, Store};
-pub use vectors::{Adjacent, Vectors};
+pub use vectors::{VectorBonds, Vectors};
 pub use volume::CellShare;
 
 /// The bonds from points of one block to points of one block.
@@ -90,10 +90,10 @@ impl BlockBonds {
 
     /// The owned points, one after the other, whose bonds here are worked on together with those of a
     /// point.
-    pub fn together(&self, point: usize) -> Range<usize> {
+    pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,
-            Self::Lattice(lattice) => lattice.together(point),
+            Self::Lattice(lattice) => lattice.lane_group(point),
         }
     }
 
@@ -103,8 +103,8 @@ impl BlockBonds {
     }
 
     /// Gives every bond so many numbers, which are 0.
-    pub fn remember(&mut self, numbers: usize) {
-        with!(self, bonds => bonds.store.remember(numbers));
+    pub fn allocate_history(&mut self, numbers: usize) {
+        with!(self, bonds => bonds.store.allocate_history(numbers));
     }
 
     /// What is kept of the bonds.

@@ -179,7 +179,7 @@ impl Group<'_> {
     /// An index, and how far the eight lie beyond it, each read by itself: else the compiler makes a vector of
     /// them, which it has to take apart again where they are to be addresses.
     #[inline(always)]
-    pub fn apart(self) -> (usize, [usize; WIDTH]) {
+    pub fn base_and_offsets(self) -> (usize, [usize; WIDTH]) {
         match self {
             Self::Near(first, distances) => {
                 // SAFETY: all of them are there.
@@ -220,7 +220,7 @@ mod tests {
         copied.extend(pushed.groups(1..groups.len()));
         for (k, group) in groups.into_iter().enumerate() {
             assert_eq!(pushed.indices(k), group);
-            let (first, distances) = pushed.all().group(k).apart();
+            let (first, distances) = pushed.all().group(k).base_and_offsets();
             assert_eq!(distances.map(|distance| (first + distance) as u32), group);
             if k > 0 {
                 assert_eq!(copied.indices(k), group);

@@ -30,7 +30,7 @@ pub struct Groups<'a> {
 
 impl Store {
     /// Gives every bond so many numbers, which are 0.
-    pub fn remember(&mut self, width: usize) {
+    pub fn allocate_history(&mut self, width: usize) {
         self.width = width;
         self.numbers = vec![Lanes::splat(0.0); width * self.intact.len()];
     }

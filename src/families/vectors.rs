@@ -19,7 +19,7 @@ pub(super) struct Vector {
 }
 
 /// The bonds of up to eight adjacent points.
-pub struct Adjacent<'a> {
+pub struct VectorBonds<'a> {
     /// The first point's place on the grid.
     pub place: usize,
     /// Its local index.
@@ -127,7 +127,7 @@ impl<'a> Vectors<'a> {
 
     /// The bonds of one vector.
     #[inline(always)]
-    pub fn vector(&mut self, vector: usize) -> Adjacent<'_> {
+    pub fn vector(&mut self, vector: usize) -> VectorBonds<'_> {
         let Shared {
             offsets,
             weighted,
@@ -138,7 +138,7 @@ impl<'a> Vectors<'a> {
         let all = (self.first + vector) * count..(self.first + vector + 1) * count;
         let bits = vector * count..(vector + 1) * count;
         let vector = &self.vectors[vector];
-        Adjacent {
+        VectorBonds {
             place: vector.place as usize,
             point: vector.point as usize,
             members: vector.members,
@@ -151,7 +151,7 @@ impl<'a> Vectors<'a> {
     }
 }
 
-impl Adjacent<'_> {
+impl VectorBonds<'_> {
     /// The place of the first of the eight far ends at an offset, with seven more after it. Where
     /// none of the bonds exists it is meaningless, but still a place.
     ///

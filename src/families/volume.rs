@@ -10,7 +10,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use rustc_hash::FxHashMap;
 
-use crate::deck::plan::VolumeCorrection;
+use crate::problem::VolumeCorrection;
 
 use super::search::cutoff;
 

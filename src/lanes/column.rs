@@ -8,7 +8,7 @@ const SETS: usize = 64;
 /// Each column starts so many lines after the one before it: of eighteen none is within two lines of another.
 const STEP: usize = 27;
 
-/// Numbers in a line.
+/// LaneTuple in a line.
 const LINE: usize = 8;
 
 /// One of several columns of numbers that are read at the same index.

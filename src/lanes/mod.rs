@@ -5,15 +5,15 @@
 
 mod column;
 pub mod instructions;
-pub mod numbers;
+mod isa_set;
+pub mod lane_tuple;
 pub mod simd;
-mod versions;
 
 pub use column::Column;
 pub use instructions::Instructions;
-pub use numbers::Numbers;
+pub use isa_set::IsaSet;
+pub use lane_tuple::LaneTuple;
 pub use simd::Simd;
-pub use versions::Versions;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 

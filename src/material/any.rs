@@ -4,7 +4,7 @@
 use nalgebra::SMatrix;
 
 use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Rotation, with_law};
-use crate::lanes::{Lanes, Numbers, Simd, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 
 /// How many numbers of each kind the points and bonds of a law have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,12 +17,12 @@ pub struct Counts {
     pub own: usize,
     /// [`Law::PASSES`].
     pub passes: usize,
-    /// [`Law::WholeSum`].
-    pub whole_sum: usize,
+    /// [`Law::ReferenceSum`].
+    pub reference_sum: usize,
     /// [`Law::Sum`].
     pub sum: usize,
-    /// [`Law::Memory`].
-    pub memory: usize,
+    /// [`Law::BondHistory`].
+    pub bond_history: usize,
     /// [`ForceState::CENTRAL`] of [`Law::Force`].
     pub central: bool,
 }
@@ -34,9 +34,9 @@ impl Counts {
             point: L::Point::COUNT,
             own: L::OWN_NUMBERS,
             passes: L::PASSES,
-            whole_sum: L::WholeSum::COUNT,
+            reference_sum: L::ReferenceSum::COUNT,
             sum: L::Sum::COUNT,
-            memory: L::Memory::COUNT,
+            bond_history: L::BondHistory::COUNT,
             central: L::Force::CENTRAL,
         }
     }
@@ -51,9 +51,9 @@ impl Counts {
             point: more(self.point, other.point),
             own: more(self.own, other.own),
             passes: more(self.passes, other.passes),
-            whole_sum: more(self.whole_sum, other.whole_sum),
+            reference_sum: more(self.reference_sum, other.reference_sum),
             sum: more(self.sum, other.sum),
-            memory: more(self.memory, other.memory),
+            bond_history: more(self.bond_history, other.bond_history),
             central: self.central && other.central,
         }
     }
@@ -72,13 +72,13 @@ pub const MOST: Counts = {
 
 /// The first of some numbers.
 #[inline(always)]
-fn first<A: Numbers, B: Numbers>(all: &A) -> B {
+fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))
 }
 
 /// Some numbers, and zeros after them.
 #[inline(always)]
-fn filled_up<A: Numbers, B: Numbers>(some: A) -> B {
+fn filled_up<A: LaneTuple, B: LaneTuple>(some: A) -> B {
     B::each(|k| {
         if k < A::COUNT {
             some.get(k)
@@ -107,19 +107,19 @@ impl AnyLaw {
 /// loop over such bonds would be compiled with all laws in it.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = [Lanes; MOST.point];
-    type Memory = [Lanes; MOST.memory];
-    type WholeSum = [Lanes; MOST.whole_sum];
+    type BondHistory = [Lanes; MOST.bond_history];
+    type ReferenceSum = [Lanes; MOST.reference_sum];
     type Sum = [Lanes; MOST.sum];
     type Force = [Lanes; D];
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const PASSES: usize = MOST.passes;
     const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;
     const HAS_BOND_STRESS_ACROSS: bool = true;
 
     #[inline(never)]
-    fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
-        with_law!(self, law => filled_up(law.whole_share(bond)))
+    fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
+        with_law!(self, law => filled_up(law.reference_contribution(bond)))
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
@@ -127,38 +127,44 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn share<const S: usize>(
+    fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
         own: &Self::Point,
-        memory: &Self::Memory,
+        history: &Self::BondHistory,
     ) -> Self::Sum {
-        with_law!(self, law => filled_up(law.share::<S>(bond, &first(own), &first(memory))))
+        with_law!(self, law => filled_up(law.pass_contribution::<S>(bond, &first(own), &first(history))))
     }
 
     #[inline(never)]
-    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], plastic: &mut PlasticState) {
-        with_law!(self, law => Law::<D>::point(law, pass, sums, numbers, plastic));
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        plastic: &mut PlasticState,
+    ) {
+        with_law!(self, law => Law::<D>::update_point(law, pass, sums, numbers, plastic));
     }
 
-    fn flows(&self) -> bool {
-        with_law!(self, law => Law::<D>::flows(law))
+    fn has_plasticity(&self) -> bool {
+        with_law!(self, law => Law::<D>::has_plasticity(law))
     }
 
     #[inline(never)]
-    fn memory(
+    fn bond_history(
         &self,
         bond: &Bond<D>,
         end: &Self::Point,
-        before: &Self::Memory,
+        before: &Self::BondHistory,
         step: f64,
-    ) -> Self::Memory {
-        with_law!(self, law => filled_up(law.memory(bond, &first(end), &first(before), step)))
+    ) -> Self::BondHistory {
+        with_law!(self, law => filled_up(law.bond_history(bond, &first(end), &first(before), step)))
     }
 
     #[inline(never)]
-    fn force(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> [Lanes; D] {
-        with_law!(self, law => law.force(bond, &first(end), &first(memory)).vector(bond))
+    fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> [Lanes; D] {
+        with_law!(self, law => law.force(bond, &first(end), &first(history)).vector(bond))
     }
 
     #[inline(never)]
@@ -167,10 +173,10 @@ impl<const D: usize> Law<D> for AnyLaw {
         simd: S,
         bond: &Bond<D>,
         end: &Self::Point,
-        memory: &Self::Memory,
+        history: &Self::BondHistory,
         rotation: &[Lanes; 3],
     ) -> Lanes {
-        with_law!(self, law => law.end_work(simd, bond, &first(end), &first(memory), rotation))
+        with_law!(self, law => law.end_work(simd, bond, &first(end), &first(history), rotation))
     }
 
     fn reads_advanced_history(&self, pass: usize) -> bool {
@@ -182,8 +188,8 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Lanes {
-        with_law!(self, law => law.bond_energy(bond, &first(end), &first(memory)))
+    fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Lanes {
+        with_law!(self, law => law.bond_energy(bond, &first(end), &first(history)))
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -216,8 +222,8 @@ impl<const D: usize> Law<D> for AnyLaw {
     }
 
     #[inline(never)]
-    fn dissipated(&self, length: Lanes, memory: &Self::Memory) -> Lanes {
-        with_law!(self, law => Law::<D>::dissipated(law, length, &first(memory)))
+    fn dissipated(&self, length: Lanes, history: &Self::BondHistory) -> Lanes {
+        with_law!(self, law => Law::<D>::dissipated(law, length, &first(history)))
     }
 
     #[inline(never)]
@@ -225,8 +231,8 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::stiffness(law, length, &first(end)))
     }
 
-    fn overload(&self, sums: &[f64]) -> f64 {
-        with_law!(self, law => Law::<D>::overload(law, sums))
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
+        with_law!(self, law => Law::<D>::truncation_factor(law, sums))
     }
 
     fn resists_across(&self) -> bool {

@@ -8,13 +8,13 @@
 //! beyond take the closed forms x/((1 + x) + √(1 + x)) and x/(1 + √(1 + x)), which lose no digits
 //! either. All of that is the same to the bit from both ends of a bond: x is.
 
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{LaneTuple, Lanes, Simd};
 
 /// The largest |x| for which the series are taken.
 pub const NEAR: f64 = 1.0 / 256.0;
 
 /// P(x)/x.
-const SHORTENING: [f64; 7] = [
+const EXTENSION_OVER_DEFORMED: [f64; 7] = [
     0.5,
     -0.375,
     0.3125,
@@ -45,17 +45,17 @@ pub struct Bond<const D: usize> {
     /// 1/|ξ|, 1/m.
     pub inverse: Lanes,
     /// x = (|Y|² − |ξ|²)/|ξ|²; for linear laws ξ·η/|ξ|².
-    pub growth: Lanes,
+    pub relative_square_extension: Lanes,
     /// s = (|Y| − |ξ|)/|ξ|; for linear laws ξ·η/|ξ|². Of intact bonds, where it is asked for.
     pub stretch: Lanes,
     /// (|Y| − |ξ|)/|Y|; means nothing for linear laws. Of intact bonds, where it is asked for.
-    pub shortening: Lanes,
+    pub extension_over_deformed: Lanes,
     /// η by component, m.
-    pub moved: [Lanes; D],
+    pub eta: [Lanes; D],
     /// Y by component, m; for linear laws ξ.
-    pub along: [Lanes; D],
+    pub deformed: [Lanes; D],
     /// A bit for each intact bond with a large |x|.
-    pub marked: u8,
+    pub beyond_series: u8,
 }
 
 /// The influence and the share of the volume that a bond has in the sums of its two ends.
@@ -103,7 +103,7 @@ impl Weights {
 #[derive(Debug, Clone, Copy)]
 pub struct Reference<const D: usize> {
     /// By component, m.
-    pub along: [Lanes; D],
+    pub xi: [Lanes; D],
     /// |ξ|, m.
     pub length: Lanes,
     /// 1/|ξ|, 1/m.
@@ -119,13 +119,13 @@ pub struct Wanted {
     pub linear: bool,
     /// [`Bond::stretch`].
     pub stretch: bool,
-    /// [`Bond::shortening`].
-    pub shortening: bool,
+    /// [`Bond::extension_over_deformed`].
+    pub extension_over_deformed: bool,
 }
 
 /// Bonds whose far ends have moved by η (m) relative to the own ones; stretches are those of the bonds
-/// whose bit is set. `limit`, at most [`NEAR`], is the |x| beyond which bonds are marked; with `ONLY_NEAR` the
-/// stretches of marked bonds mean nothing.
+/// whose bit is set. `limit`, at most [`NEAR`], is the |x| beyond which bonds leave the series; with `ONLY_NEAR` the
+/// stretches of such bonds are undefined.
 #[inline(always)]
 pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
     simd: S,
@@ -137,62 +137,70 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 ) -> Bond<D> {
     let linear = wanted.linear;
     let Reference {
-        along: xi,
+        xi,
         length,
         inverse,
         inverse_square,
     } = *reference;
-    let deformed: [Lanes; D] = Numbers::each(|d| xi[d] + eta[d]);
+    let deformed: [Lanes; D] = LaneTuple::each(|d| xi[d] + eta[d]);
     let sum = |d: usize| if linear { xi[d] } else { xi[d] + deformed[d] };
-    let mut growth = eta[0] * sum(0);
+    let mut relative_square_extension = eta[0] * sum(0);
     for d in 1..D {
-        growth = simd.multiply_add(eta[d], sum(d), growth);
+        relative_square_extension = simd.multiply_add(eta[d], sum(d), relative_square_extension);
     }
-    let growth = simd.whole(growth * inverse_square);
+    let relative_square_extension = simd.whole(relative_square_extension * inverse_square);
     if linear {
         return Bond {
             reference: xi,
             length,
             inverse,
-            growth,
-            stretch: growth,
-            shortening: growth,
-            moved: eta,
-            along: xi,
-            marked: intact,
+            relative_square_extension,
+            stretch: relative_square_extension,
+            extension_over_deformed: relative_square_extension,
+            eta,
+            deformed: xi,
+            beyond_series: intact,
         };
     }
     // Beyond the limit, or not a number.
-    let marked = intact & !simd.at_least(Lanes::splat(limit), growth.abs());
-    let (mut stretch, mut shortening) = (growth, growth);
+    let beyond_series =
+        intact & !simd.at_least(Lanes::splat(limit), relative_square_extension.abs());
+    let (mut stretch, mut extension_over_deformed) =
+        (relative_square_extension, relative_square_extension);
     if wanted.stretch {
-        let near = series(simd, growth, &STRETCH);
+        let near = series(simd, relative_square_extension, &STRETCH);
         stretch = if ONLY_NEAR {
             simd.whole(near)
         } else {
-            with_far(simd, growth, marked, near, |_| {
+            with_far(simd, relative_square_extension, beyond_series, near, |_| {
                 (Lanes::splat(1.0), Lanes::splat(0.0))
             })
         };
     }
-    if wanted.shortening {
-        let near = series(simd, growth, &SHORTENING);
-        shortening = if ONLY_NEAR {
+    if wanted.extension_over_deformed {
+        let near = series(simd, relative_square_extension, &EXTENSION_OVER_DEFORMED);
+        extension_over_deformed = if ONLY_NEAR {
             simd.whole(near)
         } else {
-            with_far(simd, growth, marked, near, |square| square)
+            with_far(
+                simd,
+                relative_square_extension,
+                beyond_series,
+                near,
+                |square| square,
+            )
         };
     }
     Bond {
         reference: xi,
         length,
         inverse,
-        growth,
+        relative_square_extension,
         stretch,
-        shortening,
-        moved: eta,
-        along: deformed,
-        marked,
+        extension_over_deformed,
+        eta,
+        deformed,
+        beyond_series,
     }
 }
 
@@ -201,7 +209,8 @@ impl<const D: usize> Bond<D> {
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);
-            self.stretch = self.growth / (one + (one + self.growth).sqrt());
+            self.stretch = self.relative_square_extension
+                / (one + (one + self.relative_square_extension).sqrt());
         }
         self
     }
@@ -215,22 +224,23 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// `near`; in marked lanes beyond the series x over the sum of √(1 + x) and `other`, which may be of 1 + x.
-/// Numbers go in pairs, with what rounding has taken.
+/// `near`; in lanes beyond the series x over the sum of √(1 + x) and `other`, which may be of 1 + x.
+/// LaneTuple go in pairs, with what rounding has taken.
 #[inline(always)]
 fn with_far<S: Simd>(
     simd: S,
-    growth: Lanes,
-    marked: u8,
+    relative_square_extension: Lanes,
+    beyond_series: u8,
     near: Lanes,
     other: impl Fn((Lanes, Lanes)) -> (Lanes, Lanes),
 ) -> Lanes {
-    if marked == 0 {
+    if beyond_series == 0 {
         return simd.whole(near);
     }
     simd.whole(simd.aside(move || {
-        let far = marked & !simd.at_least(Lanes::splat(NEAR), growth.abs());
-        let (square, lost) = sum_with_rest(Lanes::splat(1.0), growth);
+        let far =
+            beyond_series & !simd.at_least(Lanes::splat(NEAR), relative_square_extension.abs());
+        let (square, lost) = sum_with_rest(Lanes::splat(1.0), relative_square_extension);
         let root = square.sqrt();
         let rest = simd.multiply_add(root * -1.0, root, square) + lost;
         // Where ends meet there is no root to correct.
@@ -238,7 +248,7 @@ fn with_far<S: Simd>(
         let (other, other_lost) = other((square, lost));
         let (divisor, sum_lost) = sum_with_rest(other, root);
         let divisor = divisor + (sum_lost + (other_lost + root_lost));
-        simd.select(growth / divisor, far, near)
+        simd.select(relative_square_extension / divisor, far, near)
     }))
 }
 
@@ -258,8 +268,8 @@ pub fn growth_of(stretch: f64) -> f64 {
 }
 
 /// The stretch √(1 + x) − 1.
-pub fn stretch_of(growth: f64) -> f64 {
-    growth / (1.0 + (1.0 + growth).sqrt())
+pub fn stretch_of(relative_square_extension: f64) -> f64 {
+    relative_square_extension / (1.0 + (1.0 + relative_square_extension).sqrt())
 }
 
 #[cfg(test)]
@@ -270,17 +280,17 @@ mod tests {
     const ALL: Wanted = Wanted {
         linear: false,
         stretch: true,
-        shortening: true,
+        extension_over_deformed: true,
     };
 
     /// With ξ along x, |ξ| = 1 and γ = x exactly.
-    fn of_growth(simd: impl Simd, growth: [f64; 8]) -> Bond<1> {
+    fn of_growth(simd: impl Simd, relative_square_extension: [f64; 8]) -> Bond<1> {
         let one = Lanes::splat(1.0);
         let reference = Reference {
-            along: [Lanes::splat(0.0)],
+            xi: [Lanes::splat(0.0)],
             length: one,
             inverse: one,
-            inverse_square: Lanes(growth),
+            inverse_square: Lanes(relative_square_extension),
         };
         // γ = η (0 + η) = 1, and 1/|ξ|² stands for x.
         deform::<_, false, 1>(simd, &reference, [one], u8::MAX, NEAR, ALL)
@@ -289,7 +299,7 @@ mod tests {
     fn bond(xi: [f64; 2], eta: [f64; 2]) -> Bond<2> {
         let square = xi[0] * xi[0] + xi[1] * xi[1];
         let reference = Reference {
-            along: xi.map(Lanes::splat),
+            xi: xi.map(Lanes::splat),
             length: Lanes::splat(square.sqrt()),
             inverse: Lanes::splat(1.0 / square.sqrt()),
             inverse_square: Lanes::splat(1.0 / square),
@@ -309,11 +319,12 @@ mod tests {
         for s in [1e-14, -1e-9, 1e-5, 1e-3, -0.3, 0.5, 10.0_f64] {
             let xi = [0.3, 0.4];
             let bond = bond(xi, xi.map(|x| s * x));
-            let [stretch, shortening] = [bond.stretch, bond.shortening].map(|lanes| lanes.0[0]);
+            let [stretch, extension_over_deformed] =
+                [bond.stretch, bond.extension_over_deformed].map(|lanes| lanes.0[0]);
             assert!((stretch / s - 1.0).abs() < 4e-15, "{s} {stretch}");
             assert!(
-                (shortening * (1.0 + s) / s - 1.0).abs() < 4e-15,
-                "{s} {shortening}"
+                (extension_over_deformed * (1.0 + s) / s - 1.0).abs() < 4e-15,
+                "{s} {extension_over_deformed}"
             );
         }
     }
@@ -322,7 +333,10 @@ mod tests {
     fn both_ends_see_the_same_bits() {
         let (xi, eta) = ([0.123, -0.456], [0.001, 0.0234]);
         let opposite = bond(xi.map(|x| -x), eta.map(|x| -x));
-        assert_eq!(bond(xi, eta).growth, opposite.growth);
+        assert_eq!(
+            bond(xi, eta).relative_square_extension,
+            opposite.relative_square_extension
+        );
         assert_eq!(bond(xi, eta).stretch, opposite.stretch);
     }
 
@@ -376,15 +390,18 @@ mod tests {
 
     fn check_ten_million(simd: impl Simd) {
         let mut worst = [0.0_f64; 2];
-        let mut check = |growth: [f64; 8]| {
-            let bond = of_growth(simd, growth);
-            for (k, x) in growth.into_iter().enumerate() {
+        let mut check = |relative_square_extension: [f64; 8]| {
+            let bond = of_growth(simd, relative_square_extension);
+            for (k, x) in relative_square_extension.into_iter().enumerate() {
                 let square = Double::sum(1.0, x);
                 let root = square.root();
                 let stretch = Double(1.0, 0.0).plus(root).under(x);
-                let shortening = square.plus(root).under(x);
+                let extension_over_deformed = square.plus(root).under(x);
                 worst[0] = worst[0].max(error(bond.stretch.0[k], stretch));
-                worst[1] = worst[1].max(error(bond.shortening.0[k], shortening));
+                worst[1] = worst[1].max(error(
+                    bond.extension_over_deformed.0[k],
+                    extension_over_deformed,
+                ));
             }
         };
         let tiny = f64::MIN_POSITIVE;
@@ -421,7 +438,7 @@ mod tests {
         ]);
         let zero = of_growth(simd, [0.0; 8]);
         assert_eq!(
-            (zero.stretch, zero.shortening),
+            (zero.stretch, zero.extension_over_deformed),
             (Lanes::splat(0.0), Lanes::splat(0.0))
         );
         // Ten million numbers: over all sizes, near the border, and where bodies strain.

@@ -10,7 +10,7 @@ use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Pmb,
 };
-use crate::lanes::{Lanes, Simd, Versions};
+use crate::lanes::{IsaSet, Lanes, Simd};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,15 +75,21 @@ impl Described for ElasticPlasticPmb {
 impl<const D: usize> Law<D> for ElasticPlasticPmb {
     type Point = [Lanes; 0];
     /// s_p, and the sum of all its changes, counted positive.
-    type Memory = [Lanes; 2];
-    type WholeSum = [Lanes; 0];
+    type BondHistory = [Lanes; 2];
+    type ReferenceSum = [Lanes; 0];
     type Sum = [Lanes; 0];
     type Force = Along;
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]
-    fn memory(&self, bond: &Bond<D>, _: &[Lanes; 0], before: &[Lanes; 2], _: f64) -> [Lanes; 2] {
+    fn bond_history(
+        &self,
+        bond: &Bond<D>,
+        _: &[Lanes; 0],
+        before: &[Lanes; 2],
+        _: f64,
+    ) -> [Lanes; 2] {
         let [plastic, path] = *before;
         let limit = Lanes::splat(self.yield_stretch);
         // s_p stays where s − s_y ≤ s_p ≤ s + s_y, else it takes the nearer of the two.
@@ -94,7 +100,8 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], [plastic, _]: &[Lanes; 2]) -> Along {
         // s/|Y| = P/|ξ| and 1/|Y| = (1 − P)/|ξ|.
-        let elastic = bond.shortening - *plastic * (Lanes::splat(1.0) - bond.shortening);
+        let elastic = bond.extension_over_deformed
+            - *plastic * (Lanes::splat(1.0) - bond.extension_over_deformed);
         Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))
     }
 
@@ -109,9 +116,9 @@ impl<const D: usize> Law<D> for ElasticPlasticPmb {
     ) -> Along {
         let half = |end: usize| Lanes::splat(0.5 * laws[end].elastic.micromodulus);
         let (a, b) = (half(0), half(1));
-        let elastic = bond.shortening * (bond.inverse * weights.sum(a, b));
+        let elastic = bond.extension_over_deformed * (bond.inverse * weights.sum(a, b));
         let plastic = bond.inverse * weights.sum(a * here[0], b * there[0]);
-        Along(elastic - (Lanes::splat(1.0) - bond.shortening) * plastic)
+        Along(elastic - (Lanes::splat(1.0) - bond.extension_over_deformed) * plastic)
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 //! bond.
 
 use super::{Bond, rotation};
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{LaneTuple, Lanes, Simd};
 
 /// The force state of one end of eight bonds.
 pub trait ForceState<const D: usize>: Copy {
@@ -50,29 +50,29 @@ impl<const D: usize> ForceState<D> for Along {
     fn add<S: Simd>(self, simd: S, bond: &Bond<D>, volume: Lanes, bits: u8, sums: &mut [Lanes; D]) {
         let strength = simd.keep(self.0 * volume, bits);
         for d in 0..D {
-            sums[d] = simd.multiply_add(strength, bond.along[d], sums[d]);
+            sums[d] = simd.multiply_add(strength, bond.deformed[d], sums[d]);
         }
     }
 
     #[inline(always)]
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes {
-        self.0 * bond.along[a] * bond.along[b]
+        self.0 * bond.deformed[a] * bond.deformed[b]
     }
 
     /// ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
     #[inline(always)]
     fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 3]) -> Lanes {
         let share = if linear {
-            bond.growth
+            bond.relative_square_extension
         } else {
-            bond.shortening * (Lanes::splat(1.0) + bond.growth)
+            bond.extension_over_deformed * (Lanes::splat(1.0) + bond.relative_square_extension)
         };
         self.0 * (bond.length * bond.length * share) * 0.5
     }
 
     #[inline(always)]
     fn vector(self, bond: &Bond<D>) -> [Lanes; D] {
-        Numbers::each(|d| self.0 * bond.along[d])
+        LaneTuple::each(|d| self.0 * bond.deformed[d])
     }
 }
 
@@ -82,12 +82,12 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
 
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
-        Numbers::each(|d| self[d] * factor)
+        LaneTuple::each(|d| self[d] * factor)
     }
 
     #[inline(always)]
     fn plus(self, other: Self) -> Self {
-        Numbers::each(|d| self[d] + other[d])
+        LaneTuple::each(|d| self[d] + other[d])
     }
 
     #[inline(always)]
@@ -99,15 +99,15 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
 
     #[inline(always)]
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes {
-        (self[a] * bond.along[b] + self[b] * bond.along[a]) * 0.5
+        (self[a] * bond.deformed[b] + self[b] * bond.deformed[a]) * 0.5
     }
 
     #[inline(always)]
     fn work<S: Simd>(self, simd: S, bond: &Bond<D>, _: bool, rotation: &[Lanes; 3]) -> Lanes {
         let turned = rotation::displacement(&bond.reference, rotation);
-        let mut sum = self[0] * (bond.moved[0] - turned[0]);
+        let mut sum = self[0] * (bond.eta[0] - turned[0]);
         for d in 1..D {
-            sum = simd.multiply_add(self[d], bond.moved[d] - turned[d], sum);
+            sum = simd.multiply_add(self[d], bond.eta[d] - turned[d], sum);
         }
         sum * 0.5
     }

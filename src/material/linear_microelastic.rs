@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::pmb::SURFACE_CORRECTION;
 use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
-use crate::lanes::{Lanes, Versions};
+use crate::lanes::{IsaSet, Lanes};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,18 +66,18 @@ impl Described for LinearMicroelastic {
 impl<const D: usize> Law<D> for LinearMicroelastic {
     /// What the micromodulus is multiplied by.
     type Point = [Lanes; 1];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     /// Σ |ξ| Ṽ, m⁴.
-    type WholeSum = [Lanes; 1];
+    type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 0];
     type Force = Along;
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const FORCE_READS_STRETCH: bool = true;
     const LINEAR: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; 1] {
         let length = bond.length;
         [length]
     }

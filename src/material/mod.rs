@@ -51,7 +51,7 @@ registration::register! {
 
 use nalgebra::SMatrix;
 
-use crate::lanes::{Lanes, Numbers, Simd, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use bond::Weights;
 
 /// What can be told of a law without bonds.
@@ -65,24 +65,24 @@ pub trait Described {
 /// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
 /// run over bonds in these steps:
 ///
-/// 1. once, over the family without the bonds that pre-cracks cut (see [`Self::needs_shape`]): [`Self::whole_share`] → sums → [`Self::constants`], and [`Self::overload`] where a
+/// 1. once, over the family without the bonds that pre-cracks cut (see [`Self::needs_shape`]): [`Self::reference_contribution`] → sums → [`Self::constants`], and [`Self::truncation_factor`] where a
 ///    criterion reads it;
 /// 2. before each sum of forces, over the intact bonds, [`Self::PASSES`] times:
-///    [`Self::share`] → sums → [`Self::point`]; then the numbers are sent to the ghosts;
-/// 3. [`Self::memory`] and [`Self::force`] of both ends.
+///    [`Self::pass_contribution`] → sums → [`Self::update_point`]; then the numbers are sent to the ghosts;
+/// 3. [`Self::bond_history`] and [`Self::force`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
     /// The numbers of a point that bonds read at both ends: first the constants, then those that are
     /// found anew before each sum of forces.
-    type Point: Numbers;
+    type Point: LaneTuple;
 
     /// The numbers that a bond keeps for each of its ends; 0 at the start.
-    type Memory: Numbers;
+    type BondHistory: LaneTuple;
 
     /// What is summed over the whole family, once.
-    type WholeSum: Numbers;
+    type ReferenceSum: LaneTuple;
 
     /// What a pass sums over the intact bonds; passes that sum less leave the rest at 0.
-    type Sum: Numbers;
+    type Sum: LaneTuple;
 
     /// The force state's form.
     type Force: ForceState<D>;
@@ -93,10 +93,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// How many sums over the bonds come before that of the forces.
     const PASSES: usize = 0;
 
-    /// Numbers of a point that only its own law reads, after those of [`Self::Point`].
+    /// LaneTuple of a point that only its own law reads, after those of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
-    /// Whether [`Self::force`] or [`Self::memory`] read the stretch of bonds.
+    /// Whether [`Self::force`] or [`Self::bond_history`] read the stretch of bonds.
     const FORCE_READS_STRETCH: bool = false;
 
     /// Whether [`Self::force`] reads the shortening of bonds.
@@ -105,10 +105,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// How many dimensions there must be for bodies of the law.
     const LEAST_DIMENSION: usize = 1;
 
-    /// Whether [`Self::share`] reads the stretch of bonds.
+    /// Whether [`Self::pass_contribution`] reads the stretch of bonds.
     const SUM_READS_STRETCH: bool = true;
 
-    /// Whether [`Self::share`] reads the direction or the length of bonds, which those that only fill up a group
+    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds, which those that only fill up a group
     /// do not have.
     const SUM_READS_DIRECTION: bool = false;
 
@@ -116,7 +116,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     const LINEAR: bool = false;
 
     /// For which vector instructions the loops of its forces, sums and energies are compiled.
-    const VERSIONS: Versions = Versions::Each;
+    const ISA_SET: IsaSet = IsaSet::Each;
 
     /// Whether [`Self::toughness_scale`] is not 1.
     const SCALED: bool = false;
@@ -126,8 +126,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// What a bond of the undeformed body adds to the sums over the whole family.
     #[inline(always)]
-    fn whole_share(&self, _bond: &Bond<D>) -> Self::WholeSum {
-        Self::WholeSum::splat(0.0)
+    fn reference_contribution(&self, _bond: &Bond<D>) -> Self::ReferenceSum {
+        Self::ReferenceSum::splat(0.0)
     }
 
     /// The constants of a point from the sums over its whole family.
@@ -136,18 +136,18 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// What an intact bond adds to the sums of pass `S`, which may use the numbers found by the
     /// passes before.
     #[inline(always)]
-    fn share<const S: usize>(
+    fn pass_contribution<const S: usize>(
         &self,
         _bond: &Bond<D>,
         _own: &Self::Point,
-        _memory: &Self::Memory,
+        _memory: &Self::BondHistory,
     ) -> Self::Sum {
         Self::Sum::splat(0.0)
     }
 
     /// The numbers of a point from the sums of a pass: those of [`Self::Point`], then its own ones. What
     /// flow adds to the plastic state is kept in a step alone.
-    fn point(
+    fn update_point(
         &self,
         _stage: usize,
         _sums: &[f64],
@@ -157,7 +157,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// Whether points keep a [`PlasticState`].
-    fn flows(&self) -> bool {
+    fn has_plasticity(&self) -> bool {
         false
     }
 
@@ -168,18 +168,18 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// What a bond keeps for an end when it has come to this deformation in a step (s).
     #[inline(always)]
-    fn memory(
+    fn bond_history(
         &self,
         _bond: &Bond<D>,
         _end: &Self::Point,
-        before: &Self::Memory,
+        before: &Self::BondHistory,
         _step: f64,
-    ) -> Self::Memory {
+    ) -> Self::BondHistory {
         *before
     }
 
     /// The force state T of one end, N/m⁶; along the bond T/|Y|, or T/|ξ| for linear laws, N/m⁷.
-    fn force(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Self::Force;
+    fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
     /// The force density of bonds by volume, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of the ends; the same
     /// to the bit from both ends, up to its sign. Laws may find it in fewer operations.
@@ -189,15 +189,15 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         laws: &[Self; 2],
         bond: &Bond<D>,
         points: [&Self::Point; 2],
-        memory: &[Self::Memory; 2],
+        history: &[Self::BondHistory; 2],
         weights: Weights,
     ) -> Self::Force {
-        let pull = laws[0].force(bond, points[0], &memory[0]);
-        let push = laws[1].force(bond, points[1], &memory[1]);
+        let force_state_i = laws[0].force(bond, points[0], &history[0]);
+        let force_state_j = laws[1].force(bond, points[1], &history[1]);
         match weights {
-            Weights::One => pull.plus(push),
-            Weights::Same(weight) => pull.plus(push).times(weight),
-            Weights::Each([own, far]) => pull.times(own).plus(push.times(far)),
+            Weights::One => force_state_i.plus(force_state_j),
+            Weights::Same(weight) => force_state_i.plus(force_state_j).times(weight),
+            Weights::Each([own, far]) => force_state_i.times(own).plus(force_state_j.times(far)),
         }
     }
 
@@ -208,10 +208,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         simd: S,
         bond: &Bond<D>,
         end: &Self::Point,
-        memory: &Self::Memory,
+        history: &Self::BondHistory,
         rotation: &[Lanes; 3],
     ) -> Lanes {
-        let force = self.force(bond, end, memory);
+        let force = self.force(bond, end, history);
         force.work(simd, bond, Self::LINEAR, rotation)
     }
 
@@ -221,7 +221,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// What a bond adds to the strain energy density of one end, J/m⁶.
-    fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, memory: &Self::Memory) -> Lanes;
+    fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Lanes;
 
     /// The part of a point's strain energy density (J/m³) that belongs to no single bond.
     fn point_energy(&self, _numbers: &[f64]) -> f64 {
@@ -271,7 +271,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// What a bond, broken or not, has dissipated at one end without breaking, J/m⁶.
     #[inline(always)]
-    fn dissipated(&self, _length: Lanes, _memory: &Self::Memory) -> Lanes {
+    fn dissipated(&self, _length: Lanes, _memory: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
@@ -286,9 +286,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     }
 
     /// How many times as much the bonds of a point hold as those of a point inside, at the same strain, from the sums
-    /// of [`Self::whole_share`]: where a family is not whole, fewer bonds hold the energy of the point. 1 if bonds hold
+    /// of [`Self::reference_contribution`]: where a family is not whole, fewer bonds hold the energy of the point. 1 if bonds hold
     /// the same everywhere.
-    fn overload(&self, _sums: &[f64]) -> f64 {
+    fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }
 

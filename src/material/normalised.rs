@@ -79,7 +79,7 @@ fn as_printed(given: &Given) -> bool {
 fn printed_micromodulus(given: &Given) -> f64 {
     let volume = match given.dimension {
         Dimension::Space => 4.0 / 3.0 * PI * given.horizon.powi(3),
-        _ => PI * given.horizon.powi(2) * given.dimension.section(),
+        _ => PI * given.horizon.powi(2) * given.dimension.out_of_plane_measure(),
     };
     9.0 * given.elastic.bulk_modulus() / (volume * given.horizon)
 }
@@ -93,7 +93,9 @@ fn critical_stretch(given: &Given, energy: f64) -> f64 {
     let c = printed_micromodulus(given) * horizon;
     match given.dimension {
         Dimension::Space => (8.0 * energy / (PI * c * horizon.powi(4))).sqrt(),
-        dimension => (1.5 * energy / (c * dimension.section() * horizon.powi(3))).sqrt(),
+        dimension => {
+            (1.5 * energy / (c * dimension.out_of_plane_measure() * horizon.powi(3))).sqrt()
+        }
     }
 }
 
@@ -118,16 +120,16 @@ impl Described for Normalised {
 impl<const D: usize> Law<D> for Normalised {
     /// 1 / Σ |ξ| Ṽ, 1/m⁴.
     type Point = [Lanes; 1];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     /// Σ |ξ| Ṽ, m⁴.
-    type WholeSum = [Lanes; 1];
+    type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 0];
     type Force = Along;
     const CONSTANTS: usize = 1;
     const SCALED: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; 1] {
         [bond.length]
     }
 
@@ -137,7 +139,7 @@ impl<const D: usize> Law<D> for Normalised {
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, [inverse]: &[Lanes; 1], _: &[Lanes; 0]) -> Along {
-        Along(bond.shortening * *inverse * (bond.inverse * (2.0 * self.energy)))
+        Along(bond.extension_over_deformed * *inverse * (bond.inverse * (2.0 * self.energy)))
     }
 
     #[inline(always)]

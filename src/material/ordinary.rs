@@ -65,8 +65,8 @@ impl Ordinary {
 
     /// d κ θ/m (N/m⁷) and θ from A/m and Σ ω|ξ|εṼ.
     #[inline(always)]
-    pub(super) fn dilated(&self, pull: f64, sum: f64) -> [f64; 2] {
-        let share = self.dimension * pull / self.extensional;
+    pub(super) fn dilated(&self, extension_factor: f64, sum: f64) -> [f64; 2] {
+        let share = self.dimension * extension_factor / self.extensional;
         let dilatation = share * sum;
         [share * self.volumetric * dilatation, dilatation]
     }
@@ -97,8 +97,8 @@ impl Ordinary {
     }
 
     /// m (m⁵) from A/m; `None` where there are no bonds.
-    pub(super) fn weighted_volume_of(&self, pull: f64) -> Option<f64> {
-        (pull > 0.0).then(|| self.extensional / pull)
+    pub(super) fn weighted_volume_of(&self, extension_factor: f64) -> Option<f64> {
+        (extension_factor > 0.0).then(|| self.extensional / extension_factor)
     }
 
     /// What a bond holds over what it would if the family were whole, from m.
@@ -185,12 +185,15 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
 #[inline(always)]
 pub(super) fn eased_force<const D: usize>(
     bond: &Bond<D>,
-    pull: Lanes,
-    push: Lanes,
+    extension_factor: Lanes,
+    volume_factor: Lanes,
     taken: Lanes,
 ) -> Along {
-    let eased = taken * (Lanes::splat(1.0) - bond.shortening);
-    Along(push + bond.shortening * (pull - push) - pull * eased)
+    let eased = taken * (Lanes::splat(1.0) - bond.extension_over_deformed);
+    Along(
+        volume_factor + bond.extension_over_deformed * (extension_factor - volume_factor)
+            - extension_factor * eased,
+    )
 }
 
 impl Described for Ordinary {
@@ -202,9 +205,9 @@ impl Described for Ordinary {
 impl<const D: usize> Law<D> for Ordinary {
     /// A/m and d κ θ/m, N/m⁷.
     type Point = [Lanes; 2];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     /// m = Σ ω|ξ|²Ṽ, m⁵.
-    type WholeSum = [Lanes; 1];
+    type ReferenceSum = [Lanes; 1];
     /// Σ ω|ξ|εṼ over the intact bonds, m⁵.
     type Sum = [Lanes; 1];
     type Force = Along;
@@ -215,7 +218,7 @@ impl<const D: usize> Law<D> for Ordinary {
     const OWN_NUMBERS: usize = 1;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; 1] {
         [bond.length * bond.length]
     }
 
@@ -228,21 +231,31 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     #[inline(always)]
-    fn share<const S: usize>(&self, bond: &Bond<D>, _: &[Lanes; 2], _: &[Lanes; 0]) -> [Lanes; 1] {
+    fn pass_contribution<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        _: &[Lanes; 2],
+        _: &[Lanes; 0],
+    ) -> [Lanes; 1] {
         [bond.length * bond.length * bond.stretch]
     }
 
     #[inline(always)]
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
-        let [push, dilatation] = self.dilated(numbers[0], sums[0]);
-        numbers[1] = push;
+    fn update_point(&self, _: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+        let [volume_factor, dilatation] = self.dilated(numbers[0], sums[0]);
+        numbers[1] = volume_factor;
         numbers[2] = dilatation;
     }
 
     #[inline(always)]
-    fn force(&self, bond: &Bond<D>, [pull, push]: &[Lanes; 2], _: &[Lanes; 0]) -> Along {
+    fn force(
+        &self,
+        bond: &Bond<D>,
+        [extension_factor, volume_factor]: &[Lanes; 2],
+        _: &[Lanes; 0],
+    ) -> Along {
         // |ξ|/|Y| = 1 − P and |ξ| s/|Y| = P.
-        Along(*push + bond.shortening * (*pull - *push))
+        Along(*volume_factor + bond.extension_over_deformed * (*extension_factor - *volume_factor))
     }
 
     #[inline(always)]
@@ -254,15 +267,24 @@ impl<const D: usize> Law<D> for Ordinary {
         _: &[[Lanes; 0]; 2],
         weights: Weights,
     ) -> Along {
-        let pull = weights.sum(here[0], there[0]);
-        let push = weights.sum(here[1], there[1]);
-        Along(simd.multiply_add(bond.shortening, pull - push, push))
+        let extension_factor = weights.sum(here[0], there[0]);
+        let volume_factor = weights.sum(here[1], there[1]);
+        Along(simd.multiply_add(
+            bond.extension_over_deformed,
+            extension_factor - volume_factor,
+            volume_factor,
+        ))
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond<D>, [pull, _]: &[Lanes; 2], _: &[Lanes; 0]) -> Lanes {
+    fn bond_energy(
+        &self,
+        bond: &Bond<D>,
+        [extension_factor, _]: &[Lanes; 2],
+        _: &[Lanes; 0],
+    ) -> Lanes {
         let extension = bond.length * bond.stretch;
-        extension * extension * *pull * 0.5
+        extension * extension * *extension_factor * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -273,14 +295,14 @@ impl<const D: usize> Law<D> for Ordinary {
         self.weighted_volume_of(numbers[0])
     }
 
-    fn overload(&self, sums: &[f64]) -> f64 {
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
         self.overload_of(sums[0])
     }
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.
     #[inline(always)]
-    fn stiffness(&self, _: Lanes, [pull, _]: &[Lanes; 2]) -> Lanes {
+    fn stiffness(&self, _: Lanes, [extension_factor, _]: &[Lanes; 2]) -> Lanes {
         let square = self.dimension * self.dimension;
-        *pull * (1.0 + square * self.volumetric.max(0.0) / self.extensional)
+        *extension_factor * (1.0 + square * self.volumetric.max(0.0) / self.extensional)
     }
 }

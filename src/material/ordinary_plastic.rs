@@ -24,7 +24,7 @@ use super::{
     Law, PlasticState, Word,
 };
 use crate::dimension::Dimension;
-use crate::lanes::{Lanes, Versions};
+use crate::lanes::{IsaSet, Lanes};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,11 +101,11 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     /// A/m and d κ θ/m (N/m⁷), the mean elastic stretch Σ ω|ξ| (ε − e_p) Ṽ/Σ ω|ξ|² Ṽ, and 1 − r.
     type Point = [Lanes; 4];
     /// e_p/|ξ|, and the energy that is dissipated, J/m⁶.
-    type Memory = [Lanes; 2];
-    type WholeSum = [Lanes; 1];
+    type BondHistory = [Lanes; 2];
+    type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 2];
     type Force = Along;
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 3;
     /// θ.
@@ -114,8 +114,8 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
-        self.elastic.whole_share(bond)
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        self.elastic.reference_contribution(bond)
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
@@ -124,7 +124,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
 
     /// Σ ω|ξ| (ε − e_p) Ṽ and Σ ω|ξ|² Ṽ; then Σ ω ε_d² Ṽ; then the first again, after the flow; all m⁵.
     #[inline(always)]
-    fn share<const S: usize>(
+    fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
         [_, _, mean, _]: &[Lanes; 4],
@@ -141,17 +141,19 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     #[inline(always)]
-    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
-        let pull = numbers[0];
+    fn update_point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+        let extension_factor = numbers[0];
         match pass {
             0 => {
                 let [sum, square] = [sums[0], sums[1]];
                 numbers[2] = if square > 0.0 { sum / square } else { 0.0 };
             }
             1 => {
-                let mass = self.whole.unwrap_or(self.elastic.extensional() / pull);
+                let mass = self
+                    .whole
+                    .unwrap_or(self.elastic.extensional() / extension_factor);
                 let limit = 2.0 * self.strength / mass;
-                let square = pull * pull * sums[0];
+                let square = extension_factor * extension_factor * sums[0];
                 // A point without bonds has no m, and nothing that could yield.
                 numbers[3] = if square > limit {
                     1.0 - (limit / square).sqrt()
@@ -160,8 +162,8 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
                 };
             }
             _ => {
-                let [push, dilatation] = self.elastic.dilated(pull, sums[0]);
-                numbers[1] = push;
+                let [volume_factor, dilatation] = self.elastic.dilated(extension_factor, sums[0]);
+                numbers[1] = volume_factor;
                 numbers[4] = dilatation;
             }
         }
@@ -172,16 +174,16 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     #[inline(always)]
-    fn memory(
+    fn bond_history(
         &self,
         bond: &Bond<D>,
-        [pull, _, mean, shrunk]: &[Lanes; 4],
+        [extension_factor, _, mean, shrunk]: &[Lanes; 4],
         [plastic, loss]: &[Lanes; 2],
         _: f64,
     ) -> [Lanes; 2] {
         let trial = bond.stretch - *mean - *plastic;
         let change = trial * *shrunk;
-        let taken = *pull * (bond.length * bond.length) * (trial - change) * change;
+        let taken = *extension_factor * (bond.length * bond.length) * (trial - change) * change;
         [*plastic + change, *loss + taken]
     }
 
@@ -189,21 +191,21 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     fn force(
         &self,
         bond: &Bond<D>,
-        [pull, push, ..]: &[Lanes; 4],
+        [extension_factor, volume_factor, ..]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
     ) -> Along {
-        eased_force(bond, *pull, *push, *plastic)
+        eased_force(bond, *extension_factor, *volume_factor, *plastic)
     }
 
     #[inline(always)]
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        [pull, ..]: &[Lanes; 4],
+        [extension_factor, ..]: &[Lanes; 4],
         [plastic, _]: &[Lanes; 2],
     ) -> Lanes {
         let elastic = bond.length * (bond.stretch - *plastic);
-        elastic * elastic * *pull * 0.5
+        elastic * elastic * *extension_factor * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -219,12 +221,16 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
         self.elastic.weighted_volume_of(numbers[0])
     }
 
-    fn overload(&self, sums: &[f64]) -> f64 {
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
         self.elastic.overload_of(sums[0])
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, [pull, push, ..]: &[Lanes; 4]) -> Lanes {
-        Law::<D>::stiffness(&self.elastic, length, &[*pull, *push])
+    fn stiffness(
+        &self,
+        length: Lanes,
+        [extension_factor, volume_factor, ..]: &[Lanes; 4],
+    ) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, length, &[*extension_factor, *volume_factor])
     }
 }

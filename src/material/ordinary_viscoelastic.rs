@@ -17,7 +17,7 @@ use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
     PlasticState,
 };
-use crate::lanes::{Lanes, Versions};
+use crate::lanes::{IsaSet, Lanes};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,11 +108,11 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     /// A/m and the part of the force per |ξ| that all bonds have (N/m⁷), and θ/d.
     type Point = [Lanes; 3];
     /// e_b/|ξ|, ε_d/|ξ|, and the energy that is dissipated, J/m⁶.
-    type Memory = [Lanes; 3];
-    type WholeSum = [Lanes; 1];
+    type BondHistory = [Lanes; 3];
+    type ReferenceSum = [Lanes; 1];
     type Sum = [Lanes; 1];
     type Force = Along;
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const CONSTANTS: usize = 1;
     const PASSES: usize = 2;
     /// θ.
@@ -121,8 +121,8 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     const FORCE_READS_STRETCH: bool = true;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> [Lanes; 1] {
-        self.elastic.whole_share(bond)
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; 1] {
+        self.elastic.reference_contribution(bond)
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
@@ -131,7 +131,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
 
     /// Σ ω|ξ|εṼ, then Σ ω|ξ| e_b Ṽ, m⁵.
     #[inline(always)]
-    fn share<const S: usize>(
+    fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
         _: &[Lanes; 3],
@@ -142,15 +142,16 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     }
 
     #[inline(always)]
-    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         if pass == 1 {
-            let pull = numbers[0];
-            let push = pull * pull / self.elastic.extensional() * sums[0];
-            numbers[1] += self.relaxing_share * push;
+            let extension_factor = numbers[0];
+            let volume_factor =
+                extension_factor * extension_factor / self.elastic.extensional() * sums[0];
+            numbers[1] += self.relaxing_share * volume_factor;
             return;
         }
-        let [push, dilatation] = self.elastic.dilated(numbers[0], sums[0]);
-        numbers[1] = push;
+        let [volume_factor, dilatation] = self.elastic.dilated(numbers[0], sums[0]);
+        numbers[1] = volume_factor;
         numbers[2] = dilatation / D as f64;
         numbers[3] = dilatation;
     }
@@ -160,10 +161,10 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     }
 
     #[inline(always)]
-    fn memory(
+    fn bond_history(
         &self,
         bond: &Bond<D>,
-        [pull, _, even]: &[Lanes; 3],
+        [extension_factor, _, even]: &[Lanes; 3],
         [back, before, loss]: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
@@ -173,7 +174,7 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         let now = *back + change;
         // What the dashpot takes, with its force in the middle of the step.
         let force = (*before - *back + deviatoric - now) * (0.5 * self.relaxing_share);
-        let taken = *pull * (bond.length * bond.length) * force * change;
+        let taken = *extension_factor * (bond.length * bond.length) * force * change;
         [now, deviatoric, *loss + taken]
     }
 
@@ -181,23 +182,28 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
     fn force(
         &self,
         bond: &Bond<D>,
-        [pull, push, _]: &[Lanes; 3],
+        [extension_factor, volume_factor, _]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Along {
-        eased_force(bond, *pull, *push, *back * self.relaxing_share)
+        eased_force(
+            bond,
+            *extension_factor,
+            *volume_factor,
+            *back * self.relaxing_share,
+        )
     }
 
     #[inline(always)]
     fn bond_energy(
         &self,
         bond: &Bond<D>,
-        [pull, _, even]: &[Lanes; 3],
+        [extension_factor, _, even]: &[Lanes; 3],
         [back, ..]: &[Lanes; 3],
     ) -> Lanes {
         let deviatoric = bond.stretch - *even;
         let eased = (*back - deviatoric * 2.0) * *back * self.relaxing_share;
         let square = bond.stretch * bond.stretch + eased;
-        square * (bond.length * bond.length) * *pull * 0.5
+        square * (bond.length * bond.length) * *extension_factor * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -213,12 +219,12 @@ impl<const D: usize> Law<D> for OrdinaryViscoelastic {
         self.elastic.weighted_volume_of(numbers[0])
     }
 
-    fn overload(&self, sums: &[f64]) -> f64 {
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
         self.elastic.overload_of(sums[0])
     }
 
     #[inline(always)]
-    fn stiffness(&self, length: Lanes, [pull, push, _]: &[Lanes; 3]) -> Lanes {
-        Law::<D>::stiffness(&self.elastic, length, &[*pull, *push])
+    fn stiffness(&self, length: Lanes, [extension_factor, volume_factor, _]: &[Lanes; 3]) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, length, &[*extension_factor, *volume_factor])
     }
 }

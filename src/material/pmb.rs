@@ -106,14 +106,14 @@ impl Described for Pmb {
 
 impl<const D: usize> Law<D> for Pmb {
     type Point = [Lanes; 0];
-    type Memory = [Lanes; 0];
-    type WholeSum = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
+    type ReferenceSum = [Lanes; 0];
     type Sum = [Lanes; 0];
     type Force = Along;
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], _: &[Lanes; 0]) -> Along {
-        Along(bond.shortening * (bond.inverse * (0.5 * self.micromodulus)))
+        Along(bond.extension_over_deformed * (bond.inverse * (0.5 * self.micromodulus)))
     }
 
     #[inline(always)]
@@ -126,7 +126,7 @@ impl<const D: usize> Law<D> for Pmb {
         weights: Weights,
     ) -> Along {
         let half = |end: usize| Lanes::splat(0.5 * laws[end].micromodulus);
-        Along(bond.shortening * (bond.inverse * weights.sum(half(0), half(1))))
+        Along(bond.extension_over_deformed * (bond.inverse * weights.sum(half(0), half(1))))
     }
 
     #[inline(always)]

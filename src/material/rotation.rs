@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use crate::lanes::{Lanes, Numbers};
+use crate::lanes::{LaneTuple, Lanes};
 
 /// σ of a rotation, by component; 0 is none.
 pub type Rotation = [f64; 3];
@@ -125,19 +125,19 @@ pub fn displacement<const D: usize>(xi: &[Lanes; D], sigma: &[Lanes; 3]) -> [Lan
                 xi[0]
             }
         };
-        return Numbers::each(|d| sine * across(d) - cosine * xi[d]);
+        return LaneTuple::each(|d| sine * across(d) - cosine * xi[d]);
     }
     let cross = |b: [Lanes; 3]| -> [Lanes; 3] {
-        Numbers::each(|k| {
+        LaneTuple::each(|k| {
             let (m, n) = ((k + 1) % 3, (k + 2) % 3);
             sigma[m] * b[n] - sigma[n] * b[m]
         })
     };
     let square = sigma[0] * sigma[0] + sigma[1] * sigma[1] + sigma[2] * sigma[2];
     let scale = Lanes::splat(4.0) / ((one + square) * (one + square));
-    let once = cross(Numbers::each(|k| xi[k % D]));
+    let once = cross(LaneTuple::each(|k| xi[k % D]));
     let twice = cross(once);
-    Numbers::each(|d| ((one - square) * once[d] + twice[d] * 2.0) * scale)
+    LaneTuple::each(|d| ((one - square) * once[d] + twice[d] * 2.0) * scale)
 }
 
 #[cfg(test)]

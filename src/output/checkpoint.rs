@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::comm::{Communicator, IdOrder, agree};
 use crate::error::{Error, Result};
-use crate::refine::Pick;
+use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::motion::{Saved, SavedBonds};
 
@@ -39,7 +39,7 @@ pub struct Header {
     /// Time step, s.
     pub step: f64,
     /// How the grids are refined, see [`crate::refine::Grids::state`].
-    pub grids: [Vec<Pick>; 2],
+    pub grids: [Vec<NodeKey>; 2],
     /// Number of points over all ranks.
     pub points: u64,
     /// A sum over the points that is the same only for the same points.

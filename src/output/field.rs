@@ -17,7 +17,7 @@ pub struct FieldDescription {
     pub name: &'static str,
     /// Its unit, such as `m/s`; empty if it has none.
     pub unit: &'static str,
-    /// Numbers per point: 1, 2 (a plane vector, stored with a third component 0), 3, 6 (a
+    /// LaneTuple per point: 1, 2 (a plane vector, stored with a third component 0), 3, 6 (a
     /// symmetric tensor: xx, yy, zz, xy, yz, xz) or 9 (a tensor, row-major).
     pub components: usize,
 }

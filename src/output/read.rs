@@ -32,7 +32,7 @@ pub struct StoredField {
     pub name: String,
     /// Its unit; empty if it has none.
     pub unit: String,
-    /// Numbers per point: 1, 3, 6 or 9.
+    /// LaneTuple per point: 1, 3, 6 or 9.
     pub components: usize,
     /// The type of its numbers.
     pub number: Number,

@@ -95,7 +95,7 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Numbers parts so that much stays where it is: `now` has the rank and the number of points of each cell.
+/// LaneTuple parts so that much stays where it is: `now` has the rank and the number of points of each cell.
 fn renumber(part: &mut [metis::Idx], ranks: usize, now: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {

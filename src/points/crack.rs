@@ -4,7 +4,7 @@ use std::array;
 
 use nalgebra::Vector3;
 
-use crate::deck::plan::Crack;
+use crate::problem::Crack;
 
 type Vector = Vector3<f64>;
 

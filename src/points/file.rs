@@ -9,14 +9,15 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use crate::comm::{Communicator, agree, scan};
-use crate::deck::plan::{Plan, PointSource};
 use crate::error::{Error, Result, excerpt};
+use crate::problem::{PointSource, Problem};
 
 use super::Point;
 
 /// The bodies that take rows of a file: their index and the block number they ask for.
-pub fn users(plan: &Plan, file: &Path) -> Vec<(usize, Option<u32>)> {
-    plan.bodies
+pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
+    problem
+        .bodies
         .iter()
         .enumerate()
         .filter_map(|(index, body)| match &body.points {
@@ -59,14 +60,14 @@ struct Share {
 ///
 /// # Errors
 /// When the file cannot be read or a row is wrong; names the file and the line.
-pub(super) fn piece(plan: &Plan, path: &Path, comm: &dyn Communicator) -> Result<Vec<Point>> {
-    let users = users(plan, path);
-    let share = read_share(plan, path, &users, comm.rank(), comm.size()).map_err(|error| {
-        let PointSource::File { span, .. } = &plan.bodies[users[0].0].points else {
+pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Vec<Point>> {
+    let users = users(problem, path);
+    let share = read_share(problem, path, &users, comm.rank(), comm.size()).map_err(|error| {
+        let PointSource::File { span, .. } = &problem.bodies[users[0].0].points else {
             unreachable!("users are bodies with a file");
         };
         let message = format!("cannot read the point file {}: {error}", path.display());
-        plan.source.error(span.clone(), message)
+        problem.source.error(span.clone(), message)
     });
     let share = agree(comm, share)?;
     let (lines_before, _) = scan(comm, share.lines);
@@ -87,11 +88,11 @@ pub(super) fn piece(plan: &Plan, path: &Path, comm: &dyn Communicator) -> Result
 
 /// Points of a file, and the number of points that each of them stands for: 1 unless the file is long, of which evenly
 /// spaced pieces are read. Wrong rows are left out. `None` if the file cannot be read.
-pub fn sample(plan: &Plan, path: &Path) -> Option<(Vec<Point>, f64)> {
-    let users = users(plan, path);
+pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
+    let users = users(problem, path);
     let length = std::fs::metadata(path).ok()?.len();
     if length <= SAMPLED * PIECE {
-        let share = read_share(plan, path, &users, 0, 1).ok()?;
+        let share = read_share(problem, path, &users, 0, 1).ok()?;
         return Some((share.points, 1.0));
     }
     let pieces = length.div_ceil(PIECE);
@@ -99,7 +100,7 @@ pub fn sample(plan: &Plan, path: &Path) -> Option<(Vec<Point>, f64)> {
     for k in 0..SAMPLED {
         let piece = (u128::from(pieces) * u128::from(k) / u128::from(SAMPLED)) as usize;
         points.extend(
-            read_share(plan, path, &users, piece, pieces as usize)
+            read_share(problem, path, &users, piece, pieces as usize)
                 .ok()?
                 .points,
         );
@@ -109,7 +110,7 @@ pub fn sample(plan: &Plan, path: &Path) -> Option<(Vec<Point>, f64)> {
 
 /// Reads the rows that start within this rank's share of the file's bytes.
 fn read_share(
-    plan: &Plan,
+    problem: &Problem,
     path: &Path,
     users: &[(usize, Option<u32>)],
     rank: usize,
@@ -158,7 +159,7 @@ fn read_share(
             share.mistake.get_or_insert((share.lines, message));
             break;
         }
-        share.read_row(plan, users, bytes);
+        share.read_row(problem, users, bytes);
         share.lines += 1;
     }
     Ok(share)
@@ -166,7 +167,7 @@ fn read_share(
 
 impl Share {
     /// Takes the point of the next row, if it has one.
-    fn read_row(&mut self, plan: &Plan, users: &[(usize, Option<u32>)], row: &[u8]) {
+    fn read_row(&mut self, problem: &Problem, users: &[(usize, Option<u32>)], row: &[u8]) {
         let entries = match std::str::from_utf8(row) {
             Ok(row) if row.trim_start().starts_with('#') => return,
             Ok(row) => entries(row),
@@ -178,7 +179,7 @@ impl Share {
         let is_first = !std::mem::replace(&mut self.has_rows, true);
         let names_columns = |entries: &Vec<&str>| !entries.iter().any(|entry| has_number(entry));
         let is_heading = is_first && entries.as_ref().is_ok_and(names_columns);
-        match entries.and_then(|entries| point(plan, users, &entries)) {
+        match entries.and_then(|entries| point(problem, users, &entries)) {
             Ok(point) => self.points.push(point),
             Err(message) if is_heading => self.heading = Some((self.lines, message)),
             Err(message) => {
@@ -211,11 +212,11 @@ fn has_number(entry: &str) -> bool {
 
 /// The point of a row.
 fn point(
-    plan: &Plan,
+    problem: &Problem,
     users: &[(usize, Option<u32>)],
     entries: &[&str],
 ) -> std::result::Result<Point, String> {
-    let dimension = plan.dimension.count();
+    let dimension = problem.dimension.count();
     let names = &["x", "y", "z"][..dimension];
     if entries.len() != dimension + 2 {
         return Err(format!(
@@ -282,7 +283,7 @@ mod tests {
     }
 
     fn read_in(folder: &Path) -> std::result::Result<Vec<f64>, String> {
-        let plan = deck::parse(&Source {
+        let problem = deck::parse(&Source {
             path: folder.join("deck.toml"),
             text: "dimension = 'plane-stress'
                 grid.horizon = 3
@@ -292,10 +293,10 @@ mod tests {
                 "
             .to_owned(),
         });
-        let plan = plan.unwrap_or_else(|error| panic!("{error}"));
+        let problem = problem.unwrap_or_else(|error| panic!("{error}"));
         let on = |ranks: usize| {
             let path = folder.join("points.csv");
-            let pieces = threads::run(ranks, |comm| piece(&plan, &path, comm));
+            let pieces = threads::run(ranks, |comm| piece(&problem, &path, comm));
             let pieces: Result<Vec<Vec<Point>>> = pieces.into_iter().collect();
             let shorten = |error: Error| {
                 let folder = folder.display().to_string();

@@ -2,8 +2,8 @@
 //! rule, ±√3/3 of half the edge by direction (Emmrich & Weckner 2006, §4).
 
 use crate::comm::Communicator;
-use crate::deck::plan::{Body, Plan, PointSource, Quadrature, Shape};
 use crate::error::{Error, Result};
+use crate::problem::{Body, PointSource, Problem, Quadrature, Shape};
 
 use super::region::{Region, TOLERANCE};
 use super::{MOST_A_RANK, Point, distance_squared, shape};
@@ -37,15 +37,15 @@ pub struct LatticeBody<'a> {
     /// All cells that the shape can touch.
     around: Region,
     quadrature: Quadrature,
-    section: f64,
+    out_of_plane_measure: f64,
 }
 
 impl<'a> LatticeBody<'a> {
-    /// A body of a plan, by index; `None` if it has its points from a file.
+    /// A body of a problem, by index; `None` if it has its points from a file.
     ///
     /// # Errors
     /// When its cells are too far away to be numbered.
-    pub fn new(plan: &'a Plan, body: usize) -> Result<Option<Self>> {
+    pub fn new(problem: &'a Problem, body: usize) -> Result<Option<Self>> {
         let lattice = |body: &'a Body| match &body.points {
             PointSource::Lattice {
                 shape,
@@ -54,15 +54,15 @@ impl<'a> LatticeBody<'a> {
             } => Some((shape, *spacing, *origin)),
             PointSource::File { .. } => None,
         };
-        let Some((shape, spacing, origin)) = lattice(&plan.bodies[body]) else {
+        let Some((shape, spacing, origin)) = lattice(&problem.bodies[body]) else {
             return Ok(None);
         };
-        let dimension = plan.dimension.count();
+        let dimension = problem.dimension.count();
         let region = |margin| Region::new(shape, spacing, origin, dimension, margin);
         let (Some(region), Some(around)) = (region(0.0), region(0.5)) else {
-            return Err(too_many(plan, body));
+            return Err(too_many(problem, body));
         };
-        let later = plan.bodies[body + 1..].iter().filter_map(lattice);
+        let later = problem.bodies[body + 1..].iter().filter_map(lattice);
         let edges = spacing[..dimension].iter().copied();
         Ok(Some(Self {
             shape,
@@ -73,8 +73,8 @@ impl<'a> LatticeBody<'a> {
             tolerance: TOLERANCE * edges.fold(f64::INFINITY, f64::min),
             region,
             around,
-            quadrature: plan.quadrature,
-            section: plan.dimension.section(),
+            quadrature: problem.quadrature,
+            out_of_plane_measure: problem.dimension.out_of_plane_measure(),
         }))
     }
 
@@ -134,7 +134,7 @@ impl<'a> LatticeBody<'a> {
 
     /// Volume of a cell, m³.
     pub fn cell_volume(&self) -> f64 {
-        self.spacing[..self.dimension].iter().product::<f64>() * self.section
+        self.spacing[..self.dimension].iter().product::<f64>() * self.out_of_plane_measure
     }
 
     /// Number of points of a cell.
@@ -231,8 +231,8 @@ fn evenly(samples: u64, count: u64) -> impl Iterator<Item = u64> {
 ///
 /// # Errors
 /// When cells are too far away to be numbered.
-pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result<Vec<Point>> {
-    let Some(lattice) = LatticeBody::new(plan, body)? else {
+pub(super) fn piece(problem: &Problem, body: usize, comm: &dyn Communicator) -> Result<Vec<Point>> {
+    let Some(lattice) = LatticeBody::new(problem, body)? else {
         return Ok(Vec::new());
     };
     let total = lattice.cells();
@@ -266,33 +266,35 @@ pub(super) fn piece(plan: &Plan, body: usize, comm: &dyn Communicator) -> Result
 ///
 /// # Errors
 /// Names the body; the same on all ranks.
-pub fn is_feasible(plan: &Plan, body: usize, ranks: usize) -> Result<()> {
-    let Some(lattice) = LatticeBody::new(plan, body)? else {
+pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
+    let Some(lattice) = LatticeBody::new(problem, body)? else {
         return Ok(());
     };
     if lattice.cells() > (ranks as u64) << CELLS_A_RANK {
-        return Err(too_many(plan, body));
+        return Err(too_many(problem, body));
     }
     let most = MOST_A_RANK * ranks as f64;
     if lattice.cells() as f64 > most && lattice.points() > most {
         let message = format!(
             "[body.{}]: about {:.1e} points are too many for {ranks} rank(s), of 2³¹ each at most; \
              use more ranks, or is the spacing not in m?",
-            plan.bodies[body].name,
+            problem.bodies[body].name,
             lattice.points()
         );
-        return Err(plan.source.error(plan.bodies[body].span.clone(), message));
+        return Err(problem
+            .source
+            .error(problem.bodies[body].span.clone(), message));
     }
     Ok(())
 }
 
-fn too_many(plan: &Plan, body: usize) -> Error {
-    let body = &plan.bodies[body];
+fn too_many(problem: &Problem, body: usize) -> Error {
+    let body = &problem.bodies[body];
     let message = format!(
         "[body.{}]: its lattice has too many cells; is the spacing in m?",
         body.name
     );
-    plan.source.error(body.span.clone(), message)
+    problem.source.error(body.span.clone(), message)
 }
 
 #[cfg(test)]
@@ -300,7 +302,7 @@ mod tests {
     use super::*;
     use crate::deck::{self, Source};
 
-    fn plan(spacing: f64, shape: &str) -> Plan {
+    fn problem(spacing: f64, shape: &str) -> Problem {
         let text = format!(
             "dimension = '3d'
             grid = {{ spacing = {spacing}, horizon = 3 }}
@@ -321,12 +323,12 @@ mod tests {
         let ball = "sphere = { centre = [0, 0, 0], radius = 1 }";
         let volume = 4.0 / 3.0 * std::f64::consts::PI;
         for spacing in [0.1_f64, 1e-2, 1e-4] {
-            let plan = plan(spacing, ball);
-            let found = LatticeBody::new(&plan, 0).unwrap().unwrap().points();
+            let problem = problem(spacing, ball);
+            let found = LatticeBody::new(&problem, 0).unwrap().unwrap().points();
             let expected = volume / spacing.powi(3);
             assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
         }
-        let cube = plan(5e-4, "box = { lower = [0, 0, 0], upper = [1, 1, 1] }");
+        let cube = problem(5e-4, "box = { lower = [0, 0, 0], upper = [1, 1, 1] }");
         let cube = LatticeBody::new(&cube, 0).unwrap().unwrap();
         assert_eq!(cube.points(), 8e9);
     }

@@ -18,8 +18,8 @@ use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
 use crate::comm::{Communicator, agree};
-use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::error::{Error, Result};
+use crate::problem::{PointSource, Problem, Selector};
 
 /// The most points of a rank.
 pub const MOST_A_RANK: f64 = 2_147_483_647.0;
@@ -64,17 +64,17 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// # Errors
 /// A body without points, an unreadable or wrong point file, a set with an id that no point has, more
 /// points than a rank can number; the same on all ranks.
-pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
+pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
-    for (index, body) in plan.bodies.iter().enumerate() {
+    for (index, body) in problem.bodies.iter().enumerate() {
         let mut piece = match &body.points {
-            PointSource::Lattice { .. } => lattice::piece(plan, index, comm)?,
+            PointSource::Lattice { .. } => lattice::piece(problem, index, comm)?,
             PointSource::File { path, .. } => {
-                if file::users(plan, path)[0].0 != index {
+                if file::users(problem, path)[0].0 != index {
                     continue;
                 }
-                file::piece(plan, path, comm)?
+                file::piece(problem, path, comm)?
             }
         };
         let (before, all) = crate::comm::scan(comm, piece.len() as u64);
@@ -89,8 +89,8 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
         }
         total += all;
     }
-    no_empty_body(plan, comm, &points)?;
-    ids_are_those_of_points(plan, total)?;
+    no_empty_body(problem, comm, &points)?;
+    ids_are_those_of_points(problem, total)?;
     let fits = if (points.len() as f64) < MOST_A_RANK {
         Ok(())
     } else {
@@ -102,8 +102,8 @@ pub fn generate(plan: &Plan, comm: &dyn Communicator) -> Result<(Vec<Point>, u64
     Ok((points, total))
 }
 
-fn ids_are_those_of_points(plan: &Plan, total: u64) -> Result<()> {
-    for set in &plan.sets {
+fn ids_are_those_of_points(problem: &Problem, total: u64) -> Result<()> {
+    for set in &problem.sets {
         if let Selector::Ids { ids, largest } = &set.selector
             && let Some(id) = ids.last().filter(|id| **id >= total)
         {
@@ -112,14 +112,14 @@ fn ids_are_those_of_points(plan: &Plan, total: u64) -> Result<()> {
                 set.name,
                 total - 1
             );
-            return Err(plan.source.error(largest.clone(), message));
+            return Err(problem.source.error(largest.clone(), message));
         }
     }
     Ok(())
 }
 
-fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
-    let mut counts = vec![0; plan.bodies.len()];
+fn no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
+    let mut counts = vec![0; problem.bodies.len()];
     for point in points {
         counts[point.block as usize] += 1;
     }
@@ -127,7 +127,7 @@ fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Resu
     match counts.iter().position(|count| *count == 0) {
         None => Ok(()),
         Some(empty) => {
-            let body = &plan.bodies[empty];
+            let body = &problem.bodies[empty];
             let why = match &body.points {
                 PointSource::Lattice { .. } => {
                     "is its shape smaller than the spacing, or covered by a later body?"
@@ -135,7 +135,7 @@ fn no_empty_body(plan: &Plan, comm: &dyn Communicator, points: &[Point]) -> Resu
                 PointSource::File { .. } => "no row of its file is its own",
             };
             let message = format!("[body.{}]: has no points; {why}", body.name);
-            Err(plan.source.error(body.span.clone(), message))
+            Err(problem.source.error(body.span.clone(), message))
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::deck::plan::Shape;
+use crate::problem::Shape;
 
 use super::shape;
 

@@ -1,6 +1,6 @@
 //! Which points belong to a named set.
 
-use crate::deck::plan::{Selector, Set};
+use crate::problem::{Selector, Set};
 
 use super::shape;
 

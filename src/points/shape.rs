@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::deck::plan::Shape;
+use crate::problem::Shape;
 
 /// A box that holds the shape: its lower and upper corner, m. Unbounded directions give ±∞.
 pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {

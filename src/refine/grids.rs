@@ -5,20 +5,20 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::comm::{Communicator, agree, all_gather_many};
-use crate::deck::plan::{Kind, Plan, PreCrack, Refinement};
 use crate::error::Result;
 use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
+use crate::problem::{Kind, PreCrack, Problem, Refinement};
 
 use super::at_coarser::AtCoarser;
 use super::pattern::{Node, Pattern};
-use super::place::{Place, born, numbered, parents};
+use super::place::{Place, canonical, numbered, parents};
 use super::place_set::PlaceSet;
 
 /// The grids of all bodies, by body; the same on all ranks.
 #[derive(Clone)]
 pub struct Grids<'a> {
-    plan: &'a Plan,
+    problem: &'a Problem,
     /// Number of points of level 0 over all ranks.
     coarsest: u64,
     finest: u32,
@@ -33,24 +33,24 @@ struct BodyGrid<'a> {
 }
 
 /// A node that is to be refined: body, level, and place in steps of the level.
-pub type Pick = [i64; 5];
+pub type NodeKey = [i64; 5];
 
 /// An order of nodes in which finer ones come first.
-fn finest_first([body, level, x, y, z]: &Pick) -> Pick {
+fn finest_first([body, level, x, y, z]: &NodeKey) -> NodeKey {
     [-level, *body, *z, *y, *x]
 }
 
 impl<'a> Grids<'a> {
-    /// Grids in which nothing is refined, of a plan with so many points of level 0 over all ranks; without
+    /// Grids in which nothing is refined, of a problem with so many points of level 0 over all ranks; without
     /// refinement there is none.
     ///
     /// # Errors
     /// When the cells of a body are too far away to be numbered.
-    pub fn new(plan: &'a Plan, coarsest: u64) -> Result<Self> {
-        let finest = plan.refinement.as_ref().map_or(0, |r| r.levels);
-        let dimension = plan.dimension.count();
+    pub fn new(problem: &'a Problem, coarsest: u64) -> Result<Self> {
+        let finest = problem.refinement.as_ref().map_or(0, |r| r.levels);
+        let dimension = problem.dimension.count();
         let grid = |body| {
-            let cells = LatticeBody::new(plan, body)?;
+            let cells = LatticeBody::new(problem, body)?;
             let pattern = Pattern::new(dimension, finest);
             Ok(cells.map(|cells| BodyGrid {
                 cells: Arc::new(cells),
@@ -60,10 +60,10 @@ impl<'a> Grids<'a> {
         let bodies = if finest == 0 {
             Vec::new()
         } else {
-            (0..plan.bodies.len()).map(grid).collect::<Result<_>>()?
+            (0..problem.bodies.len()).map(grid).collect::<Result<_>>()?
         };
         Ok(Self {
-            plan,
+            problem,
             coarsest,
             finest,
             bodies,
@@ -75,20 +75,20 @@ impl<'a> Grids<'a> {
         self.coarsest
     }
 
-    /// Refines what the plan wants from the start, but for nodes between places that a pre-crack parts;
+    /// Refines what the problem wants from the start, but for nodes between places that a pre-crack parts;
     /// `coarse` are this rank's points of level 0. Collective.
     ///
     /// # Errors
     /// When there is no point in a region; the same on all ranks.
     pub fn refine_regions(&mut self, comm: &dyn Communicator, coarse: &[Point]) -> Result<()> {
-        let plan = self.plan;
-        let Some(refinement) = &plan.refinement else {
+        let problem = self.problem;
+        let Some(refinement) = &problem.refinement else {
             return Ok(());
         };
         let whole = self.clone();
         for region in &refinement.regions {
             for level in 0..region.level {
-                let mut picks: Vec<Pick> = Vec::new();
+                let mut keys: Vec<NodeKey> = Vec::new();
                 for point in coarse {
                     let Some(grid) = &self.bodies[point.block as usize] else {
                         continue;
@@ -96,17 +96,17 @@ impl<'a> Grids<'a> {
                     grid.for_each_node(point.position, level, &mut |place, position| {
                         if region.condition.is_true(position, 0.0) {
                             let [x, y, z] = place;
-                            picks.push([i64::from(point.block), i64::from(level), x, y, z]);
+                            keys.push([i64::from(point.block), i64::from(level), x, y, z]);
                         }
                     });
                 }
-                let all = all_gather_many(comm, &picks);
+                let all = all_gather_many(comm, &keys);
                 if all.is_empty() {
                     let message = format!(
                         "[refinement.region.{}] where: there is no point of a body given as a shape",
                         region.name
                     );
-                    let error = plan.source.error(region.span.clone(), message);
+                    let error = problem.source.error(region.span.clone(), message);
                     return agree(comm, Err(error));
                 }
                 self.refine(&all);
@@ -114,7 +114,7 @@ impl<'a> Grids<'a> {
         }
         let crosses = |crack: &PreCrack, a, b| crack::crosses(&crack.surface, a, b);
         self.part(&whole, &|a, b| {
-            plan.cracks.iter().any(|crack| crosses(crack, a, b))
+            problem.cracks.iter().any(|crack| crosses(crack, a, b))
         });
         for grid in self.bodies.iter_mut().flatten() {
             grid.pattern.make_last();
@@ -123,9 +123,9 @@ impl<'a> Grids<'a> {
     }
 
     /// Refines nodes, and what must be refined with them. Returns whether any were not yet.
-    pub fn refine(&mut self, picks: &[Pick]) -> bool {
+    pub fn refine(&mut self, keys: &[NodeKey]) -> bool {
         let mut changed = false;
-        for [body, level, x, y, z] in picks {
+        for [body, level, x, y, z] in keys {
             let Some(BodyGrid { cells, pattern }) = &mut self.bodies[*body as usize] else {
                 continue;
             };
@@ -137,21 +137,21 @@ impl<'a> Grids<'a> {
     /// Makes refined nodes coarse again, but for those that are refined from the start or are needed by finer ones.
     /// Returns the nodes that are no longer there: body, level of their birth, and place in steps of the
     /// finest level, the finest level first, each once.
-    pub fn coarsen(&mut self, picks: &[Pick]) -> Vec<Pick> {
-        let mut coarse: Vec<Pick> = picks.to_vec();
+    pub fn coarsen(&mut self, keys: &[NodeKey]) -> Vec<NodeKey> {
+        let mut coarse: Vec<NodeKey> = keys.to_vec();
         // Finer nodes first, for they need the coarser ones.
         coarse.sort_unstable_by_key(finest_first);
         coarse.retain(|[body, level, x, y, z]| {
             let grid = self.bodies[*body as usize].as_mut();
             grid.is_some_and(|grid| grid.pattern.coarsen(*level as u32, [*x, *y, *z]))
         });
-        let mut left: Vec<Pick> = Vec::new();
+        let mut left: Vec<NodeKey> = Vec::new();
         for [number, level, x, y, z] in coarse {
             let Some(BodyGrid { cells, pattern }) = &self.bodies[number as usize] else {
                 continue;
             };
             let body = |cell| cells.has_cell(cell);
-            let gone = pattern.left(&body, level as u32, [x, y, z]);
+            let gone = pattern.removed(&body, level as u32, [x, y, z]);
             left.extend(gone.map(|[x, y, z]| [number, level + 1, x, y, z]));
         }
         left.sort_unstable_by_key(finest_first);
@@ -161,7 +161,7 @@ impl<'a> Grids<'a> {
 
     /// What making the refined point of a body at a position (m) coarse means; none if it is not refined, or was
     /// from the start.
-    pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<Pick> {
+    pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
         let place = self.place_at(body, position)?;
         let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(place)?;
         Some([body as i64, i64::from(level), x, y, z])
@@ -197,9 +197,9 @@ impl<'a> Grids<'a> {
             let Some(grid) = grid else { continue };
             for (level, place) in grid.pattern.parted() {
                 let mut half_way = (0..3).filter(|k| place[*k] & 1 == 1);
-                let number = self.plan.block_number(body, level - 1, Kind::Whole);
+                let number = self.problem.block_number(body, level - 1, Kind::Whole);
                 if let (Some(axis), None) = (half_way.next(), half_way.next())
-                    && let Some(edges) = self.plan.block(number).spacing()
+                    && let Some(edges) = self.problem.block(number).spacing()
                 {
                     faces.push((grid.position(level, place), edges, axis));
                 }
@@ -209,7 +209,7 @@ impl<'a> Grids<'a> {
     }
 
     /// All nodes that are refined, and all places without nodes with the level that they would be born at.
-    pub fn state(&self) -> [Vec<Pick>; 2] {
+    pub fn state(&self) -> [Vec<NodeKey>; 2] {
         let mut state = [Vec::new(), Vec::new()];
         for (body, grid) in (0..).zip(&self.bodies) {
             let pick = |(level, [x, y, z]): (u32, Place)| [body, i64::from(level), x, y, z];
@@ -221,12 +221,12 @@ impl<'a> Grids<'a> {
             );
             parted.extend(grid.iter().flat_map(|grid| grid.pattern.parted()).map(pick));
         }
-        state.iter_mut().for_each(|picks| picks.sort_unstable());
+        state.iter_mut().for_each(|keys| keys.sort_unstable());
         state
     }
 
     /// Refines to what [`Self::state`] gave. Returns whether anything was not yet.
-    pub fn refine_to(&mut self, [refined, parted]: &[Vec<Pick>; 2]) -> bool {
+    pub fn refine_to(&mut self, [refined, parted]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in parted {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
                 grid.pattern.part(*level as u32, [*x, *y, *z]);
@@ -236,12 +236,12 @@ impl<'a> Grids<'a> {
     }
 
     /// What refining the point of a block at a position (m) means; none if it is of the finest level.
-    pub fn pick(&self, block: usize, position: [f64; 3]) -> Option<Pick> {
-        let level = self.plan.block(block).level;
+    pub fn pick(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
+        let level = self.problem.block(block).level;
         if level == self.finest {
             return None;
         }
-        let body = self.plan.body_of(block);
+        let body = self.problem.body_of(block);
         let [x, y, z] = self
             .place_at(body, position)?
             .map(|x| x >> (self.finest - level));
@@ -257,12 +257,12 @@ impl<'a> Grids<'a> {
     /// Reference position (m) of a place of a body in steps of the finest level, if it is one of level 0.
     pub fn coarse_position(&self, body: usize, place: Place) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
-        (born(self.finest, place).0 == 0).then(|| grid.position(self.finest, place))
+        (canonical(self.finest, place).0 == 0).then(|| grid.position(self.finest, place))
     }
 
     /// The places, in steps of the finest level, of the points that one lies between.
     pub fn parents(&self, place: Place) -> Vec<Place> {
-        let (level, place) = born(self.finest, place);
+        let (level, place) = canonical(self.finest, place);
         let steps = 1 << (self.finest + 1 - level);
         parents(place)
             .map(|parent| parent.map(|x| x * steps))
@@ -272,7 +272,7 @@ impl<'a> Grids<'a> {
     /// Points of level 0 as they are without refinement.
     pub fn unrefined(&self, points: impl Iterator<Item = Point>) -> Vec<Point> {
         let unrefined = |mut point: Point| {
-            let body = self.plan.body_of(point.block as usize);
+            let body = self.problem.body_of(point.block as usize);
             point.block = body as u32;
             if let Some(grid) = &self.bodies[body] {
                 point.volume = grid.cells.cell_volume();
@@ -306,7 +306,7 @@ impl<'a> Grids<'a> {
             let block = |place, node: &Node| self.block(body, interfaces, grid, place, node);
             let mut finer = Vec::new();
             if grid.pattern.touches(cell) {
-                for part in 1..1_u64 << (self.finest as usize * self.plan.dimension.count()) {
+                for part in 1..1_u64 << (self.finest as usize * self.problem.dimension.count()) {
                     let place = numbered(origin, self.finest, part);
                     if let Some(node) = grid.node(place) {
                         let id = point.id + self.coarsest * part;
@@ -331,13 +331,13 @@ impl<'a> Grids<'a> {
     /// enlarged for it.
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
-        if !self.plan.refinement.as_ref().is_some_and(is_enlarged) {
+        if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
             // They can share a lattice with the others.
             return Vec::new();
         }
         let of_level = |level| {
-            let number = self.plan.block_number(body, level, Kind::Whole);
-            let block = self.plan.block(number);
+            let number = self.problem.block_number(body, level, Kind::Whole);
+            let block = self.problem.block(number);
             let edges = block.spacing()?;
             Some(AtCoarser::new(pattern, level, edges, cutoff(block.horizon)))
         };
@@ -365,7 +365,7 @@ impl<'a> Grids<'a> {
         } else {
             Kind::Partial
         };
-        self.plan.block_number(body, node.level, kind)
+        self.problem.block_number(body, node.level, kind)
     }
 
     /// Which cells of a body hold points that are other than without refinement, or nodes that are next to them;

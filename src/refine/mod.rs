@@ -13,7 +13,7 @@ mod place;
 mod place_set;
 mod shares;
 
-pub use grids::{Grids, Pick};
+pub use grids::{Grids, NodeKey};
 pub use pattern::{Node, Pattern};
 pub use place::Place;
 pub use place_set::PlaceSet;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
-use super::place::{Place, around, between, born, halves, parents};
+use super::place::{Place, around, between, canonical, halves, parents};
 use super::place_set::PlaceSet;
 
 /// A node of a refined grid.
@@ -90,7 +90,7 @@ impl Pattern {
     /// there.
     pub fn refined_at(&self, place: Place) -> Option<(u32, Place)> {
         let finest = self.finest();
-        let (birth, _) = born(finest, place);
+        let (birth, _) = canonical(finest, place);
         let nodes = (birth..finest).map(|level| (level, place.map(|x| x >> (finest - level))));
         let is_in = |sets: &[FxHashSet<Place>], (level, place): &(u32, Place)| {
             sets[*level as usize].contains(place)
@@ -101,7 +101,7 @@ impl Pattern {
 
     /// The nodes that a refined one of a level had around it and that are no longer there now that it is coarse,
     /// in steps of the finest level.
-    pub fn left(
+    pub fn removed(
         &self,
         body: &impl Fn(Place) -> bool,
         level: u32,
@@ -128,7 +128,7 @@ impl Pattern {
 
     /// Whether there is a node at a place, in steps of a level's spacing, if there can be one.
     fn is_taken(&self, level: u32, place: Place) -> bool {
-        let (level, place) = born(level, place);
+        let (level, place) = canonical(level, place);
         level == 0 || {
             let refined = &self.refined[level as usize - 1];
             parents(place).any(|parent| refined.contains(&parent))
@@ -164,7 +164,7 @@ impl Pattern {
         if !self.exists(body, finest, place) {
             return None;
         }
-        let (birth, at_birth) = born(finest, place);
+        let (birth, at_birth) = canonical(finest, place);
         let dimension = self.dimension as u32;
         // Volume in units of which the finest cell has 2^dimension: all of this is exact.
         let cell = |level: u32| 1_u64 << (dimension * (finest + 1 - level));
@@ -214,7 +214,7 @@ impl Pattern {
             let high = place.map(|x| (x + (1 << level) - 1) >> level);
             return between(low, high).all(body);
         }
-        let (level, place) = born(level, place);
+        let (level, place) = canonical(level, place);
         if level == 0 {
             return body(place);
         }
@@ -244,7 +244,7 @@ impl Pattern {
         let newly = self.refined[coarse].difference(&earlier.refined[coarse]);
         let places: FxHashSet<Place> = newly
             .flat_map(|place| around(*place, self.dimension))
-            .filter(|place| born(level, *place).0 == level)
+            .filter(|place| canonical(level, *place).0 == level)
             .filter(|place| {
                 self.exists(body, level, *place) && !earlier.exists(body, level, *place)
             })
@@ -320,7 +320,7 @@ mod tests {
         let mut pattern = Pattern::new(dimension, finest);
         for (level, place) in parted {
             let place = std::array::from_fn(|k| if k < dimension { place[k] } else { 0 });
-            if let (level @ 1.., place) = born(level % (finest + 1), place) {
+            if let (level @ 1.., place) = canonical(level % (finest + 1), place) {
                 pattern.part(level, place);
             }
         }
@@ -373,7 +373,7 @@ mod tests {
                 .collect();
             let left = coarse
                 .iter()
-                .flat_map(|(level, place)| pattern.left(&body, *level, *place));
+                .flat_map(|(level, place)| pattern.removed(&body, *level, *place));
             let left: FxHashSet<Place> = left.collect();
             let after = is_sound(&pattern);
             let stays = |(place, _): &&(Place, Node)| !left.contains(place);
@@ -384,7 +384,7 @@ mod tests {
             assert_eq!(stayed, places(after.iter().collect()));
             // Those that leave have their whole cell to give, but for finer ones that leave with them.
             for (place, node) in before.iter().filter(|node| !stays(node)) {
-                let (level, _) = born(finest, *place);
+                let (level, _) = canonical(finest, *place);
                 let alone = 0.5_f64.powi((level * dimension as u32) as i32);
                 let finer = around_by_half(level, finest, *place, dimension);
                 if finer

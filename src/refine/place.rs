@@ -44,7 +44,7 @@ pub(super) fn halves(place: Place) -> u32 {
 }
 
 /// The same place in steps of the coarsest level that has it, and that level.
-pub(super) fn born(mut level: u32, mut place: Place) -> (u32, Place) {
+pub(super) fn canonical(mut level: u32, mut place: Place) -> (u32, Place) {
     while level > 0 && halves(place) == 0 {
         level -= 1;
         place = place.map(|x| x / 2);
@@ -80,7 +80,7 @@ mod tests {
         let pair = [[-2, 1, 0], [-1, 1, 0]];
         assert_eq!(parents([-3, 2, 0]).collect::<Vec<_>>(), pair);
         assert_eq!(parents([1, 1, 1]).count(), 8);
-        assert_eq!(born(3, [4, -12, 0]), (1, [1, -3, 0]));
-        assert_eq!(born(3, [8, 16, 0]), (0, [1, 2, 0]));
+        assert_eq!(canonical(3, [4, -12, 0]), (1, [1, -3, 0]));
+        assert_eq!(canonical(3, [8, 16, 0]), (0, [1, 2, 0]));
     }
 }

@@ -1,12 +1,12 @@
 //! What a run has decided by itself, for the reader of a log.
 
 use crate::comm;
-use crate::deck::plan::{Method, StepRule};
+use crate::problem::{Method, StepRule};
 use crate::solver::Simulation;
 
 /// Names and what was decided; the same on all ranks. Collective.
 pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'static str, String)> {
-    let plan = simulation.plan;
+    let problem = simulation.problem;
     let lower = |rule: &dyn std::fmt::Debug| format!("{rule:?}").to_lowercase();
     let mut decided = vec![
         ("partition", partition(simulation)),
@@ -20,14 +20,14 @@ pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'stati
             "volumes",
             format!(
                 "volume correction {}, quadrature {}",
-                lower(&plan.volume_correction),
-                lower(&plan.quadrature)
+                lower(&problem.volume_correction),
+                lower(&problem.quadrature)
             ),
         ),
     ];
-    if plan.bodies.len() > 1 {
-        let rule = lower(&plan.interface.rule);
-        let own = plan.interface.pairs.len();
+    if problem.bodies.len() > 1 {
+        let rule = lower(&problem.interface.rule);
+        let own = problem.interface.pairs.len();
         decided.push((
             "interface",
             format!("rule {rule}, {own} pair(s) with their own"),

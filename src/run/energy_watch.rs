@@ -44,11 +44,11 @@ pub struct EnergyWatch {
 impl EnergyWatch {
     /// For a run that stands before a step. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
-        let (plan, model) = (simulation.plan, &simulation.model);
+        let (problem, model) = (simulation.problem, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
         let mut stiffness = [ExactSum::ZERO];
         for (volume, block) in model.volume.iter().zip(&model.block) {
-            let material = &plan.block(usize::from(*block)).body.material;
+            let material = &problem.block(usize::from(*block)).body.material;
             stiffness[0].add(material.elastic.youngs_modulus * volume);
         }
         let (step, stable) = (simulation.clock.step(), simulation.stable_step);

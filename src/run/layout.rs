@@ -1,8 +1,8 @@
 //! What a result consists of.
 
 use crate::comm::{self, IdOrder};
-use crate::deck::plan::Field;
 use crate::output::{Contents, FieldData, FieldDescription, Piece};
+use crate::problem::Field;
 use crate::solver::Simulation;
 
 /// The fields that do not change while the points are the same.
@@ -33,14 +33,14 @@ impl<'a> Layout<'a> {
     ) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let owned = model.owned();
-        let plan = simulation.plan;
+        let problem = simulation.problem;
         let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
-        let body = |block: &u16| plan.body_of(usize::from(*block)) as u32;
+        let body = |block: &u16| problem.body_of(usize::from(*block)) as u32;
         let blocks: Vec<u32> = model.block.iter().map(body).collect();
-        let level = |block: &u16| plan.block(usize::from(*block)).level;
+        let level = |block: &u16| problem.block(usize::from(*block)).level;
         let levels: Option<Vec<u32>> =
-            (plan.refinement.is_some()).then(|| model.block.iter().map(level).collect());
-        let output = &plan.output;
+            (problem.refinement.is_some()).then(|| model.block.iter().map(level).collect());
+        let output = &problem.output;
         let describe = |field: &Field| FieldDescription {
             name: field.name(),
             unit: field.unit(),

@@ -1,4 +1,4 @@
-//! A run: from a plan to a result, with history, checkpoints and restart. What `fissure run` does, for
+//! A run: from a problem to a result, with history, checkpoints and restart. What `fissure run` does, for
 //! Rust.
 //!
 //! ```no_run
@@ -11,13 +11,13 @@
 //! let deck = fissure::deck::read(Path::new("plate.toml"), &[])?;
 //! let mut options = Options::new("out/plate");
 //! options.deck = Some(deck.explain()?);
-//! fissure::run(&deck.plan()?, &threads::alone(), options, &mut Unobserved)?;
+//! fissure::run(&deck.problem()?, &threads::alone(), options, &mut Unobserved)?;
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! `examples/` holds whole programs: one that runs a deck under MPI, and one that has no deck but builds
-//! its plan.
+//! its problem.
 
 mod checkpoints;
 mod crack_files;
@@ -27,9 +27,9 @@ mod files;
 mod layout;
 mod observer;
 mod options;
-mod physics;
 mod recorder;
 mod restart;
+mod restart_compatibility;
 mod signals;
 mod summary;
 mod warnings;
@@ -46,9 +46,9 @@ use std::path::PathBuf;
 
 use crate::comm::mpi::{self, World};
 use crate::comm::{self, Communicator, agree};
-use crate::deck::Plan;
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
+use crate::problem::Problem;
 use crate::solver::Simulation;
 use crate::solver::observers::{ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
@@ -92,19 +92,19 @@ pub fn start_mpi() -> Result<World> {
     World::start()
 }
 
-/// Runs a plan to its end, or until it is stopped, and writes the result. Threads are those of Rayon's
+/// Runs a problem to its end, or until it is stopped, and writes the result. Threads are those of Rayon's
 /// global pool. Collective; without MPI there must be one rank.
 ///
 /// # Errors
-/// When the plan cannot be run, a signal has come before the first step, the folder holds what must not be replaced, the checkpoint to go on from
-/// is none of this plan, the disc is full, or the motion of a point is not finite; the same on all ranks.
+/// When the problem cannot be run, a signal has come before the first step, the folder holds what must not be replaced, the checkpoint to go on from
+/// is none of this problem, the disc is full, or the motion of a point is not finite; the same on all ranks.
 pub fn run(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     options: Options,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
-    let calibrated = calibrated(plan)?;
+    let calibrated = calibrated(problem)?;
     let files = Files::new(options.folder.clone());
     // Taken before anything is looked at, and kept until the end.
     let prepared = match comm.rank() {
@@ -118,14 +118,14 @@ pub fn run(
     };
     let _lock = agree(comm, prepared)?;
     let mut job = Job {
-        plan: &calibrated,
+        problem: &calibrated,
         comm,
         files,
-        physics: physics::describe(plan, options.deck.as_deref()),
+        physics: restart_compatibility::describe(problem, options.deck.as_deref()),
         options,
         observer,
     };
-    match plan.dimension.count() {
+    match problem.dimension.count() {
         1 => job.run::<1>(),
         2 => job.run::<2>(),
         _ => job.run::<3>(),
@@ -142,7 +142,7 @@ enum Left {
 
 /// Everything that a run needs beside the points.
 struct Job<'a> {
-    plan: &'a Plan,
+    problem: &'a Problem,
     comm: &'a dyn Communicator,
     files: Files,
     physics: String,
@@ -155,7 +155,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Started);
         self.look_before_the_first_step()?;
         let mut look = || self.look_before_the_first_step();
-        let mut simulation = Simulation::<D>::set_up(self.plan, self.comm, &mut look)?;
+        let mut simulation = Simulation::<D>::set_up(self.problem, self.comm, &mut look)?;
         simulation.check()?;
         self.observer.message(&Message::SetUp {
             step: simulation.clock.step(),
@@ -225,12 +225,12 @@ impl<'a> Job<'a> {
         let signals = self.options.signals.clone();
         let started = self.options.started;
         let limit = self.options.wall_time.map(|limit| (started, limit));
-        let mut watch = Watch::new(signals.as_ref(), self.plan.checkpoint, limit);
+        let mut watch = Watch::new(signals.as_ref(), self.problem.checkpoint, limit);
         let mut contact = Some(ContactWatch::new(simulation));
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        let mut energy = (!self.plan.relaxes()).then(|| EnergyWatch::new(simulation));
+        let mut energy = (!self.problem.relaxes()).then(|| EnergyWatch::new(simulation));
         while !simulation.is_over() {
             if simulation.is_refinement_due()
                 && let Some(regridded) = simulation.refine()?
@@ -392,9 +392,9 @@ impl<'a> Job<'a> {
         simulation: &Simulation<'_, D>,
     ) -> Vec<(&'static str, String)> {
         // All ranks must write the same; what differs between them is told by rank 0.
-        let source = &self.plan.source;
+        let source = &self.problem.source;
         let mut metadata = vec![
-            ("title", self.plan.title.clone()),
+            ("title", self.problem.title.clone()),
             ("deck", source.text.clone()),
             (
                 "deck_in_full",
@@ -410,7 +410,10 @@ impl<'a> Job<'a> {
                 self.text_of_rank_0(&rayon::current_num_threads().to_string()),
             ),
             ("dimension", D.to_string()),
-            ("section", self.plan.dimension.section().to_string()),
+            (
+                "out_of_plane_measure",
+                self.problem.dimension.out_of_plane_measure().to_string(),
+            ),
             ("time_step", simulation.clock.step().to_string()),
         ];
         let more = self.options.attributes.iter();

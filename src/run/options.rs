@@ -1,11 +1,11 @@
-//! How a plan is run: what does not belong to the problem itself.
+//! How a problem is run: what does not belong to the problem itself.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use super::signals::Signals;
 
-/// How a plan is run. Must be the same on all ranks, but for `signals`.
+/// How a problem is run. Must be the same on all ranks, but for `signals`.
 pub struct Options {
     /// Folder of the result, the history and the checkpoints; it is made if it is not there.
     pub folder: PathBuf,
@@ -18,8 +18,8 @@ pub struct Options {
     pub started: Instant,
     /// Signals of this process that stop the run or ask for a checkpoint.
     pub signals: Option<Signals>,
-    /// The plan's deck with every default filled in, see [`Deck::explain`](crate::deck::Deck::explain);
-    /// `None` for a plan that was built in Rust.
+    /// The problem's deck with every default filled in, see [`Deck::explain`](crate::deck::Deck::explain);
+    /// `None` for a problem that was built in Rust.
     pub deck: Option<String>,
     /// More attributes of the result: name and text, such as the command line. Rank 0's texts count.
     pub attributes: Vec<(&'static str, String)>,

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, IdOrder, agree};
-use crate::deck::Plan;
-use crate::deck::plan::Field;
 use crate::error::{Error, ErrorKind, Result};
 use crate::output::checkpoint::{Header, is_taken};
 use crate::output::{
     Creation, HistoryContents, Number, ResultFile, ResultReader, SideCar, StoredField, mix,
 };
+use crate::problem::Field;
+use crate::problem::Problem;
 use crate::solver::Simulation;
 use crate::solver::conditions::output_members;
 use crate::solver::motion::Clock;
@@ -21,7 +21,7 @@ use super::crack_files;
 use super::files::Files;
 use super::layout::{FIXED, Layout, pick};
 use super::observer::{Observer, Row};
-use super::physics::history_differences;
+use super::restart_compatibility::history_differences;
 
 /// History rows that are held back before they are written.
 const ROWS_HELD: usize = 256;
@@ -73,12 +73,15 @@ impl<'a> Recorder<'a> {
         start: Start,
         metadata: &[(&str, String)],
     ) -> Result<Self> {
-        let (plan, comm) = (simulation.plan, simulation.comm);
+        let (problem, comm) = (simulation.problem, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
         let order = simulation.id_order();
         let kept = kept(simulation, &order)?;
         let clock = &simulation.expected_clock();
-        let (outputs, rows) = (Schedule(plan.output.every), Schedule(plan.row_interval()));
+        let (outputs, rows) = (
+            Schedule(problem.output.every),
+            Schedule(problem.row_interval()),
+        );
         let layout = Layout::new(simulation, (&order, &kept), outputs.count(clock), metadata);
         let fixed = layout.fixed();
         let contents = layout.contents(&fixed);
@@ -125,7 +128,7 @@ impl<'a> Recorder<'a> {
             spent: Duration::ZERO,
             spent_on_rows: Duration::ZERO,
             folder: files.folder.clone(),
-            fields: plan.output.fields.clone(),
+            fields: problem.output.fields.clone(),
             outputs,
             rows,
             held: Vec::new(),
@@ -287,8 +290,8 @@ fn kept<const D: usize>(
     simulation: &Simulation<'_, D>,
     order: &IdOrder,
 ) -> Result<Option<Vec<usize>>> {
-    let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
-    let Some(points) = output_members(plan, comm, model)? else {
+    let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
+    let Some(points) = output_members(problem, comm, model)? else {
         return Ok(None);
     };
     let mut flags = vec![0_u32; model.owned()];
@@ -300,7 +303,7 @@ fn kept<const D: usize>(
 }
 
 /// Why the result that a checkpoint belongs to cannot be continued, if it cannot: it is not there, damaged or
-/// another one, or the plan asks for other fields or columns. Collective.
+/// another one, or the problem asks for other fields or columns. Collective.
 ///
 /// # Errors
 /// When a set of the history is empty, or a deck cannot be parsed; when another program has locked the result, or
@@ -345,7 +348,7 @@ pub fn why_not_continued<const D: usize>(
             .iter()
             .filter(|field| field.dynamic && !FIXED.contains(&&field.name[..]));
         let found: Vec<&str> = moving.map(|field| &field.name[..]).collect();
-        let mut wanted: Vec<&str> = wanted_fields(simulation.plan);
+        let mut wanted: Vec<&str> = wanted_fields(simulation.problem);
         wanted.sort_unstable();
         let names = columns.iter().map(|column| &column.name);
         let expected = observer.columns().iter().map(|(name, _)| name);
@@ -357,7 +360,8 @@ pub fn why_not_continued<const D: usize>(
         let found_points = reader.ids(0)?.into_iter().map(mix);
         if !changing && found_points.fold(0, u64::wrapping_add) != points {
             return Ok(Some("other points are asked for".to_owned()));
-        } else if fields.iter().any(single) != (simulation.plan.output.single && !wanted.is_empty())
+        } else if fields.iter().any(single)
+            != (simulation.problem.output.single && !wanted.is_empty())
         {
             return Ok(Some("numbers of another length are asked for".to_owned()));
         } else if found != wanted {
@@ -405,8 +409,9 @@ fn found_by_root(
     Ok((!why.is_empty()).then_some(why))
 }
 
-fn wanted_fields(plan: &Plan) -> Vec<&'static str> {
-    plan.output
+fn wanted_fields(problem: &Problem) -> Vec<&'static str> {
+    problem
+        .output
         .fields
         .iter()
         .map(|field| field.name())

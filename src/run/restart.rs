@@ -8,7 +8,7 @@ use crate::solver::Simulation;
 use super::checkpoints::{CheckpointWriter, fingerprint};
 use super::files::Files;
 use super::observer::{Message, Observer};
-use super::physics;
+use super::restart_compatibility;
 
 /// What a restart begins with.
 pub struct Restart {
@@ -32,7 +32,10 @@ pub fn restart<const D: usize>(
     let mut warn = |message| observer.message(&Message::Warning(message));
     let (checkpoints, path) = Checkpoints::open(comm, &files.folder, &mut warn)?;
     let header = read_header(comm, &path)?;
-    let lines = agree(comm, physics::differences(&header.deck, &physics))?;
+    let lines = agree(
+        comm,
+        restart_compatibility::differences(&header.deck, &physics),
+    )?;
     if !lines.is_empty() {
         return Err(Error::input(format!(
             "the deck differs in its physics from that of {}, so the run cannot be continued:\n  {}",

@@ -3,8 +3,8 @@
 use super::Job;
 use super::observer::Message;
 use super::recorder::Recorder;
-use crate::deck::shown;
 use crate::error::Result;
+use crate::message::format_number;
 use crate::solver::Simulation;
 use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
@@ -21,8 +21,8 @@ const START_SHARE: f64 = 0.1;
 impl<'a> Job<'a> {
     /// Says that bodies go through one another.
     pub(super) fn warn_of_contact(&mut self, contact: &Contact, time: f64) {
-        let [a, b] = contact.bodies.map(|body| &self.plan.bodies[body].name);
-        let place = &contact.place[..self.plan.dimension.count()];
+        let [a, b] = contact.bodies.map(|body| &self.problem.bodies[body].name);
+        let place = &contact.place[..self.problem.dimension.count()];
         let place: Vec<String> = place.iter().map(|x| format!("{x:.4e}")).collect();
         let text = format!(
             "at t = {time:.4e} s points of `{a}` and `{b}` have come nearer than their spacing, at ({}) m; \
@@ -57,7 +57,7 @@ impl<'a> Job<'a> {
         simulation: &Simulation<'a, D>,
         recorder: &Recorder<'a>,
     ) -> bool {
-        let (time, end) = (simulation.clock.time(), self.plan.time.end);
+        let (time, end) = (simulation.clock.time(), self.problem.time.end);
         let scaled = simulation.time_rule().density_scale != 1.0;
         let Some(row) = recorder.last_row.as_ref().filter(|_| scaled) else {
             return false;
@@ -82,7 +82,7 @@ impl<'a> Job<'a> {
             return;
         };
         let (overshoot, fracture) = (row.energies.overshoot, row.energies.fracture);
-        if self.plan.relaxes() || fracture <= 0.0 || overshoot <= OVERSHOOT_SHARE * fracture {
+        if self.problem.relaxes() || fracture <= 0.0 || overshoot <= OVERSHOOT_SHARE * fracture {
             return;
         }
         let text = format!(
@@ -101,8 +101,8 @@ impl<'a> Job<'a> {
         &mut self,
         simulation: &Simulation<'a, D>,
     ) -> Result<()> {
-        let (clock, plan) = (&simulation.clock, self.plan);
-        let steps = choose_steps(plan, simulation.stable_step)?;
+        let (clock, problem) = (&simulation.clock, self.problem);
+        let steps = choose_steps(problem, simulation.stable_step)?;
         let &[(fresh, _)] = &steps[..] else {
             return Ok(());
         };
@@ -111,7 +111,7 @@ impl<'a> Job<'a> {
                 "the steps stay at {:e} s, as the run began; a new run until t = {} s would take {fresh:e} s \
                  and end with other last digits",
                 clock.step(),
-                shown(plan.time.end),
+                format_number(problem.time.end),
             );
             self.observer.message(&Message::Warning(text));
         }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::comm::Communicator;
-use crate::deck::plan::CheckpointRule;
+use crate::problem::CheckpointRule;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 

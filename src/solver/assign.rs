@@ -1,15 +1,15 @@
-//! From the plan to the law, the failure rule and the weights of every family.
+//! From the problem to the law, the failure rule and the weights of every family.
 
 use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, WorkRule};
-use crate::deck::plan::{
-    self, Block, Body, DamageRule, InterfaceRule, Plan, Toughness, VolumeCorrection,
-};
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
 use crate::families::{BlockBonds, CellShare, Fault};
 use crate::material::{Built, Given, PairLaw};
 use crate::memory::check_room;
 use crate::points::distance_squared;
+use crate::problem::{
+    self, Block, Body, DamageRule, InterfaceRule, Problem, Toughness, VolumeCorrection,
+};
 
 use super::bonds::{BlockLaws, Interaction};
 use super::model::Model;
@@ -22,7 +22,7 @@ struct Constants {
 }
 
 /// Those of the own end of the bonds from one block to another.
-fn constants(plan: &Plan, here: &Block, there: &Block) -> Constants {
+fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
     let [own, other] = [here, there].map(|block| (block.body.material.elastic, block.horizon));
     let combine = |of: fn(f64, f64) -> f64| Constants {
         elastic: Isotropic {
@@ -31,10 +31,13 @@ fn constants(plan: &Plan, here: &Block, there: &Block) -> Constants {
         },
         horizon: of(own.1, other.1),
     };
-    let within = plan.refinement.as_ref().map(|refinement| refinement.bonds);
+    let within = problem
+        .refinement
+        .as_ref()
+        .map(|refinement| refinement.bonds);
     let rule = match within.filter(|_| here.body.name == there.body.name) {
         Some(rule) => rule,
-        None => plan.interface.between(here.body, there.body),
+        None => problem.interface.between(here.body, there.body),
     };
     match rule {
         // Where there are no bonds, these are asked for none.
@@ -48,11 +51,11 @@ fn constants(plan: &Plan, here: &Block, there: &Block) -> Constants {
 /// go with that of another body.
 ///
 /// # Errors
-/// For plans made in Rust; most of what a deck says is checked where it is read.
-pub fn laws_are_possible(plan: &Plan) -> Result<()> {
-    for body in &plan.bodies {
+/// For problems made in Rust; most of what a deck says is checked where it is read.
+pub fn laws_are_possible(problem: &Problem) -> Result<()> {
+    for body in &problem.bodies {
         let law = &body.material.law;
-        let fault = law.fault(plan.dimension).map(|fault| fault.message);
+        let fault = law.fault(problem.dimension).map(|fault| fault.message);
         let damage = body.damage.as_ref();
         let fault = fault.or_else(|| damage.and_then(|damage| law.damage_fault(damage)));
         if let Some(fault) = fault {
@@ -62,30 +65,30 @@ pub fn laws_are_possible(plan: &Plan) -> Result<()> {
                 body.name
             )));
         }
-        damage_is_possible(plan, body)?;
+        damage_is_possible(problem, body)?;
     }
     Ok(())
 }
 
 /// Whether bonds of a body with this damage break by their work. That of bond-based laws follows from the stretch,
 /// so that theirs break at the one that costs as much.
-fn breaks_by_work(body: &Body, damage: &plan::Damage) -> bool {
+fn breaks_by_work(body: &Body, damage: &problem::Damage) -> bool {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     damage.rule != DamageRule::CriticalStretch && !bond_based
 }
 
 /// An error if the bonds of a body break by their energy and something else is in the way of it.
-fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
+fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
     };
     let by_work = breaks_by_work(body, damage);
     let error = |message: String| {
         let message = format!("[body.{}] damage: {message}", body.name);
-        Err(plan.source.error(body.span.clone(), message))
+        Err(problem.source.error(body.span.clone(), message))
     };
-    let meets = |other: &Body| plan.interface.between(body, other) != InterfaceRule::None;
-    let of_other_kind = plan.bodies.iter().find(|other| {
+    let meets = |other: &Body| problem.interface.between(body, other) != InterfaceRule::None;
+    let of_other_kind = problem.bodies.iter().find(|other| {
         let differs = |damage| breaks_by_work(other, damage) != by_work;
         other.damage.as_ref().is_some_and(differs) && meets(other)
     });
@@ -98,7 +101,7 @@ fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
         ));
     }
     if damage.rule.is_unmeasured() {
-        let message = "what opening the body costs has not been measured: take the plan that `survey::calibrated` returns";
+        let message = "what opening the body costs has not been measured: take the problem that `survey::calibrated` returns";
         return error(message.to_owned());
     }
     let by_energy = damage.rule != DamageRule::CriticalStretch;
@@ -109,8 +112,8 @@ fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
         return Ok(());
     }
     let block = Block::unrefined(body);
-    let influenced = build(plan, body, constants(plan, &block, &block)).influence;
-    if influenced.is_some() && plan.volume_correction != VolumeCorrection::None {
+    let influenced = build(problem, body, constants(problem, &block, &block)).influence;
+    if influenced.is_some() && problem.volume_correction != VolumeCorrection::None {
         return error(
             "bonds with an influence that is not constant break by their energy only with \
              `[grid] volume_correction = \"none\"`"
@@ -121,11 +124,12 @@ fn damage_is_possible(plan: &Plan, body: &Body) -> Result<()> {
 }
 
 /// What the law of a body is made from.
-fn given<'a>(plan: &Plan, body: &'a Body, constants: Constants) -> Given<'a> {
-    // A critical stretch that the plan gives itself holds for all bonds.
-    let itself = |damage: &plan::Damage| matches!(damage.toughness, Toughness::CriticalStretch(_));
+fn given<'a>(problem: &Problem, body: &'a Body, constants: Constants) -> Given<'a> {
+    // A critical stretch that the problem gives itself holds for all bonds.
+    let itself =
+        |damage: &problem::Damage| matches!(damage.toughness, Toughness::CriticalStretch(_));
     Given {
-        dimension: plan.dimension,
+        dimension: problem.dimension,
         elastic: constants.elastic,
         horizon: constants.horizon,
         values: &body.material.law.values,
@@ -134,32 +138,32 @@ fn given<'a>(plan: &Plan, body: &'a Body, constants: Constants) -> Given<'a> {
 }
 
 /// The law of a body with these constants.
-fn build(plan: &Plan, body: &Body, constants: Constants) -> Built {
-    (body.material.law.declaration.build)(&given(plan, body, constants))
+fn build(problem: &Problem, body: &Body, constants: Constants) -> Built {
+    (body.material.law.declaration.build)(&given(problem, body, constants))
 }
 
 /// The share of a block's cells in the families of a horizon.
-fn cell_share(plan: &Plan, neighbours: &Block, horizon: f64) -> CellShare {
+fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
     // Only cells with equal edges are corrected.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
     CellShare::new(
-        plan.volume_correction,
+        problem.volume_correction,
         horizon,
         edge,
-        plan.dimension.count(),
+        problem.dimension.count(),
     )
 }
 
 /// The longest bond (m) of each pair of blocks, row by row.
-pub fn cutoffs(plan: &Plan) -> Vec<f64> {
+pub fn cutoffs(problem: &Problem) -> Vec<f64> {
     let reach = |here: &Block, there: &Block| {
-        if plan.interface.between(here.body, there.body) == InterfaceRule::None {
+        if problem.interface.between(here.body, there.body) == InterfaceRule::None {
             return 0.0;
         }
-        let horizon = constants(plan, here, there).horizon;
-        cell_share(plan, there, horizon).cutoff()
+        let horizon = constants(problem, here, there).horizon;
+        cell_share(problem, there, horizon).cutoff()
     };
-    let blocks: Vec<Block> = plan.blocks().collect();
+    let blocks: Vec<Block> = problem.blocks().collect();
     let pairs = blocks
         .iter()
         .flat_map(|here| blocks.iter().map(move |there| (here, there)));
@@ -169,19 +173,19 @@ pub fn cutoffs(plan: &Plan) -> Vec<f64> {
 }
 
 /// What the points of a block follow.
-pub fn block_laws(plan: &Plan, block: &Block) -> BlockLaws {
-    let constants = constants(plan, block, block);
+pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
+    let constants = constants(problem, block, block);
     BlockLaws {
-        law: build(plan, block.body, constants).law,
-        damage: damage(plan, block.body, constants),
+        law: build(problem, block.body, constants).law,
+        damage: damage(problem, block.body, constants),
     }
 }
 
 /// The damage law of a block.
-fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
+fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<DamageLaw> {
     let damage = body.damage.as_ref()?;
-    let (dimension, elastic) = (plan.dimension, constants.elastic);
-    let given = given(plan, body, constants);
+    let (dimension, elastic) = (problem.dimension, constants.elastic);
+    let given = given(problem, body, constants);
     let of_law = body.material.law.declaration.critical_stretch;
     let stretch = |energy: f64| match of_law {
         Some(stretch) => stretch(&given, energy),
@@ -221,7 +225,7 @@ fn damage(plan: &Plan, body: &Body, constants: Constants) -> Option<DamageLaw> {
 /// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
 /// without damage has none. `horizons` (m) are those of the ends of the bonds.
 fn criterion(
-    plan: &Plan,
+    problem: &Problem,
     blocks: &[BlockLaws],
     ends: [usize; 2],
     horizons: [f64; 2],
@@ -237,8 +241,8 @@ fn criterion(
         DamageLaw::CriticalStretch(_) => None,
     };
     let rules = laws.into_iter().flatten().filter_map(rule);
-    let work = |horizon: f64| BondEnergy::from_energy(plan.dimension, 1.0, horizon);
-    let of_block = ends.map(|block| work(plan.block(block).horizon));
+    let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
+    let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
     match (rules.reduce(WorkRule::of_both), per_point) {
         (Some(rule), true) => Criterion::WorkThresholds(ratios, rule),
@@ -260,7 +264,7 @@ fn criterion(
 /// # Errors
 /// When there is not enough memory for the weights.
 pub fn assign<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     model: &Model<D>,
     blocks: &[BlockLaws],
     all: Vec<BlockBonds>,
@@ -270,25 +274,25 @@ pub fn assign<const D: usize>(
         .any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
     let give = |mut bonds: BlockBonds| {
         let indices = bonds.blocks();
-        let [here, there] = indices.map(|block| plan.block(block));
+        let [here, there] = indices.map(|block| problem.block(block));
         let ends = [(here, there), (there, here)].map(|(block, other)| {
-            let constants = constants(plan, &block, &other);
+            let constants = constants(problem, &block, &other);
             let horizon = constants.horizon;
             End {
-                built: build(plan, block.body, constants),
+                built: build(problem, block.body, constants),
                 horizon,
-                share: cell_share(plan, &other, horizon),
+                share: cell_share(problem, &other, horizon),
             }
         });
-        weigh(plan, model, &mut bonds, &ends)?;
+        weigh(problem, model, &mut bonds, &ends)?;
         let horizons = ends.each_ref().map(|end| end.horizon);
-        let criterion = criterion(plan, blocks, indices, horizons, per_point);
+        let criterion = criterion(problem, blocks, indices, horizons, per_point);
         let [own, far] = ends.map(|end| end.built.law);
         Ok(Interaction {
             bonds,
             laws: PairLaw::new(own, far),
             criterion,
-            influence: plan.volume_correction == VolumeCorrection::None,
+            influence: problem.volume_correction == VolumeCorrection::None,
         })
     };
     all.into_iter().map(give).collect()
@@ -316,12 +320,12 @@ impl End {
 
 /// Sets the weights of the bonds between two blocks, unless they are all 1.
 fn weigh<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     model: &Model<D>,
     bonds: &mut BlockBonds,
     ends: &[End; 2],
 ) -> std::result::Result<(), Fault> {
-    let plain = plan.volume_correction == VolumeCorrection::None
+    let plain = problem.volume_correction == VolumeCorrection::None
         && ends[0].horizon == ends[1].horizon
         && ends.iter().all(|end| end.built.influence.is_none());
     if plain {

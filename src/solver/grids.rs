@@ -4,12 +4,12 @@
 use rayon::prelude::*;
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::plan::{FamilyRule, Kind, Plan, PointSource, Quadrature};
 use crate::error::Result;
 use crate::families::GridFrame;
 use crate::partition::Domain;
 use crate::points::Point;
 use crate::points::bins::Bins;
+use crate::problem::{FamilyRule, Kind, PointSource, Problem, Quadrature};
 
 /// The share of a cell's edge by which a point may be off its place, and two grids apart.
 const ON_GRID: f64 = 1e-6;
@@ -32,22 +32,22 @@ struct Cells {
 /// # Errors
 /// When the deck wants lattices and the points of a file do not lie on a grid; the same on all ranks.
 pub fn grids(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     domain: &Domain,
     longest: f64,
 ) -> Result<Vec<GridFrame>> {
     let mut grids: Vec<GridFrame> = Vec::new();
-    if plan.family == FamilyRule::List || plan.quadrature == Quadrature::Gauss {
+    if problem.family == FamilyRule::List || problem.quadrature == Quadrature::Gauss {
         return Ok(grids);
     }
-    let dimension = plan.dimension.count();
-    for (index, body) in plan.bodies.iter().enumerate() {
+    let dimension = problem.dimension.count();
+    for (index, body) in problem.bodies.iter().enumerate() {
         let found = match body.points {
             PointSource::Lattice {
                 spacing, origin, ..
             } => Some(described(origin, spacing, dimension)),
-            PointSource::File { .. } => detected(plan, comm, domain, index, longest),
+            PointSource::File { .. } => detected(problem, comm, domain, index, longest),
         };
         let Some(Cells { centre, edges }) = found else {
             let message = format!(
@@ -55,27 +55,32 @@ pub fn grids(
                  `family = \"lattice\"` wants; take \"auto\" or \"list\"",
                 body.name
             );
-            let wanted = plan.family == FamilyRule::Lattice;
-            let error = || plan.source.error(body.span.clone(), message);
+            let wanted = problem.family == FamilyRule::Lattice;
+            let error = || problem.source.error(body.span.clone(), message);
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };
         // Those of the levels lie with one point on a centre.
         let is_shape = matches!(body.points, PointSource::Lattice { .. });
-        let refinement = plan.refinement.as_ref().filter(|_| is_shape);
+        let refinement = problem.refinement.as_ref().filter(|_| is_shape);
         for level in 0..=refinement.map_or(0, |refinement| refinement.levels) {
             let edges = edges.map(|edge| edge * 0.5_f64.powi(level as i32));
-            let block = plan.block_number(index, level, Kind::Whole);
-            add(&mut grids, Cells { centre, edges }, block, plan);
+            let block = problem.block_number(index, level, Kind::Whole);
+            add(&mut grids, Cells { centre, edges }, block, problem);
         }
     }
     Ok(grids)
 }
 
 /// Notes that the points of a block lie on a grid.
-fn add(grids: &mut Vec<GridFrame>, Cells { centre, edges }: Cells, block: usize, plan: &Plan) {
+fn add(
+    grids: &mut Vec<GridFrame>,
+    Cells { centre, edges }: Cells,
+    block: usize,
+    problem: &Problem,
+) {
     let coincides = |frame: &&mut GridFrame| {
-        (0..plan.dimension.count()).all(|k| {
+        (0..problem.dimension.count()).all(|k| {
             let steps = (centre[k] - frame.origin[k]) / edges[k];
             let same = (frame.spacing[k] / edges[k] - 1.0).abs() < 1e-12;
             same && (steps - steps.round()).abs() < ON_GRID
@@ -86,7 +91,7 @@ fn add(grids: &mut Vec<GridFrame>, Cells { centre, edges }: Cells, block: usize,
         None => grids.push(GridFrame {
             origin: centre,
             spacing: edges,
-            blocks: (0..plan.block_count())
+            blocks: (0..problem.block_count())
                 .map(|other| other == block)
                 .collect(),
         }),
@@ -105,13 +110,13 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
 /// The grid that the points of a body lie on, if they all do, and if each has the volume of a cell;
 /// collective.
 fn detected(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     domain: &Domain,
     body: usize,
     longest: f64,
 ) -> Option<Cells> {
-    let dimension = plan.dimension.count();
+    let dimension = problem.dimension.count();
     let points = || {
         let owned = &domain.points[..domain.owned];
         owned.iter().filter(|point| point.block as usize == body)
@@ -140,7 +145,8 @@ fn detected(
             longest
         };
     }
-    let cell: f64 = edges[..dimension].iter().product::<f64>() * plan.dimension.section();
+    let cell: f64 =
+        edges[..dimension].iter().product::<f64>() * problem.dimension.out_of_plane_measure();
     let layers = (0..dimension).any(|k| smallest[6 + k] == f64::MAX);
     let [volume, largest] = [smallest[9], -smallest[10]];
     let fits = volume == largest && (layers || (volume / cell - 1.0).abs() < VOLUME);

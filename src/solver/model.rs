@@ -1,16 +1,16 @@
 //! What does not change during a run: the points and their constants.
 
-use crate::deck::plan::Plan;
 use crate::partition::Domain;
+use crate::problem::Problem;
 
-use super::repeated::Repeated;
+use super::palette_column::PaletteColumn;
 
 /// The local points by component, and the constants of the blocks.
 pub struct Model<const D: usize> {
     /// Reference positions by component, m; owned points, then ghosts.
     pub reference: [Vec<f64>; D],
     /// Volumes, m³; owned points, then ghosts.
-    pub volume: Repeated,
+    pub volume: PaletteColumn,
     /// Block of each owned point.
     pub block: Vec<u16>,
     /// Global ids; owned points, then ghosts.
@@ -29,7 +29,7 @@ pub struct Model<const D: usize> {
 
 impl<const D: usize> Model<D> {
     /// From a distributed cloud, with so many points of level 0 over all ranks.
-    pub fn new(plan: &Plan, domain: &Domain, coarsest: u64) -> Self {
+    pub fn new(problem: &Problem, domain: &Domain, coarsest: u64) -> Self {
         let owned = &domain.points[..domain.owned];
         Self {
             reference: std::array::from_fn(|d| {
@@ -39,14 +39,14 @@ impl<const D: usize> Model<D> {
                     .map(|point| point.position[d])
                     .collect()
             }),
-            volume: Repeated::new(domain.points.iter().map(|point| point.volume).collect()),
+            volume: PaletteColumn::new(domain.points.iter().map(|point| point.volume).collect()),
             block: owned.iter().map(|point| point.block as u16).collect(),
             ids: domain.points.iter().map(|point| point.id).collect(),
-            density: plan
+            density: problem
                 .blocks()
                 .map(|block| block.body.material.density)
                 .collect(),
-            damping: plan
+            damping: problem
                 .blocks()
                 .map(|block| block.body.material.damping)
                 .collect(),
@@ -60,7 +60,7 @@ impl<const D: usize> Model<D> {
     pub fn empty() -> Self {
         Self {
             reference: std::array::from_fn(|_| Vec::new()),
-            volume: Repeated::new(Vec::new()),
+            volume: PaletteColumn::new(Vec::new()),
             block: Vec::new(),
             ids: Vec::new(),
             density: Vec::new(),

@@ -6,10 +6,10 @@
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, IdOrder, all_gather};
-use crate::deck::plan::Balance;
 use crate::error::Result;
 use crate::partition::Cost;
 use crate::points::Point;
+use crate::problem::Balance;
 
 use super::Simulation;
 use super::model::Model;
@@ -36,7 +36,7 @@ impl BalanceWatch {
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         // One rank is always balanced.
         let rule = simulation
-            .plan
+            .problem
             .balance
             .filter(|_| simulation.comm.size() > 1);
         Self {
@@ -122,7 +122,7 @@ impl<const D: usize> Simulation<'_, D> {
         let cost = Cost::of(time, pieces.len());
         self.release();
         let mut other = Self::of_points(
-            self.plan,
+            self.problem,
             self.comm,
             (pieces, self.grids.clone()),
             Some(cost),

@@ -1,18 +1,18 @@
-//! A run: from the plan to points in motion, step by step.
+//! A run: from the problem to points in motion, step by step.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::plan::{Action, Condition, Initial, Method, Plan, Stage, Time};
 use crate::error::{Error, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
+use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
-use super::bonds::{Acting, Evolution, ForceTimes, Forces, history_fits};
+use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
 use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
 use super::grids::grids;
 use super::model::Model;
@@ -22,8 +22,8 @@ use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
+use super::palette_column::PaletteColumn;
 use super::refinement::{self, Refined};
-use super::repeated::Repeated;
 use super::size;
 use super::steps::choose_steps;
 
@@ -34,7 +34,7 @@ const SLACK: f64 = 1e-5;
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
     /// The validated deck.
-    pub plan: &'a Plan,
+    pub problem: &'a Problem,
     /// The other ranks.
     pub comm: &'a dyn Communicator,
     /// The points.
@@ -54,7 +54,7 @@ pub struct Simulation<'a, const D: usize> {
     /// First step (s) of each stage, and the number of its steps if no bond breaks.
     pub(super) steps: Vec<(f64, f64)>,
     /// Volume of each owned point's whole family, broken bonds included, m³.
-    pub family_volume: Repeated,
+    pub family_volume: PaletteColumn,
     /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
     pub cut: Vec<u64>,
     /// Bonds of the owned points that were intact before any could break, counted from their ends here;
@@ -113,8 +113,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// # Errors
     /// When the points cannot be made, a set that is acted on is empty, or no stable step exists; the
     /// same on all ranks.
-    pub fn new(plan: &'a Plan, comm: &'a dyn Communicator) -> Result<Self> {
-        Self::set_up(plan, comm, &mut || Ok(()))
+    pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
+        Self::set_up(problem, comm, &mut || Ok(()))
     }
 
     /// As [`Self::new`], with a look at `between` after each stage: an error of its ends the set-up. It
@@ -123,21 +123,21 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// # Errors
     /// As [`Self::new`], and those of `between`.
     pub fn set_up(
-        plan: &'a Plan,
+        problem: &'a Problem,
         comm: &'a dyn Communicator,
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
         let start = Instant::now();
-        laws_are_possible(plan)?;
-        refinement::is_possible(plan)?;
-        let cutoffs = cutoffs(plan);
-        size::is_feasible(plan, &cutoffs, comm.size())?;
-        let (coarse, coarsest) = points::generate(plan, comm)?;
-        let mut refined = Grids::new(plan, coarsest)?;
+        laws_are_possible(problem)?;
+        refinement::is_possible(problem)?;
+        let cutoffs = cutoffs(problem);
+        size::is_feasible(problem, &cutoffs, comm.size())?;
+        let (coarse, coarsest) = points::generate(problem, comm)?;
+        let mut refined = Grids::new(problem, coarsest)?;
         refined.refine_regions(comm, &coarse)?;
         let pieces = refined.points(coarse);
         between()?;
-        let mut simulation = Self::of_points(plan, comm, (pieces, refined), None, between)?;
+        let mut simulation = Self::of_points(problem, comm, (pieces, refined), None, between)?;
         simulation.begin();
         simulation.can_bond_new_points()?;
         simulation.times.set_up = start.elapsed();
@@ -147,49 +147,49 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Distributes and bonds the points of grids; forces are not evaluated yet. `cost` is what this rank's
     /// points cost, if that is known; see [`Self::set_up`].
     pub(super) fn of_points(
-        plan: &'a Plan,
+        problem: &'a Problem,
         comm: &'a dyn Communicator,
         (pieces, refined): (Vec<Point>, Grids<'a>),
         cost: Option<Cost>,
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
-        let cutoffs = cutoffs(plan);
+        let cutoffs = cutoffs(problem);
         let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
         // Bonds at the limit must find their ghosts however their length is rounded.
         let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
         between()?;
-        let frames = grids(plan, comm, &domain, longest)?;
+        let frames = grids(problem, comm, &domain, longest)?;
         families::arrange(&mut domain, &frames);
-        let (blocks, dimension) = (plan.block_count(), plan.dimension.count());
+        let (blocks, dimension) = (problem.block_count(), problem.dimension.count());
         let found = families::find(&domain, &frames, blocks, &cutoffs, dimension)
-            .map_err(|fault| fault.error(plan));
+            .map_err(|fault| fault.error(problem));
         let (bonds, grids) = agree(comm, found)?;
         between()?;
-        let model = Model::new(plan, &domain, refined.coarsest());
-        let blocks = plan.blocks();
-        let blocks: Vec<_> = blocks.map(|block| block_laws(plan, &block)).collect();
+        let model = Model::new(problem, &domain, refined.coarsest());
+        let blocks = problem.blocks();
+        let blocks: Vec<_> = blocks.map(|block| block_laws(problem, &block)).collect();
         let halo = std::mem::take(&mut domain.halo);
         // The points are known to the model from here on.
         drop(domain);
-        let interactions = assign(plan, &model, &blocks, bonds)
+        let interactions = assign(problem, &model, &blocks, bonds)
             .and_then(|all| history_fits::<D>(&all).map(|()| all))
-            .map_err(|fault| fault.error(plan));
+            .map_err(|fault| fault.error(problem));
         let interactions = agree(comm, interactions)?;
         let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
         between()?;
-        let family_volume = Repeated::new(forces.intact_families(&model).volume);
-        let cut = pre_crack(plan, &model, &mut forces);
+        let family_volume = PaletteColumn::new(forces.intact_families(&model).volume);
+        let cut = pre_crack(problem, &model, &mut forces);
         forces.find_constants(comm, &model);
         let stiffness = forces.stiffness(&model);
         let stable = stable_step(comm, &model, &stiffness);
-        let stages = plan.all_stages();
-        let steps = choose_steps(plan, stable)?;
+        let stages = problem.all_stages();
+        let steps = choose_steps(problem, stable)?;
         let clock = Clock::new(steps[0].0, stages[0].time.end);
-        protect(plan, &model, comm, &mut forces);
+        protect(problem, &model, comm, &mut forces);
 
         let each = stages.iter().map(|stage| &stage.acting);
-        let each = each.map(|acting| Conditions::new(plan, comm, (&model, &refined), acting));
+        let each = each.map(|acting| Conditions::new(problem, comm, (&model, &refined), acting));
         let mut waiting = each
             .map(|conditions| conditions.map(Some))
             .collect::<Result<Vec<_>>>()?;
@@ -198,24 +198,24 @@ impl<'a, const D: usize> Simulation<'a, D> {
             loads: all().any(Conditions::have_loads),
             supports: all().any(Conditions::have_supports),
             damping: model.damping.iter().any(|rate| *rate > 0.0),
-            relaxation: plan.relaxes(),
-            damage: plan.bodies.iter().any(|body| body.damage.is_some()),
-            plasticity: forces.flow(),
-            coarsening: refinement::may_coarsen(plan),
+            relaxation: problem.relaxes(),
+            damage: problem.bodies.iter().any(|body| body.damage.is_some()),
+            plasticity: forces.has_plasticity(),
+            coarsening: refinement::may_coarsen(problem),
         };
         let mut fields = Fields::new(&model, needs);
         if let Some(density) = &mut fields.fictitious_density {
             *density = fictitious_density(&stiffness);
         }
-        apply_initials(plan, comm, &model, &mut fields)?;
-        are_finite(plan, comm, &model, 0.0)?;
-        let intact_at_start = starts_deformed(plan).then(|| {
+        apply_initials(problem, comm, &model, &mut fields)?;
+        are_finite(problem, comm, &model, 0.0)?;
+        let intact_at_start = starts_deformed(problem).then(|| {
             let mut intact = 0;
             forces.for_each_intact(|_, _| intact += 1);
             intact
         });
         let mut simulation = Self {
-            plan,
+            problem,
             comm,
             model,
             fields,
@@ -247,15 +247,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Places what is supported, and evaluates the forces at time 0. Collective.
     fn begin(&mut self) {
-        self.place(0.0, 0.0);
-        self.load(0.0, true);
+        self.apply_displacements(0.0, 0.0);
+        self.apply_loads(0.0, true);
         self.evaluate(match self.time_rule().method {
-            Method::Explicit => Evolution::Step(0.0),
+            Method::Explicit => BondUpdate::Step(0.0),
             // This is no equilibrium.
-            Method::Relaxation(_) => Evolution::None,
+            Method::Relaxation(_) => BondUpdate::None,
         });
-        self.guide();
-        self.find_damping();
+        self.apply_velocities();
+        self.update_damping_power();
         self.bad = self.first_bad(&self.clock);
         self.times = Times::default();
     }
@@ -326,17 +326,17 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 let finite = !was_halfway || second_half(part, &mut here, step);
                 here.before_moving(part);
                 verlet::half_kick_and_drift(part, step);
-                here.place(part);
+                here.apply_displacements(part);
                 finite
             };
-            part.show();
+            part.write_bond_inputs();
             finite
         });
         if !finite {
             self.note_bad(&before);
         }
         self.times.motion += start.elapsed();
-        self.evaluate_shown(Evolution::Step(step));
+        self.evaluate_shown(BondUpdate::Step(step));
     }
 
     /// Gets ready for the second half kick of the step that a clock has come to.
@@ -360,7 +360,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             ..
         } = self;
         let (all, on_parts) = conditions.by_part();
-        forces.with_shown(model.owned(), |shown| {
+        forces.with_bond_inputs(model.owned(), |shown| {
             walk(Part::all(model, fields, shown), on_parts, |part, on| {
                 work(part, Here::new(all, on))
             })
@@ -369,16 +369,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Internal forces at the present place; bonds break and remember, or nothing changes but forces.
     /// Collective.
-    pub fn evaluate(&mut self, evolution: Evolution) {
+    pub fn evaluate(&mut self, bond_update: BondUpdate) {
         self.walk(|part, _| {
-            part.show();
+            part.write_bond_inputs();
             true
         });
-        self.evaluate_shown(evolution);
+        self.evaluate_shown(bond_update);
     }
 
     /// As [`Self::evaluate`], after all parts of the points were [shown](Part::show).
-    fn evaluate_shown(&mut self, evolution: Evolution) {
+    fn evaluate_shown(&mut self, bond_update: BondUpdate) {
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -392,44 +392,44 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.evaluations += 1;
         let times = &mut self.times.forces;
         self.forces
-            .evaluate(self.comm, &self.model, acting, evolution, times);
-        if let Evolution::Step(step) = evolution {
+            .evaluate(self.comm, &self.model, acting, bond_update, times);
+        if let BondUpdate::Step(step) = bond_update {
             fields.book_broken(&self.model, self.forces.broken(), step);
         }
     }
 
     /// Puts supported points in their place at `time` (s). `step` is the step just made (s), or 0.
-    pub(super) fn place(&mut self, time: f64, step: f64) {
+    pub(super) fn apply_displacements(&mut self, time: f64, step: f64) {
         self.conditions.set_places(time, step);
         self.walk(|part, here| {
-            here.place(part);
+            here.apply_displacements(part);
             true
         });
     }
 
     /// Finds the external forces at `time` (s); those that do not change only where `all` are wanted.
-    pub(super) fn load(&mut self, time: f64, all: bool) {
+    pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
         self.conditions.set_loads(time, all);
         self.walk(|part, mut here| {
-            here.load(part);
+            here.apply_loads(part);
             true
         });
     }
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
-    pub(super) fn guide(&mut self) -> bool {
+    pub(super) fn apply_velocities(&mut self) -> bool {
         match self.time_rule().method {
             Method::Explicit => {
                 self.conditions
                     .set_guidance(self.clock.time(), self.clock.step());
-                self.walk(|part, here| here.guide(part))
+                self.walk(|part, here| here.apply_velocities(part))
             }
-            Method::Relaxation(_) => self.walk(|part, here| here.hold(part)),
+            Method::Relaxation(_) => self.walk(|part, here| here.project_residual(part)),
         }
     }
 
     /// Finds the power of damping at the present velocities.
-    pub(super) fn find_damping(&mut self) {
+    pub(super) fn update_damping_power(&mut self) {
         self.walk(|part, _| {
             part.add_damped_energy(0.0);
             true
@@ -437,9 +437,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// Finds from the state, after it has been put back, what is not part of it. Collective.
-    pub(super) fn find_anew(&mut self) {
-        self.load(self.clock.time(), true);
-        self.find_damping();
+    pub(super) fn recompute_derived(&mut self) {
+        self.apply_loads(self.clock.time(), true);
+        self.update_damping_power();
         self.evaluate(self.standing_evolution());
     }
 
@@ -489,7 +489,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if step == f64::MAX {
             return self.check_equilibrium();
         }
-        let valued = are_finite(self.plan, self.comm, &self.model, time);
+        let valued = are_finite(self.problem, self.comm, &self.model, time);
         valued.map_err(|error| Error::run(error.message))?;
         let own = self.bad.filter(|bad| bad.step as f64 == step);
         let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
@@ -498,7 +498,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             None => Ok(()),
             Some(bad) => {
                 let block = usize::from(self.model.block[bad.index]);
-                let body = self.plan.block(block).body;
+                let body = self.problem.block(block).body;
                 let position = self.model.position(bad.index);
                 Err(if bad.step == 0 {
                     let message = format!(
@@ -508,7 +508,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                         bad.id,
                         &position[..D],
                     );
-                    self.plan.source.error(body.span.clone(), message)
+                    self.problem.source.error(body.span.clone(), message)
                 } else {
                     Error::run(format!(
                         "step {} (t = {time:.6e} s): the motion of point {} of body `{}` is not \
@@ -530,36 +530,40 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
 /// The second half of a step (s), after forces are known at the new place. Returns whether all is finite.
 fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, step: f64) -> bool {
-    here.load(part);
+    here.apply_loads(part);
     let finite = verlet::second_half_kick(part, step);
-    let finite = here.guide(part) && finite;
+    let finite = here.apply_velocities(part) && finite;
     here.add_work(part, Work::Trapezoid);
     part.add_damped_energy(step);
     finite
 }
 
 /// Whether bonds may break in the place where the points begin.
-fn starts_deformed(plan: &Plan) -> bool {
+fn starts_deformed(problem: &Problem) -> bool {
     let displaced = |initial: &Initial| initial.displacement.is_some();
     let placed = |condition: &Condition| matches!(condition.action, Action::Displacement(_));
-    plan.bodies.iter().any(|body| body.damage.is_some())
-        && (plan.initials.iter().any(displaced) || plan.conditions.iter().any(placed))
+    problem.bodies.iter().any(|body| body.damage.is_some())
+        && (problem.initials.iter().any(displaced) || problem.conditions.iter().any(placed))
 }
 
 /// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id
 /// first.
-fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<D>) -> Vec<u64> {
-    if plan.cracks.is_empty() {
+fn pre_crack<const D: usize>(
+    problem: &Problem,
+    model: &Model<D>,
+    forces: &mut Forces<D>,
+) -> Vec<u64> {
+    if problem.cracks.is_empty() {
         return Vec::new();
     }
-    let longest = cutoffs(plan).into_iter().fold(0.0, f64::max) * (1.0 + SLACK);
+    let longest = cutoffs(problem).into_iter().fold(0.0, f64::max) * (1.0 + SLACK);
     let in_reach = |point: usize| {
         let position = model.position(point);
-        let mut cracks = plan.cracks.iter();
+        let mut cracks = problem.cracks.iter();
         cracks.any(|crack| points::crack::is_in_reach(&crack.surface, position, longest))
     };
     let in_reach: Vec<bool> = (0..model.owned()).map(in_reach).collect();
-    let counts = vec![Cell::new(0); plan.cracks.len()];
+    let counts = vec![Cell::new(0); problem.cracks.len()];
     let crosses = |here, there| {
         let (first, second) = if model.ids[here] < model.ids[there] {
             (here, there)
@@ -568,7 +572,7 @@ fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<
         };
         let [from, to] = [first, second].map(|point| model.position(point));
         let mut cut = false;
-        for (crack, count) in plan.cracks.iter().zip(&counts) {
+        for (crack, count) in problem.cracks.iter().zip(&counts) {
             if points::crack::crosses(&crack.surface, from, to) {
                 count.set(count.get() + 1);
                 cut = true;
@@ -582,12 +586,15 @@ fn pre_crack<const D: usize>(plan: &Plan, model: &Model<D>, forces: &mut Forces<
 
 /// Makes the bonds of no-failure zones unbreakable.
 fn protect<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     model: &Model<D>,
     comm: &dyn Communicator,
     forces: &mut Forces<D>,
 ) {
-    let laws = plan.bodies.iter().filter_map(|body| body.damage.as_ref());
+    let laws = problem
+        .bodies
+        .iter()
+        .filter_map(|body| body.damage.as_ref());
     let mut sets: Vec<usize> = laws
         .flat_map(|law| law.no_failure.iter().copied())
         .collect();
@@ -598,9 +605,9 @@ fn protect<const D: usize>(
     }
     let mut protected = vec![0.0; model.volume.len()];
     for set in sets {
-        for point in members(plan, model, set) {
+        for point in members(problem, model, set) {
             let block = usize::from(model.block[point as usize]);
-            let body = plan.block(block).body;
+            let body = problem.block(block).body;
             if body
                 .damage
                 .as_ref()

@@ -1,34 +1,38 @@
-//! Whether a run is small enough to be made, found from the plan before its points are.
+//! Whether a run is small enough to be made, found from the problem before its points are.
 
-use crate::deck::plan::{Plan, PointSource};
 use crate::error::Result;
 use crate::families::{Fault, MOST_NEIGHBOURS, most_neighbours};
 use crate::points::{lattice, shape};
+use crate::problem::{PointSource, Problem};
 
 /// An error if a point would have too many neighbours or a rank too many points, as far as the shapes
-/// of the plan show it; `cutoffs` has the longest bond (m) of each pair of blocks, row by row.
+/// of the problem show it; `cutoffs` has the longest bond (m) of each pair of blocks, row by row.
 ///
 /// # Errors
 /// Names the horizon or the body; the same on all ranks.
-pub fn is_feasible(plan: &Plan, cutoffs: &[f64], ranks: usize) -> Result<()> {
-    let blocks = plan.block_count();
-    (0..plan.bodies.len()).try_for_each(|body| lattice::is_feasible(plan, body, ranks))?;
+pub fn is_feasible(problem: &Problem, cutoffs: &[f64], ranks: usize) -> Result<()> {
+    let blocks = problem.block_count();
+    (0..problem.bodies.len()).try_for_each(|body| lattice::is_feasible(problem, body, ranks))?;
     // First each block alone: its body is the one to name.
     let alone = (0..blocks).map(|block| [block, block]);
     let pairs = (0..blocks * blocks).map(|pair| [pair / blocks, pair % blocks]);
     for [here, there] in alone.chain(pairs) {
-        not_too_many_neighbours(plan, [here, there], cutoffs[here * blocks + there])?;
+        not_too_many_neighbours(problem, [here, there], cutoffs[here * blocks + there])?;
     }
     Ok(())
 }
 
-fn not_too_many_neighbours(plan: &Plan, [here, there]: [usize; 2], cutoff: f64) -> Result<()> {
-    let [near, far] = [here, there].map(|block| plan.block(block));
+fn not_too_many_neighbours(
+    problem: &Problem,
+    [here, there]: [usize; 2],
+    cutoff: f64,
+) -> Result<()> {
+    let [near, far] = [here, there].map(|block| problem.block(block));
     let (PointSource::Lattice { shape, .. }, Some(spacing)) = (&far.body.points, far.spacing())
     else {
         return Ok(());
     };
-    let dimension = plan.dimension.count();
+    let dimension = problem.dimension.count();
     let (lower, upper) = shape::bounds(shape);
     if let PointSource::Lattice { shape: own, .. } = &near.body.points {
         let (own_lower, own_upper) = shape::bounds(own);
@@ -39,7 +43,7 @@ fn not_too_many_neighbours(plan: &Plan, [here, there]: [usize; 2], cutoff: f64) 
     }
     let cells =
         std::array::from_fn(|k| ((upper[k] - lower[k]) / spacing[k] - 1e-9).ceil().max(1.0));
-    let points = f64::from(plan.quadrature.points(dimension));
+    let points = f64::from(problem.quadrature.points(dimension));
     let neighbours = points * most_neighbours(spacing, cutoff, cells, dimension);
     if neighbours <= MOST_NEIGHBOURS {
         return Ok(());
@@ -49,5 +53,5 @@ fn not_too_many_neighbours(plan: &Plan, [here, there]: [usize; 2], cutoff: f64) 
         neighbours: Some(neighbours),
         spacings: Some(cutoff / spacing[0]),
     };
-    Err(fault.error(plan))
+    Err(fault.error(problem))
 }

@@ -28,7 +28,7 @@ impl<const D: usize> Simulation<'_, D> {
     pub fn expected_clock(&self) -> Clock {
         match &self.stages[..] {
             [stage] if stage.time.adaptive.is_none() => self.clock,
-            _ => even_clock(self.plan, &self.steps),
+            _ => even_clock(self.problem, &self.steps),
         }
     }
 
@@ -56,8 +56,8 @@ impl<const D: usize> Simulation<'_, D> {
         let components = forces.into_iter().flatten().flatten();
         components.for_each(|component| component.fill(0.0));
         let clock = self.clock;
-        self.load(clock.time(), true);
-        let mut finite = self.guide();
+        self.apply_loads(clock.time(), true);
+        let mut finite = self.apply_velocities();
         let factor = self.time_rule().density_scale / scale;
         if factor != 1.0 && !relaxed && !self.relaxes() {
             finite &= self.keep_momentum(factor);
@@ -78,8 +78,8 @@ impl<const D: usize> Simulation<'_, D> {
         components
             .flatten()
             .for_each(|velocity| *velocity /= factor);
-        let finite = self.guide();
-        self.find_damping();
+        let finite = self.apply_velocities();
+        self.update_damping_power();
         self.density_scale_energy += self.kinetic_energy() - before;
         finite
     }
@@ -119,7 +119,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// Gives the blocks the density that they have in the present stage.
     pub(super) fn scale_density(&mut self) {
         let scale = self.time_rule().density_scale;
-        for (density, block) in self.model.density.iter_mut().zip(self.plan.blocks()) {
+        for (density, block) in self.model.density.iter_mut().zip(self.problem.blocks()) {
             *density = scale * block.body.material.density;
         }
     }

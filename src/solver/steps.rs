@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use crate::deck::plan::{Adaptive, Method, Plan, Stage, StepRule, Time};
-use crate::deck::shown;
 use crate::error::Result;
+use crate::message::format_number;
+use crate::problem::{Adaptive, Method, Problem, Stage, StepRule, Time};
 
 use super::motion::Clock;
 use super::motion::clock::steps_to;
@@ -17,49 +17,49 @@ const MOST_STEPS: f64 = 1e15;
 ///
 /// # Errors
 /// When there is no stable step, or there are more steps than can be counted.
-pub fn choose_steps(plan: &Plan, stable: f64) -> Result<Vec<(f64, f64)>> {
+pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     let mut start = 0.0;
     let choose = |stage: Stage| {
         let (time, length) = (stage.time, stage.time.end - start);
         start = time.end;
-        choose_step(plan, &time, length, stable)
+        choose_step(problem, &time, length, stable)
     };
-    plan.all_stages().into_iter().map(choose).collect()
+    problem.all_stages().into_iter().map(choose).collect()
 }
 
 /// A clock with equal steps that makes as many steps as all stages together, of which `steps` has the first step (s)
 /// and the number of steps.
-pub fn even_clock(plan: &Plan, steps: &[(f64, f64)]) -> Clock {
+pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
     let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
-    Clock::new(plan.time.end / all, plan.time.end)
+    Clock::new(problem.time.end / all, problem.time.end)
 }
 
 /// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks.
-fn choose_step(plan: &Plan, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
+fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     let (step, steps) = match (time.method, time.step) {
         (Method::Relaxation(rule), _) => {
             let steps = rule.load_steps as f64;
             (length / steps, steps)
         }
         (Method::Explicit, StepRule::Fixed(step)) => {
-            follows_damping(plan, "step", &plan.places.step, step)?;
+            follows_damping(problem, "step", &problem.places.step, step)?;
             (step, steps_to(length, step))
         }
         (Method::Explicit, StepRule::Automatic(_)) if stable.is_infinite() => {
-            return Err(plan.source.error(
-                plan.places.horizon.clone(),
+            return Err(problem.source.error(
+                problem.places.horizon.clone(),
                 "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
                  in m and larger than the distance of the points?",
             ));
         }
         (Method::Explicit, StepRule::Automatic(safety)) => {
-            let steps = (length / automatic_step(plan, time, safety, stable)).ceil();
+            let steps = (length / automatic_step(problem, time, safety, stable)).ceil();
             (length / steps, steps)
         }
     };
     let (step, steps) = match (time.method, &time.adaptive) {
         (Method::Explicit, Some(rule)) => {
-            adapts_in_time(plan, rule, length, step)?;
+            adapts_in_time(problem, rule, length, step)?;
             adapted(rule, (step, steps), length)
         }
         _ => (step, steps),
@@ -67,9 +67,9 @@ fn choose_step(plan: &Plan, time: &Time, length: f64, stable: f64) -> Result<(f6
     if steps > MOST_STEPS {
         let message = format!(
             "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",
-            shown(length)
+            format_number(length)
         );
-        return Err(plan.source.error(plan.places.step.clone(), message));
+        return Err(problem.source.error(problem.places.step.clone(), message));
     }
     Ok((step, steps))
 }
@@ -79,13 +79,17 @@ const MOST_REPEATS: f64 = 100.0;
 
 /// An error if a step of a stage of some length (s), for which `step` (s) was chosen, may be repeated without end, or
 /// become so small that the stage has no end.
-fn adapts_in_time(plan: &Plan, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
+fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
-    let error = |message: String| Err(plan.source.error(plan.places.adaptive.clone(), message));
+    let error = |message: String| {
+        Err(problem
+            .source
+            .error(problem.places.adaptive.clone(), message))
+    };
     if length / smallest > MOST_STEPS {
         return error(format!(
             "[time] adaptive smallest: {} s take {:.1e} steps of {smallest:.1e} s, {MOST_STEPS:.0e} at most",
-            shown(length),
+            format_number(length),
             length / smallest,
         ));
     }
@@ -95,10 +99,15 @@ fn adapts_in_time(plan: &Plan, rule: &Adaptive, length: f64, step: f64) -> Resul
         return error(format!(
             "[time] adaptive reduce: with {} a step may be repeated {repeats:.0} times until {largest:.3e} s become \
              `smallest`, {smallest:.3e} s; {MOST_REPEATS} at most: take a smaller `reduce` or a larger `smallest`",
-            shown(rule.reduce),
+            format_number(rule.reduce),
         ));
     }
-    follows_damping(plan, "adaptive largest", &plan.places.adaptive, largest)
+    follows_damping(
+        problem,
+        "adaptive largest",
+        &problem.places.adaptive,
+        largest,
+    )
 }
 
 /// The largest r Δt of an automatic step, with viscous damping at a rate r: the error of the energy balance is up to
@@ -109,31 +118,31 @@ const DAMPED: f64 = 0.5;
 const SIGN_CHANGES: f64 = 2.0;
 
 /// The largest rate of viscous damping of a body, 1/s.
-fn damping(plan: &Plan) -> f64 {
-    let rates = plan.bodies.iter().map(|body| body.material.damping);
+fn damping(problem: &Problem) -> f64 {
+    let rates = problem.bodies.iter().map(|body| body.material.damping);
     rates.fold(0.0, f64::max)
 }
 
 /// The longest step (s) that `safety` allows, with a stable step (s) for the density of the materials.
-pub fn automatic_step(plan: &Plan, time: &Time, safety: f64, stable: f64) -> f64 {
-    let damped = DAMPED / damping(plan);
+pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) -> f64 {
+    let damped = DAMPED / damping(problem);
     safety * (stable * time.density_scale.sqrt()).min(damped)
 }
 
 /// An error if steps of a key of [time] (s) are too long for viscous damping.
-fn follows_damping(plan: &Plan, key: &str, place: &Range<usize>, step: f64) -> Result<()> {
-    let rate = damping(plan);
+fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64) -> Result<()> {
+    let rate = damping(problem);
     if rate * step <= SIGN_CHANGES {
         return Ok(());
     }
     let message = format!(
         "[time] {key}: {} s is too long for the largest `damping`, {} 1/s: it must be at most {SIGN_CHANGES}/damping = \
          {:.3e} s, or velocities change their sign in each step",
-        shown(step),
-        shown(rate),
+        format_number(step),
+        format_number(rate),
         SIGN_CHANGES / rate,
     );
-    Err(plan.source.error(place.clone(), message))
+    Err(problem.source.error(place.clone(), message))
 }
 
 /// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks, under an adaptive

@@ -2,8 +2,8 @@
 
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
-use crate::deck::plan::{Plan, PointSource};
 use crate::points::{LatticeBody, distance_squared};
+use crate::problem::{PointSource, Problem};
 use crate::solver::Simulation;
 
 /// The share of a shape's volume by which that of its points may differ without a warning.
@@ -34,13 +34,13 @@ pub fn figures<const D: usize>(
     simulation: &Simulation<'_, D>,
     warnings: &mut Vec<String>,
 ) -> Vec<BodyFigures> {
-    let (plan, model) = (simulation.plan, &simulation.model);
+    let (problem, model) = (simulation.problem, &simulation.model);
     let nearest = nearest_neighbours(simulation);
-    let mut counts = vec![0; 2 * plan.bodies.len()];
+    let mut counts = vec![0; 2 * problem.bodies.len()];
     // Volume, its moments by direction, and the distance to the nearest neighbour.
-    let mut sums = vec![ExactSum::ZERO; 5 * plan.bodies.len()];
+    let mut sums = vec![ExactSum::ZERO; 5 * problem.bodies.len()];
     for point in 0..model.owned() {
-        let body = plan.body_of(usize::from(model.block[point]));
+        let body = problem.body_of(usize::from(model.block[point]));
         let (volume, position) = (model.volume[point], model.position(point));
         let sums = &mut sums[5 * body..];
         sums[0].add(volume);
@@ -53,34 +53,33 @@ pub fn figures<const D: usize>(
     }
     simulation.comm.sum(&mut counts);
     let sums = reduce(simulation.comm, &mut sums);
-    let bodies = plan.bodies.iter().zip(sums.chunks_exact(5)).enumerate();
+    let bodies = problem.bodies.iter().zip(sums.chunks_exact(5)).enumerate();
     let figures = bodies.map(|(index, (body, sums))| BodyFigures {
         points: counts[2 * index],
         volume: sums[0],
         mass: body.material.density * sums[0],
         centre: std::array::from_fn(|k| sums[1 + k] / sums[0]),
-        shape_volume: shape_volume(plan, index),
+        shape_volume: shape_volume(problem, index),
         spacing: sums[4] / (counts[2 * index + 1].max(1)) as f64,
     });
     let figures: Vec<BodyFigures> = figures.collect();
     for (index, body) in figures.iter().enumerate() {
-        warnings.extend(volume_doubt(plan, index, body));
+        warnings.extend(volume_doubt(problem, index, body));
     }
     figures
 }
 
-fn shape_volume(plan: &Plan, body: usize) -> Option<f64> {
-    let lattice = LatticeBody::new(plan, body).ok()??;
+fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
+    let lattice = LatticeBody::new(problem, body).ok()??;
     Some(lattice.shape_volume())
 }
 
 /// The distance (m) of each owned point to the nearest one that it is bonded to; of no point where no body
 /// has its points from a file.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
-    let (plan, model) = (simulation.plan, &simulation.model);
-    let from_file =
-        |body: &crate::deck::plan::Body| matches!(body.points, PointSource::File { .. });
-    if !plan.bodies.iter().any(from_file) {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let from_file = |body: &crate::problem::Body| matches!(body.points, PointSource::File { .. });
+    if !problem.bodies.iter().any(from_file) {
         return Vec::new();
     }
     let mut squares = vec![f64::INFINITY; model.owned()];
@@ -92,8 +91,8 @@ fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64
 }
 
 /// A warning if the points of a body do not fill it, or fill more.
-fn volume_doubt(plan: &Plan, index: usize, figures: &BodyFigures) -> Option<String> {
-    let body = &plan.bodies[index];
+fn volume_doubt(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<String> {
+    let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {
         let excess = figures.volume / volume - 1.0;
         if excess.abs() < VOLUME_SLACK {
@@ -107,7 +106,8 @@ fn volume_doubt(plan: &Plan, index: usize, figures: &BodyFigures) -> Option<Stri
             100.0 * excess.abs()
         )
     } else {
-        let cell = figures.spacing.powi(plan.dimension.count() as i32) * plan.dimension.section();
+        let cell = figures.spacing.powi(problem.dimension.count() as i32)
+            * problem.dimension.out_of_plane_measure();
         let mean = figures.volume / figures.points as f64;
         let ratio = mean / cell;
         if cell == 0.0 || (VOLUME_FACTOR.recip()..=VOLUME_FACTOR).contains(&ratio) {
@@ -123,5 +123,5 @@ fn volume_doubt(plan: &Plan, index: usize, figures: &BodyFigures) -> Option<Stri
         PointSource::Lattice { .. } => &body.span,
         PointSource::File { span, .. } => span,
     };
-    Some(plan.source.warning(place.clone(), message))
+    Some(problem.source.warning(place.clone(), message))
 }

@@ -2,38 +2,39 @@
 
 use std::borrow::Cow;
 
-use crate::deck::plan::{Calibration, DamageRule, Plan};
 use crate::error::Result;
+use crate::problem::{Calibration, DamageRule, Problem};
 
-use super::parting::parting_cost;
+use super::parting::separation_energy_ratio;
 
-/// The plan with what opening its bodies costs, where their damage is calibrated by it.
+/// The problem with what opening its bodies costs, where their damage is calibrated by it.
 ///
 /// # Errors
 /// When that of a body cannot be measured.
-pub fn calibrated(plan: &Plan) -> Result<Cow<'_, Plan>> {
-    let mut found = Cow::Borrowed(plan);
-    for (index, body) in plan.bodies.iter().enumerate() {
+pub fn calibrated(problem: &Problem) -> Result<Cow<'_, Problem>> {
+    let mut found = Cow::Borrowed(problem);
+    for (index, body) in problem.bodies.iter().enumerate() {
         let rule = body.damage.as_ref().map(|damage| damage.rule);
         if !rule.is_some_and(DamageRule::is_unmeasured) {
             continue;
         }
         set_cost(found.to_mut(), index, 1.0);
-        let Some(cost) = parting_cost(&found, index, 0.0).filter(|cost| *cost > 0.0) else {
+        let Some(cost) = separation_energy_ratio(&found, index, 0.0).filter(|cost| *cost > 0.0)
+        else {
             let message = format!(
                 "[body.{}] damage: what opening this body costs cannot be measured: `calibration = \"opening\"` is for \
                  bodies on a lattice with horizons of at most 3 spacings in space and 10 in the plane; take \"energy\"",
                 body.name
             );
-            return Err(plan.source.error(body.span.clone(), message));
+            return Err(problem.source.error(body.span.clone(), message));
         };
         set_cost(found.to_mut(), index, cost);
     }
     Ok(found)
 }
 
-fn set_cost(plan: &mut Plan, body: usize, cost: f64) {
-    let damage = plan.bodies[body].damage.as_mut();
+fn set_cost(problem: &mut Problem, body: usize, cost: f64) {
+    let damage = problem.bodies[body].damage.as_mut();
     if let Some(DamageRule::Energy { calibration, .. }) = damage.map(|damage| &mut damage.rule) {
         *calibration = Calibration::Opening(Some(cost));
     }

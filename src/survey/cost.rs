@@ -1,8 +1,8 @@
 //! What a run takes: memory and space on the disc.
 
 use super::Size;
-use crate::deck::plan::{Action, Block, Body, FamilyRule, Plan, PointSource, Quadrature};
 use crate::material::{Law, PlasticState};
+use crate::problem::{Action, Block, Body, FamilyRule, PointSource, Problem, Quadrature};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::motion::Clock;
@@ -60,7 +60,7 @@ pub struct Cost {
     pub checkpoint: f64,
 }
 
-/// Numbers of points and bonds that a cost is found from.
+/// LaneTuple of points and bonds that a cost is found from.
 #[derive(Debug, Clone, Copy)]
 struct Counts {
     points: f64,
@@ -71,7 +71,7 @@ struct Counts {
     bonds: f64,
     /// Columns of the history.
     columns: f64,
-    /// Numbers that a checkpoint holds a point.
+    /// LaneTuple that a checkpoint holds a point.
     saved: usize,
 }
 
@@ -84,7 +84,7 @@ impl Cost {
         held: u64,
         measured: Option<Measured>,
     ) -> Self {
-        let (plan, model) = (simulation.plan, &simulation.model);
+        let (problem, model) = (simulation.problem, &simulation.model);
         let points = model.total as f64;
         let kept = simulation.forces.saved_lengths(model.owned());
         let kept = kept.iter().map(|length| f64::from(*length)).sum();
@@ -93,39 +93,39 @@ impl Cost {
         let counts = Counts {
             points,
             share: held as f64 / points,
-            memory: measured.unwrap_or_else(|| estimated(plan, points, bonds, listed as f64)),
+            memory: measured.unwrap_or_else(|| estimated(problem, points, bonds, listed as f64)),
             bonds: kept,
             columns: columns as f64,
             saved: simulation.saved_width(),
         };
-        cost(plan, counts, &simulation.expected_clock())
+        cost(problem, counts, &simulation.expected_clock())
     }
 
     /// The cost of a run of some size with the steps of a clock, by estimate.
-    pub fn estimate(plan: &Plan, size: &Size, clock: &Clock) -> Self {
+    pub fn estimate(problem: &Problem, size: &Size, clock: &Clock) -> Self {
         let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
         let is_lattice = |source: &PointSource| matches!(source, PointSource::Lattice { .. });
-        let on_lattice = plan.family != FamilyRule::List
-            && plan.quadrature == Quadrature::Midpoint
-            && plan.bodies.iter().all(|body| is_lattice(&body.points));
+        let on_lattice = problem.family != FamilyRule::List
+            && problem.quadrature == Quadrature::Midpoint
+            && problem.bodies.iter().all(|body| is_lattice(&body.points));
         let (bytes, listed) = if on_lattice {
             (ON_LATTICE, 0.0)
         } else {
             (LISTED, directed_bonds)
         };
-        let bodies = plan.bodies.iter().zip(&size.bonds);
-        let history = bodies.map(|(body, bonds)| bonds * history_bytes(plan, body));
+        let bodies = problem.bodies.iter().zip(&size.bonds);
+        let history = bodies.map(|(body, bonds)| bonds * history_bytes(problem, body));
         let history: f64 = history.sum();
         let bonds = bytes * directed_bonds + history;
         let counts = Counts {
             points,
             share: size.held / points,
-            memory: estimated(plan, points, bonds, listed),
+            memory: estimated(problem, points, bonds, listed),
             bonds: ON_LATTICE * directed_bonds + history,
             columns: 16.0,
-            saved: saved_width(plan),
+            saved: saved_width(problem),
         };
-        cost(plan, counts, clock)
+        cost(problem, counts, clock)
     }
 
     /// The most memory that one of so many ranks takes, bytes; `ghosts` as a share of its own points.
@@ -137,19 +137,19 @@ impl Cost {
 }
 
 /// Bytes of history of each bond of a body's points, which keeps the numbers of both ends.
-fn history_bytes(plan: &Plan, body: &Body) -> f64 {
-    let law = block_laws(plan, &Block::unrefined(body)).law;
-    let numbers = match plan.dimension.count() {
-        1 => law.counts::<1>().memory,
-        2 => law.counts::<2>().memory,
-        _ => law.counts::<3>().memory,
+fn history_bytes(problem: &Problem, body: &Body) -> f64 {
+    let law = block_laws(problem, &Block::unrefined(body)).law;
+    let numbers = match problem.dimension.count() {
+        1 => law.counts::<1>().bond_history,
+        2 => law.counts::<2>().bond_history,
+        _ => law.counts::<3>().bond_history,
     };
     (2 * size_of::<f64>() * numbers) as f64
 }
 
 /// Memory of the set-up and after it, by formula.
-fn estimated(plan: &Plan, points: f64, bonds: f64, listed: f64) -> Measured {
-    let dimension = plan.dimension.count();
+fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measured {
+    let dimension = problem.dimension.count();
     // Place, displacement, velocity, force; what its bonds have set free; volumes of few different sizes, of the
     // point and its family; id, block.
     let state = 4 * 8 * dimension + 8 + 2 + 8 + 2;
@@ -184,51 +184,57 @@ pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     grown.product::<f64>() - 1.0
 }
 
-/// Numbers that a checkpoint holds a point: displacement, velocity; bonds that broke, and their energies;
+/// LaneTuple that a checkpoint holds a point: displacement, velocity; bonds that broke, and their energies;
 /// reactions, work; what damping takes; what plastic flow leaves; when a trigger was last near.
-fn saved_width(plan: &Plan) -> usize {
-    let dimension = plan.dimension.count();
+fn saved_width(problem: &Problem) -> usize {
+    let dimension = problem.dimension.count();
     let is_support =
         |action: &Action| matches!(action, Action::Displacement(_) | Action::Velocity(_));
-    let mut actions = plan.conditions.iter().map(|condition| &condition.action);
+    let mut actions = problem.conditions.iter().map(|condition| &condition.action);
     let supported = if actions.any(is_support) {
         dimension
     } else {
         0
     };
-    let worked = usize::from(!plan.conditions.is_empty());
-    let breaks = plan.bodies.iter().any(|body| body.damage.is_some());
+    let worked = usize::from(!problem.conditions.is_empty());
+    let breaks = problem.bodies.iter().any(|body| body.damage.is_some());
     let broken = if breaks { 4 } else { 0 };
-    let damped = plan.bodies.iter().any(|body| body.material.damping > 0.0);
-    let relaxed = if plan.relaxes() {
+    let damped = problem
+        .bodies
+        .iter()
+        .any(|body| body.material.damping > 0.0);
+    let relaxed = if problem.relaxes() {
         2 * dimension + supported
     } else {
         0
     };
-    let flows = plan.blocks().any(|block| match dimension {
-        2 => Law::<2>::flows(&block_laws(plan, &block).law),
-        3 => Law::<3>::flows(&block_laws(plan, &block).law),
+    let flows = problem.blocks().any(|block| match dimension {
+        2 => Law::<2>::has_plasticity(&block_laws(problem, &block).law),
+        3 => Law::<3>::has_plasticity(&block_laws(problem, &block).law),
         _ => false,
     });
     let flowed = if flows { PlasticState::COUNT } else { 0 };
-    let seen = usize::from(may_coarsen(plan));
+    let seen = usize::from(may_coarsen(problem));
     2 * dimension + broken + supported + worked + usize::from(damped) + relaxed + flowed + seen
 }
 
-fn cost(plan: &Plan, counts: Counts, clock: &Clock) -> Cost {
+fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     let count = |every| Schedule(every).count(clock);
-    let (outputs, rows) = (count(plan.output.every), count(plan.row_interval()) as f64);
-    let components: usize = plan
+    let (outputs, rows) = (
+        count(problem.output.every),
+        count(problem.row_interval()) as f64,
+    );
+    let components: usize = problem
         .output
         .fields
         .iter()
         .map(|field| field.components())
         .sum();
-    let number = if plan.output.single { 4.0 } else { 8.0 };
+    let number = if problem.output.single { 4.0 } else { 8.0 };
     let written = counts.share * (FIXED + number * outputs as f64 * components as f64);
     let saved = 8.0 * counts.saved as f64 + 4.0;
     // While a field is on its way: what is known of the bonds, and its copies.
-    let widest = plan.output.fields.iter().map(|field| field.components());
+    let widest = problem.output.fields.iter().map(|field| field.components());
     let widest = widest.max().unwrap_or(0).max(3) as f64;
     let output = counts.points * 8.0 * (5.0 + FIELD_COPIES * widest);
     let bonds = counts.bonds;

@@ -1,15 +1,15 @@
 //! What a body is like far from its surface: a small block of its lattice, bonded and stretched.
 
 use crate::comm::threads;
-use crate::deck::plan::{Plan, PointSource, Shape};
 use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
+use crate::problem::{PointSource, Problem, Shape};
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
-use crate::solver::bonds::Evolution;
+use crate::solver::bonds::BondUpdate;
 use crate::solver::observers::nearest;
 
-use super::alone::{alone, fill};
+use super::single_body::{alone, fill};
 
 /// Blocks with more bonds than this are not made.
 const MOST_BONDS: f64 = 2e7;
@@ -35,31 +35,31 @@ pub struct Interior {
 
 /// A point within a body of a lattice, with no other body near; `None` for points from a file and for
 /// families too large for a block of them.
-pub fn interior(plan: &Plan, body: usize) -> Option<Interior> {
-    let block = block(plan, body)?;
-    match plan.dimension.count() {
+pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
+    let block = block(problem, body)?;
+    match problem.dimension.count() {
         1 => measure::<1>(&block),
         2 => measure::<2>(&block),
         _ => measure::<3>(&block),
     }
 }
 
-/// The plan of a block that has one point with all of its neighbours.
-fn block(plan: &Plan, body: usize) -> Option<Plan> {
-    let (mut block, spacing) = alone(plan, body)?;
+/// The problem of a block that has one point with all of its neighbours.
+fn block(problem: &Problem, body: usize) -> Option<Problem> {
+    let (mut block, spacing) = alone(problem, body)?;
     block.bodies[0].damage = None;
     let cutoff = cutoffs(&block)[0];
     let (mut upper, mut bonds) = ([0.0; 3], 1.0);
-    for k in 0..plan.dimension.count() {
+    for k in 0..problem.dimension.count() {
         let cells = 2.0 * (cutoff / spacing[k]).ceil() + 1.0;
         upper[k] = cells * spacing[k];
-        bonds *= cells * cells * f64::from(plan.quadrature.points(1)).powi(2);
+        bonds *= cells * cells * f64::from(problem.quadrature.points(1)).powi(2);
     }
     fill(&mut block, [[0.0; 3], upper], spacing, [0.0; 3]);
     (bonds < MOST_BONDS).then_some(block)
 }
 
-fn measure<const D: usize>(block: &Plan) -> Option<Interior> {
+fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
     let comm = threads::alone();
     let mut simulation = Simulation::<D>::new(block, &comm).ok()?;
     let PointSource::Lattice {
@@ -116,7 +116,7 @@ fn stored<const D: usize>(
             *values = STRAIN * (0..D).map(|d| row[d] * place[d]).sum::<f64>();
         }
     }
-    simulation.evaluate(Evolution::None);
+    simulation.evaluate(BondUpdate::None);
     let stored = simulation.forces.stored(&simulation.model);
     (stored.energy[point], stored.neighbours[point] as u32)
 }

@@ -4,9 +4,9 @@ use std::collections::HashSet;
 
 use crate::comm::sum::reduce;
 use crate::comm::{ExactSum, total};
-use crate::deck::expression::Expression;
-use crate::deck::plan::{Action, Condition, Plan, PointSource, Stage};
-use crate::deck::shown;
+use crate::expression::Expression;
+use crate::message::format_number;
+use crate::problem::{Action, Condition, PointSource, Problem, Stage};
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
@@ -22,15 +22,15 @@ const LARGE_LAYER: u64 = 4_000_000;
 
 /// Adds a warning for each of them. Collective.
 pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) {
-    let plan = simulation.plan;
-    let points: Vec<Vec<u32>> = plan
+    let problem = simulation.problem;
+    let points: Vec<Vec<u32>> = problem
         .conditions
         .iter()
-        .map(|condition| members(plan, &simulation.model, condition.set))
+        .map(|condition| members(problem, &simulation.model, condition.set))
         .collect();
     twice_prescribed(simulation, &points, warnings);
     without_effect(simulation, &points, warnings);
-    for (condition, points) in plan.conditions.iter().zip(&points) {
+    for (condition, points) in problem.conditions.iter().zip(&points) {
         if let Some(depth) = condition.default_depth {
             layer(simulation, condition, depth, points, warnings);
         }
@@ -38,12 +38,12 @@ pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec
     against_the_surface(simulation, &points, warnings);
 }
 
-fn warn(plan: &Plan, condition: &Condition, words: &str, warnings: &mut Vec<String>) {
+fn warn(problem: &Problem, condition: &Condition, words: &str, warnings: &mut Vec<String>) {
     let message = format!(
         "[condition.{}] {}: {words}",
         condition.name, condition.quantity
     );
-    warnings.push(plan.source.warning(condition.place.clone(), message));
+    warnings.push(problem.source.warning(condition.place.clone(), message));
 }
 
 /// What a condition prescribes of the motion, by component; `None` for loads.
@@ -60,7 +60,7 @@ fn twice_prescribed<const D: usize>(
     points: &[Vec<u32>],
     warnings: &mut Vec<String>,
 ) {
-    let conditions = &simulation.plan.conditions;
+    let conditions = &simulation.problem.conditions;
     for (later, second) in conditions.iter().enumerate() {
         for (earlier, first) in conditions[..later].iter().enumerate() {
             let (Some(old), Some(new)) = (motion(first), motion(second)) else {
@@ -87,7 +87,7 @@ fn twice_prescribed<const D: usize>(
                     first.name,
                     components.join(" and ")
                 );
-                warn(simulation.plan, second, &words, warnings);
+                warn(simulation.problem, second, &words, warnings);
             }
         }
     }
@@ -99,8 +99,8 @@ fn without_effect<const D: usize>(
     points: &[Vec<u32>],
     warnings: &mut Vec<String>,
 ) {
-    let plan = simulation.plan;
-    for (condition, own) in plan.conditions.iter().zip(points) {
+    let problem = simulation.problem;
+    for (condition, own) in problem.conditions.iter().zip(points) {
         let acts: Vec<usize> = match &condition.action {
             Action::BodyForce(values, factors) => (0..D)
                 .filter(|d| factors[*d] != 0.0 && values[*d].as_constant() != Some(0.0))
@@ -111,20 +111,24 @@ fn without_effect<const D: usize>(
             Action::Displacement(_) | Action::Velocity(_) => continue,
         };
         if acts.is_empty() {
-            warn(plan, condition, "is 0, so it does nothing", warnings);
+            warn(problem, condition, "is 0, so it does nothing", warnings);
             continue;
         }
         let is_held = |point: &u32, d: usize| {
-            plan.conditions.iter().zip(points).any(|(other, others)| {
-                let holds = motion(other).is_some_and(|motion| motion[d].is_some());
-                holds && others.binary_search(point).is_ok()
-            })
+            problem
+                .conditions
+                .iter()
+                .zip(points)
+                .any(|(other, others)| {
+                    let holds = motion(other).is_some_and(|motion| motion[d].is_some());
+                    holds && others.binary_search(point).is_ok()
+                })
         };
         let is_free = |point: &&u32| acts.iter().any(|d| !is_held(point, *d));
         let free = own.iter().filter(is_free).count();
         if total(simulation.comm, free as u64) == 0 {
             let words = "acts only where supports prescribe the motion, so it moves nothing";
-            warn(plan, condition, words, warnings);
+            warn(problem, condition, words, warnings);
         }
     }
 }
@@ -137,15 +141,15 @@ fn layer<const D: usize>(
     points: &[u32],
     warnings: &mut Vec<String>,
 ) {
-    let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
+    let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
     if total(comm, points.len() as u64) > LARGE_LAYER {
         return;
     }
     // Rank 0 looks at all points of the layer: body and cell of each.
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
-        let body = plan.body_of(usize::from(model.block[*point as usize]));
-        let edges = edges(plan, body, depth);
+        let body = problem.body_of(usize::from(model.block[*point as usize]));
+        let edges = edges(problem, body, depth);
         let position = model.position(*point as usize);
         let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edges[k]).floor() as i64);
         cells[0].extend_from_slice(bytemuck::cast_slice(&[
@@ -160,7 +164,7 @@ fn layer<const D: usize>(
         .chunks_exact(4)
         .map(|cell| [cell[0], cell[1], cell[2], cell[3]])
         .collect();
-    let thickness = thickness::<D>(plan, &cells, depth);
+    let thickness = thickness::<D>(problem, &cells, depth);
     let mut known = thickness.map_or(Vec::new(), |thickness| thickness.to_le_bytes().to_vec());
     comm.broadcast(0, &mut known);
     let Ok(bytes) = <[u8; 8]>::try_from(&known[..]) else {
@@ -171,15 +175,15 @@ fn layer<const D: usize>(
         let words = format!(
             "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give \
              the layer's `depth`",
-            shown(depth)
+            format_number(depth)
         );
-        warn(plan, condition, &words, warnings);
+        warn(problem, condition, &words, warnings);
     }
 }
 
 /// The edges (m) of the cells of a body; of one from a file the given length.
-fn edges(plan: &Plan, body: usize, otherwise: f64) -> [f64; 3] {
-    match &plan.bodies[body].points {
+fn edges(problem: &Problem, body: usize, otherwise: f64) -> [f64; 3] {
+    match &problem.bodies[body].points {
         PointSource::Lattice { spacing, .. } => *spacing,
         PointSource::File { .. } => [otherwise; 3],
     }
@@ -187,7 +191,11 @@ fn edges(plan: &Plan, body: usize, otherwise: f64) -> [f64; 3] {
 
 /// The mean length (m) of the rows of adjacent cells in the direction in which they are shortest, of the
 /// body for which it differs most from `depth` (m); `None` without cells.
-fn thickness<const D: usize>(plan: &Plan, cells: &HashSet<[i64; 4]>, depth: f64) -> Option<f64> {
+fn thickness<const D: usize>(
+    problem: &Problem,
+    cells: &HashSet<[i64; 4]>,
+    depth: f64,
+) -> Option<f64> {
     let of_body = |body: usize| {
         let own = || cells.iter().filter(move |cell| cell[0] == body as i64);
         let row_length = |k: usize| {
@@ -197,13 +205,13 @@ fn thickness<const D: usize>(plan: &Plan, cells: &HashSet<[i64; 4]>, depth: f64)
                 !cells.contains(&before)
             };
             let rows = own().filter(begins).count();
-            own().count() as f64 / rows as f64 * edges(plan, body, depth)[k]
+            own().count() as f64 / rows as f64 * edges(problem, body, depth)[k]
         };
         let shortest = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
         (own().next().is_some()).then_some(shortest)
     };
     let difference = |thickness: &f64| libm::log(thickness / depth).abs();
-    (0..plan.bodies.len())
+    (0..problem.bodies.len())
         .filter_map(of_body)
         .max_by(|a, b| difference(a).total_cmp(&difference(b)))
 }
@@ -214,9 +222,9 @@ fn against_the_surface<const D: usize>(
     points: &[Vec<u32>],
     warnings: &mut Vec<String>,
 ) {
-    let (plan, model) = (simulation.plan, &simulation.model);
+    let (problem, model) = (simulation.problem, &simulation.model);
     let is_pressure = |condition: &Condition| condition.quantity == "pressure";
-    if !plan.conditions.iter().any(is_pressure) {
+    if !problem.conditions.iter().any(is_pressure) {
         return;
     }
     // Where the neighbours of each point lie: a sum of unit vectors.
@@ -227,7 +235,7 @@ fn against_the_surface<const D: usize>(
         let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
         (0..3).for_each(|k| towards[here][k] += along[k] / length);
     });
-    for (condition, points) in plan.conditions.iter().zip(points) {
+    for (condition, points) in problem.conditions.iter().zip(points) {
         let Action::BodyForce(_, factors) = &condition.action else {
             continue;
         };
@@ -243,7 +251,7 @@ fn against_the_surface<const D: usize>(
         if reduce(simulation.comm, &mut sum)[0] > 0.0 {
             let words =
                 "its `normal` points into the body, so that it pulls; the outward one is meant";
-            warn(plan, condition, words, warnings);
+            warn(problem, condition, words, warnings);
         }
     }
 }

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use super::memory;
 use super::{Cost, Measured, Survey, ghost_share};
 use crate::comm::threads;
-use crate::deck::Plan;
 use crate::error::Result;
+use crate::problem::Problem;
 use crate::solver::Simulation;
 use crate::solver::conditions::output_members;
 use crate::solver::observers::HistoryObserver;
@@ -45,23 +45,23 @@ pub struct Look {
 ///
 /// # Errors
 /// As those of a run before its first step.
-pub fn look(plan: &Plan, ranks: u32, tried: bool) -> Result<Look> {
-    match plan.dimension.count() {
-        1 => look_in::<1>(plan, ranks, tried),
-        2 => look_in::<2>(plan, ranks, tried),
-        _ => look_in::<3>(plan, ranks, tried),
+pub fn look(problem: &Problem, ranks: u32, tried: bool) -> Result<Look> {
+    match problem.dimension.count() {
+        1 => look_in::<1>(problem, ranks, tried),
+        2 => look_in::<2>(problem, ranks, tried),
+        _ => look_in::<3>(problem, ranks, tried),
     }
 }
 
-fn look_in<const D: usize>(plan: &Plan, ranks: u32, tried: bool) -> Result<Look> {
+fn look_in<const D: usize>(problem: &Problem, ranks: u32, tried: bool) -> Result<Look> {
     let comm = threads::alone();
     let before = memory::forget_peak();
-    let mut simulation = Simulation::<D>::new(plan, &comm)?;
+    let mut simulation = Simulation::<D>::new(problem, &comm)?;
     let after = memory::resident();
     simulation.check()?;
     let columns = HistoryObserver::new(&simulation)?.columns().len();
     let total = simulation.model.total;
-    let held = output_members(plan, &comm, &simulation.model)?;
+    let held = output_members(problem, &comm, &simulation.model)?;
     let held = held.map_or(total, |points| points.len() as u64);
     let survey = Survey::new(&mut simulation);
     let measured = before.map(|before| Measured {
@@ -73,10 +73,10 @@ fn look_in<const D: usize>(plan: &Plan, ranks: u32, tried: bool) -> Result<Look>
         points: total,
         bonds: simulation.forces.directed_bonds() / 2,
         lattice_bonds: simulation.forces.lattice_bonds() / 2,
-        ghosts: ghost_share(&edges(&simulation), plan.horizon, ranks),
+        ghosts: ghost_share(&edges(&simulation), problem.horizon, ranks),
         cost: Cost::of(&simulation, columns, held, measured),
         stable_step: simulation.scaled_stable_step(),
-        steps: choose_steps(plan, simulation.stable_step)?,
+        steps: choose_steps(problem, simulation.stable_step)?,
         seconds: tried.then(|| seconds_a_step(&mut simulation)),
     })
 }

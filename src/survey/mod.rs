@@ -2,7 +2,6 @@
 //! warnings about what a deck may say but most likely does not mean. `check` and the start of a run say
 //! the same.
 
-mod alone;
 mod bodies;
 mod calibrated;
 mod cost;
@@ -11,6 +10,7 @@ mod loads;
 mod look;
 pub mod memory;
 mod parting;
+mod single_body;
 mod size;
 mod speed;
 
@@ -19,14 +19,14 @@ pub use calibrated::calibrated;
 pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
 pub use look::{Look, look};
-pub use parting::parting_cost;
+pub use parting::separation_energy_ratio;
 pub use size::{Size, size};
 pub use speed::{Speed, speed};
 
 use crate::comm::total;
 use crate::damage::DamageLaw;
-use crate::deck::plan::{Block, Plan, PointSource, Selector, Stage, StepRule};
-use crate::deck::shown;
+use crate::message::format_number;
+use crate::problem::{Block, PointSource, Problem, Selector, Stage, StepRule};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::conditions::members;
@@ -65,18 +65,23 @@ pub struct Survey {
 impl Survey {
     /// Looks at a run before its first step. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        let (plan, comm) = (simulation.plan, simulation.comm);
-        let mut warnings = plan.warnings.clone();
+        let (problem, comm) = (simulation.problem, simulation.comm);
+        let mut warnings = problem.warnings.clone();
         let bodies = bodies::figures(simulation, &mut warnings);
-        horizons(plan, &bodies, &mut warnings);
-        stretches(plan, &mut warnings);
+        horizons(problem, &bodies, &mut warnings);
+        stretches(problem, &mut warnings);
         let joints = joints(simulation);
         let mut cuts = simulation.cut.clone();
         comm.sum(&mut cuts);
         cuts.iter_mut().for_each(|ends| *ends /= 2);
-        for (crack, _) in plan.cracks.iter().zip(&cuts).filter(|(_, cut)| **cut == 0) {
+        for (crack, _) in problem
+            .cracks
+            .iter()
+            .zip(&cuts)
+            .filter(|(_, cut)| **cut == 0)
+        {
             let message = format!("[crack.{}]: cuts no bond", crack.name);
-            warnings.push(plan.source.warning(crack.span.clone(), message));
+            warnings.push(problem.source.warning(crack.span.clone(), message));
         }
         let sets = sets(simulation, &mut warnings);
         let probes = probes(simulation, &mut warnings);
@@ -96,10 +101,10 @@ impl Survey {
 
 /// Bonds between each two bodies, of all ranks; those within a body are left out.
 fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
-    let count = simulation.plan.bodies.len();
+    let count = simulation.problem.bodies.len();
     let mut bonds = vec![0; count * count];
     for ([here, there], own) in simulation.forces.bonds_of_blocks() {
-        let [here, there] = [here, there].map(|block| simulation.plan.body_of(block));
+        let [here, there] = [here, there].map(|block| simulation.problem.body_of(block));
         bonds[here * count + there] += own;
     }
     simulation.comm.sum(&mut bonds);
@@ -110,10 +115,10 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
         .collect()
 }
 
-fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
-    for (body, figures) in plan.bodies.iter().zip(bodies) {
+fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
+    for (body, figures) in problem.bodies.iter().zip(bodies) {
         let spacing = match &body.points {
-            PointSource::Lattice { spacing, .. } => spacing[..plan.dimension.count()]
+            PointSource::Lattice { spacing, .. } => spacing[..problem.dimension.count()]
                 .iter()
                 .copied()
                 .fold(0.0, f64::max),
@@ -124,17 +129,17 @@ fn horizons(plan: &Plan, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
             let message = format!(
                 "[body.{}]: its horizon, {} m, is {} spacings; 3 to 6 are usual",
                 body.name,
-                shown(body.horizon),
-                shown((100.0 * horizon).round() / 100.0)
+                format_number(body.horizon),
+                format_number((100.0 * horizon).round() / 100.0)
             );
-            warnings.push(plan.source.warning(body.horizon_place.clone(), message));
+            warnings.push(problem.source.warning(body.horizon_place.clone(), message));
         }
     }
 }
 
-fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
-    for body in &plan.bodies {
-        let critical = match block_laws(plan, &Block::unrefined(body)).damage {
+fn stretches(problem: &Problem, warnings: &mut Vec<String>) {
+    for body in &problem.bodies {
+        let critical = match block_laws(problem, &Block::unrefined(body)).damage {
             Some(DamageLaw::CriticalStretch(law)) => law.critical,
             _ => continue,
         };
@@ -143,13 +148,13 @@ fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
             let message = format!(
                 "[body.{name}] damage: its bonds break at a stretch of {critical:.3}{consequence}"
             );
-            warnings.push(plan.source.warning(body.span.clone(), message));
+            warnings.push(problem.source.warning(body.span.clone(), message));
         };
         if critical >= LARGEST_STRETCH {
             warn(format!(", at {:.3} times their length", 1.0 + critical));
         }
-        let slower = stretched_stiffness(critical, plan.dimension.count()).sqrt();
-        let too_bold = safeties(plan)
+        let slower = stretched_stiffness(critical, problem.dimension.count()).sqrt();
+        let too_bold = safeties(problem)
             .into_iter()
             .find(|safety| safety * slower > 1.0);
         if let Some(safety) = too_bold {
@@ -162,8 +167,8 @@ fn stretches(plan: &Plan, warnings: &mut Vec<String>) {
 }
 
 /// The shares of the stable step that the stages of a run take.
-fn safeties(plan: &Plan) -> Vec<f64> {
-    let moving = plan
+fn safeties(problem: &Problem) -> Vec<f64> {
+    let moving = problem
         .all_stages()
         .into_iter()
         .filter(|stage| !stage.time.is_relaxation());
@@ -182,15 +187,15 @@ fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
 
 /// Number of points of each set.
 fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) -> Vec<u64> {
-    let (plan, comm) = (simulation.plan, simulation.comm);
-    let count = |set| members(plan, &simulation.model, set).len() as u64;
-    let mut sizes: Vec<u64> = (0..plan.sets.len()).map(count).collect();
+    let (problem, comm) = (simulation.problem, simulation.comm);
+    let count = |set| members(problem, &simulation.model, set).len() as u64;
+    let mut sizes: Vec<u64> = (0..problem.sets.len()).map(count).collect();
     comm.sum(&mut sizes);
-    for (set, size) in plan.sets.iter().zip(&sizes) {
+    for (set, size) in problem.sets.iter().zip(&sizes) {
         let by_place = matches!(set.selector, Selector::Where(_) | Selector::Within(_));
         if by_place && *size < D as u64 && simulation.model.total > 2 * D as u64 {
             let message = format!("[set.{}]: has {size} point(s) only", set.name);
-            warnings.push(plan.source.warning(set.span.clone(), message));
+            warnings.push(problem.source.warning(set.span.clone(), message));
         }
     }
     sizes
@@ -200,21 +205,21 @@ fn probes<const D: usize>(
     simulation: &Simulation<'_, D>,
     warnings: &mut Vec<String>,
 ) -> Vec<Nearest> {
-    let plan = simulation.plan;
-    let follow = |probe: &crate::deck::plan::Probe| {
+    let problem = simulation.problem;
+    let follow = |probe: &crate::problem::Probe| {
         let found = nearest(simulation, probe.at);
-        if found.distance > 0.5 * plan.horizon {
+        if found.distance > 0.5 * problem.horizon {
             let message = format!(
                 "[history.probe.{}] at: the nearest point is {:.3e} m away, at {:?} m",
                 probe.name,
                 found.distance,
                 &found.position[..D]
             );
-            warnings.push(plan.source.warning(probe.span.clone(), message));
+            warnings.push(problem.source.warning(probe.span.clone(), message));
         }
         found
     };
-    plan.history.probes.iter().map(follow).collect()
+    problem.history.probes.iter().map(follow).collect()
 }
 
 fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<String>) {
@@ -230,9 +235,9 @@ fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: 
 }
 
 fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) {
-    let plan = simulation.plan;
+    let problem = simulation.problem;
     let mut warn = |message: String| {
-        warnings.push(plan.source.warning(plan.places.step.clone(), message));
+        warnings.push(problem.source.warning(problem.places.step.clone(), message));
     };
     let clock = simulation.clock;
     let (step, stable) = (clock.step(), simulation.scaled_stable_step());

@@ -3,12 +3,12 @@
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
-use crate::deck::plan::{Block, Plan, Toughness};
+use crate::problem::{Block, Problem, Toughness};
 use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
-use crate::solver::bonds::Evolution;
+use crate::solver::bonds::BondUpdate;
 
-use super::alone::{alone, fill};
+use super::single_body::{alone, fill};
 
 /// Blocks with more bonds than this are not parted: it would take more than seconds.
 const MOST_BONDS: f64 = 1e6;
@@ -35,17 +35,17 @@ const LOOK: u32 = 20;
 ///
 /// `None` for a body without a fracture energy, for points from a file, for families so large that it would take
 /// long, and for a body that does not part.
-pub fn parting_cost(plan: &Plan, body: usize, angle: f64) -> Option<f64> {
-    let (mut block, spacing) = alone(plan, body)?;
+pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
+    let (mut block, spacing) = alone(problem, body)?;
     laws_are_possible(&block).ok()?;
-    let fracture_energy = fracture_energy(plan, body)?;
+    let fracture_energy = fracture_energy(problem, body)?;
     let first = match block_laws(&block, &Block::unrefined(&block.bodies[0])).damage? {
         DamageLaw::CriticalStretch(law) => law.critical,
         DamageLaw::BondEnergy(law) => law.stretch,
     };
     // Families of the middle, and of their neighbours, are whole.
     let cutoff = cutoffs(&block)[0];
-    let dimension = plan.dimension.count();
+    let dimension = problem.dimension.count();
     let normal = normal(dimension);
     let (mut upper, mut origin, mut bonds) = ([0.0; 3], [0.0; 3], 1.0);
     for k in 0..dimension {
@@ -56,7 +56,7 @@ pub fn parting_cost(plan: &Plan, body: usize, angle: f64) -> Option<f64> {
             origin[k] = 0.5 * spacing[k];
         }
         upper[k] = cells * spacing[k];
-        let points = f64::from(plan.quadrature.points(1));
+        let points = f64::from(problem.quadrature.points(1));
         bonds *= 2.0 * cells * (2.0 * reach + 1.0) * points.powi(2);
     }
     fill(&mut block, [upper.map(|x| -x), upper], spacing, origin);
@@ -83,13 +83,13 @@ fn normal(dimension: usize) -> usize {
 }
 
 /// G0 of a body, J/m².
-fn fracture_energy(plan: &Plan, body: usize) -> Option<f64> {
-    let body = &plan.bodies[body];
+fn fracture_energy(problem: &Problem, body: usize) -> Option<f64> {
+    let body = &problem.bodies[body];
     let elastic = body.material.elastic;
     match body.damage.as_ref()?.toughness {
         Toughness::FractureEnergy(energy) => Some(energy),
         Toughness::FractureToughness(toughness) => Some(CriticalStretch::energy_from_toughness(
-            plan.dimension,
+            problem.dimension,
             elastic,
             toughness,
         )),
@@ -111,7 +111,7 @@ struct Way {
 
 impl Way {
     /// The energy that a unit area in the middle of the cut takes, J/m².
-    fn energy<const D: usize>(&self, block: &Plan) -> Option<f64> {
+    fn energy<const D: usize>(&self, block: &Problem) -> Option<f64> {
         let comm = threads::alone();
         let mut simulation = Simulation::<D>::new(block, &comm).ok()?;
         let normal = normal(D);
@@ -136,7 +136,7 @@ impl Way {
                     fields[0][point] = sin * size;
                 }
             }
-            simulation.evaluate(Evolution::Step(0.0));
+            simulation.evaluate(BondUpdate::Step(0.0));
             size *= 1.0 + GROWTH;
             if step % LOOK == 0 && is_parted(&simulation, &middle, &upper) {
                 return Some(spent(&mut simulation, &middle, self.height));

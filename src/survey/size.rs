@@ -1,9 +1,9 @@
-//! How large a run is, from its plan: without making its points, of which there may be too many.
+//! How large a run is, from its problem: without making its points, of which there may be too many.
 
-use crate::deck::plan::{Plan, PointSource, Selector};
 use crate::dimension::Dimension;
 use crate::error::Result;
 use crate::points::{LatticeBody, file, set};
+use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
 /// Cells looked at, of all samples together, to count neighbours.
@@ -41,11 +41,11 @@ impl Size {
 ///
 /// # Errors
 /// When lattice cells are too far away to be numbered.
-pub fn size(plan: &Plan) -> Result<Size> {
-    let bodies = (0..plan.bodies.len())
-        .map(|body| LatticeBody::new(plan, body))
+pub fn size(problem: &Problem) -> Result<Size> {
+    let bodies = (0..problem.bodies.len())
+        .map(|body| LatticeBody::new(problem, body))
         .collect::<Result<Vec<_>>>()?;
-    let files = from_files(plan);
+    let files = from_files(problem);
     let points = |index: usize| match &bodies[index] {
         Some(lattice) => lattice.points(),
         None => files[index].points,
@@ -60,22 +60,22 @@ pub fn size(plan: &Plan) -> Result<Size> {
         bonds: Vec::new(),
         held: 0.0,
     };
-    let (cutoffs, all) = (cutoffs(plan), size.all_points());
+    let (cutoffs, all) = (cutoffs(problem), size.all_points());
     for (here, body) in bodies.iter().enumerate() {
         let neighbours = match body {
             Some(lattice) => {
-                let reach = &cutoffs[here * plan.block_count()..][..bodies.len()];
+                let reach = &cutoffs[here * problem.block_count()..][..bodies.len()];
                 neighbours(lattice, &bodies, reach)
             }
             None => {
                 let volume = files[here].volume / files[here].points;
-                (family_volume(plan, here) / volume).min(all) - 1.0
+                (family_volume(problem, here) / volume).min(all) - 1.0
             }
         };
         // A body without points has no mean volume.
         size.bonds.push(size.points[here] * neighbours.max(0.0));
     }
-    size.held = held(plan, &bodies, &files, &size.points);
+    size.held = held(problem, &bodies, &files, &size.points);
     Ok(size)
 }
 
@@ -114,33 +114,33 @@ struct Rows {
 }
 
 /// The points of each body that are rows of a file.
-fn from_files(plan: &Plan) -> Vec<Rows> {
-    let mut rows = vec![Rows::default(); plan.bodies.len()];
-    for (index, body) in plan.bodies.iter().enumerate() {
+fn from_files(problem: &Problem) -> Vec<Rows> {
+    let mut rows = vec![Rows::default(); problem.bodies.len()];
+    for (index, body) in problem.bodies.iter().enumerate() {
         let PointSource::File { path, .. } = &body.points else {
             continue;
         };
         // The first body that takes rows of a file counts those of all bodies.
-        if file::users(plan, path)[0].0 != index {
+        if file::users(problem, path)[0].0 != index {
             continue;
         }
-        let Some((points, weight)) = file::sample(plan, path) else {
+        let Some((points, weight)) = file::sample(problem, path) else {
             continue;
         };
         for point in points {
             let body = point.block as usize;
             rows[body].points += weight;
             rows[body].volume += weight * point.volume;
-            rows[body].held += weight * f64::from(u8::from(is_held(plan, body, point.position)));
+            rows[body].held += weight * f64::from(u8::from(is_held(problem, body, point.position)));
         }
     }
     rows
 }
 
 /// The volume (m³) within the horizon of a point of a body.
-fn family_volume(plan: &Plan, body: usize) -> f64 {
-    let horizon = plan.bodies[body].horizon;
-    match plan.dimension {
+fn family_volume(problem: &Problem, body: usize) -> f64 {
+    let horizon = problem.bodies[body].horizon;
+    match problem.dimension {
         Dimension::Space => 4.0 / 3.0 * std::f64::consts::PI * horizon.powi(3),
         Dimension::PlaneStress { thickness } | Dimension::PlaneStrain { thickness } => {
             std::f64::consts::PI * horizon * horizon * thickness
@@ -150,17 +150,19 @@ fn family_volume(plan: &Plan, body: usize) -> f64 {
 }
 
 /// Whether a point of a body at a position (m) is in the set of the result, which is not one of ids.
-fn is_held(plan: &Plan, body: usize, position: [f64; 3]) -> bool {
-    let set = plan.output.set.as_ref();
-    set.is_none_or(|(set, _)| set::contains(&plan.sets[*set], plan.horizon, 0, position, body))
+fn is_held(problem: &Problem, body: usize, position: [f64; 3]) -> bool {
+    let set = problem.output.set.as_ref();
+    set.is_none_or(|(set, _)| {
+        set::contains(&problem.sets[*set], problem.horizon, 0, position, body)
+    })
 }
 
 /// The number of points of the result, from some points of each body.
-fn held(plan: &Plan, bodies: &[Option<LatticeBody>], files: &[Rows], points: &[f64]) -> f64 {
-    let Some((set, _)) = &plan.output.set else {
+fn held(problem: &Problem, bodies: &[Option<LatticeBody>], files: &[Rows], points: &[f64]) -> f64 {
+    let Some((set, _)) = &problem.output.set else {
         return points.iter().sum();
     };
-    if let Selector::Ids { ids, .. } = &plan.sets[*set].selector {
+    if let Selector::Ids { ids, .. } = &problem.sets[*set].selector {
         return ids.len() as f64;
     }
     let of_body = |(index, body): (usize, &Option<LatticeBody>)| match body {
@@ -169,7 +171,7 @@ fn held(plan: &Plan, bodies: &[Option<LatticeBody>], files: &[Rows], points: &[f
             let centres = lattice.some_centres(u64::MAX);
             let held = centres
                 .iter()
-                .filter(|centre| is_held(plan, index, **centre))
+                .filter(|centre| is_held(problem, index, **centre))
                 .count();
             points[index] * held as f64 / centres.len().max(1) as f64
         }

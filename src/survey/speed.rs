@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use super::memory::{Resident, resident};
 use crate::comm::Communicator;
 use crate::comm::halo::Traffic;
-use crate::deck::Plan;
 use crate::error::Result;
 use crate::lanes::Instructions;
+use crate::problem::Problem;
 use crate::solver::Simulation;
 use crate::solver::simulation::Times;
 
@@ -45,21 +45,26 @@ pub struct Speed {
 ///
 /// # Errors
 /// As those of a run; or the motion of a point is not finite.
-pub fn speed(plan: &Plan, comm: &dyn Communicator, warm_up: u32, steps: u32) -> Result<Speed> {
-    match plan.dimension.count() {
-        1 => speed_in::<1>(plan, comm, warm_up, steps),
-        2 => speed_in::<2>(plan, comm, warm_up, steps),
-        _ => speed_in::<3>(plan, comm, warm_up, steps),
-    }
-}
-
-fn speed_in<const D: usize>(
-    plan: &Plan,
+pub fn speed(
+    problem: &Problem,
     comm: &dyn Communicator,
     warm_up: u32,
     steps: u32,
 ) -> Result<Speed> {
-    let mut simulation = Simulation::<D>::new(plan, comm)?;
+    match problem.dimension.count() {
+        1 => speed_in::<1>(problem, comm, warm_up, steps),
+        2 => speed_in::<2>(problem, comm, warm_up, steps),
+        _ => speed_in::<3>(problem, comm, warm_up, steps),
+    }
+}
+
+fn speed_in<const D: usize>(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    warm_up: u32,
+    steps: u32,
+) -> Result<Speed> {
+    let mut simulation = Simulation::<D>::new(problem, comm)?;
     for _ in 0..warm_up {
         simulation.advance();
     }

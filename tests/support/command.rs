@@ -97,7 +97,7 @@ pub fn finish(command: &mut Command) -> Output {
     wait(child)
 }
 
-/// Numbers of the processes that mpirun, or the command itself, started for the ranks.
+/// LaneTuple of the processes that mpirun, or the command itself, started for the ranks.
 pub fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
     if ranks == 1 {
         return vec![child.id()];
@@ -105,7 +105,7 @@ pub fn rank_processes(child: &Child, ranks: usize) -> Vec<u32> {
     children(child)
 }
 
-/// Numbers of the processes that a process started, zombies among them.
+/// LaneTuple of the processes that a process started, zombies among them.
 fn children(child: &Child) -> Vec<u32> {
     let children = format!("/proc/{0}/task/{0}/children", child.id());
     let text = std::fs::read_to_string(children).unwrap_or_default();

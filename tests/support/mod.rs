@@ -9,12 +9,13 @@ pub mod saved;
 use std::path::Path;
 
 use fissure::comm::{Communicator, threads};
-use fissure::deck::{self, Plan, Source};
+use fissure::deck::{self, Source};
+use fissure::problem::Problem;
 use fissure::solver::Simulation;
-use fissure::solver::bonds::Evolution;
+use fissure::solver::bonds::BondUpdate;
 
 /// A validated deck from its text.
-pub fn plan(text: &str) -> Plan {
+pub fn problem(text: &str) -> Problem {
     let source = Source {
         path: "test.toml".into(),
         text: text.to_owned(),
@@ -24,9 +25,9 @@ pub fn plan(text: &str) -> Plan {
 
 /// Runs `body` on one rank without MPI.
 pub fn simulate<const D: usize, T>(text: &str, body: impl FnOnce(Simulation<D>) -> T) -> T {
-    let plan = plan(text);
+    let problem = problem(text);
     let comm = threads::alone();
-    body(Simulation::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}")))
+    body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
 /// Runs `body` on one rank without MPI, with a deck of `inputs/` in which some parameters have other
@@ -41,10 +42,10 @@ pub fn simulate_input<const D: usize, T>(
         .iter()
         .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
         .collect();
-    let plan = deck::read(&path, &set).and_then(|deck| deck.plan());
-    let plan = plan.unwrap_or_else(|error| panic!("{error}"));
+    let problem = deck::read(&path, &set).and_then(|deck| deck.problem());
+    let problem = problem.unwrap_or_else(|error| panic!("{error}"));
     let comm = threads::alone();
-    body(Simulation::new(&plan, &comm).unwrap_or_else(|error| panic!("{error}")))
+    body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
 
 /// Runs `body` on several ranks, each a thread.
@@ -53,9 +54,9 @@ pub fn simulate_on<const D: usize, T: Send>(
     text: &str,
     body: impl Fn(Simulation<D>) -> T + Sync,
 ) -> Vec<T> {
-    let plan = plan(text);
+    let problem = problem(text);
     threads::run(ranks, |comm: &dyn Communicator| {
-        body(Simulation::new(&plan, comm).unwrap_or_else(|error| panic!("{error}")))
+        body(Simulation::new(&problem, comm).unwrap_or_else(|error| panic!("{error}")))
     })
 }
 
@@ -71,7 +72,7 @@ pub fn displace<const D: usize>(
                 place[d] - simulation.model.reference[d][point];
         }
     }
-    simulation.evaluate(Evolution::Step(0.0));
+    simulation.evaluate(BondUpdate::Step(0.0));
 }
 
 /// The internal force density of an owned point, N/m³.

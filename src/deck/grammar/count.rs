@@ -1,4 +1,4 @@
-//! Numbers of things.
+//! LaneTuple of things.
 
 use std::fmt;
 use std::num::NonZeroU64;

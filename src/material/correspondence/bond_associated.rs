@@ -34,7 +34,7 @@ use super::hooke::{self, Hooke};
 use super::stress::{OfBonds, Stress};
 use super::tensor::{Tensor, tensor};
 use super::{STRESS, of_stress};
-use crate::lanes::{Lanes, Numbers, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes};
 
 /// The law with its constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,21 +126,21 @@ impl BondAssociated {
 fn own_gradient<const D: usize>(bond: &Bond<D>, gradient: &Tensor<Lanes, D>) -> Tensor<Lanes, D> {
     let xi = &bond.reference;
     let share = bond.inverse * bond.inverse;
-    let rest: [Lanes; D] = Numbers::each(|a| {
+    let rest: [Lanes; D] = LaneTuple::each(|a| {
         let mut seen = gradient[a][0] * xi[0];
         for b in 1..D {
             seen += gradient[a][b] * xi[b];
         }
-        (bond.moved[a] - seen) * share
+        (bond.eta[a] - seen) * share
     });
     tensor(|a, b| gradient[a][b] + rest[a] * xi[b])
 }
 
 impl<const D: usize> Law<D> for BondAssociated {
     type Point = Point<D>;
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
-    type WholeSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
+    type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
     /// K as in the whole sum, Σ ω η⊗ξ Ṽ (m⁵), and Σ ω Ṽ; then Z Σ ω Ṽ (N m), and whether a bond has no stress.
     type Sum = (FamilyShare<D>, [Lanes; 1]);
     type Force = [Lanes; D];
@@ -153,10 +153,10 @@ impl<const D: usize> Law<D> for BondAssociated {
     const FORCE_READS_SHORTENING: bool = false;
     const HAS_BOND_STRESS_ACROSS: bool = true;
     // The stresses, in a loop of their own, take most of the time.
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
+    fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
         (shape_share(&bond.reference), [Lanes::splat(1.0)])
     }
 
@@ -169,7 +169,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     }
 
     /// The trace of a whole family's shape tensor over its own.
-    fn overload(&self, sums: &[f64]) -> f64 {
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(sums);
         if shape.inverse().is_some() {
             self.whole / shape.trace()
@@ -179,7 +179,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     }
 
     #[inline(always)]
-    fn share<const S: usize>(
+    fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
         (_, (gradient, _)): &Point<D>,
@@ -189,7 +189,7 @@ impl<const D: usize> Law<D> for BondAssociated {
             return (family_share(bond), [Lanes::splat(1.0)]);
         }
         let OfBonds { piola, missing, .. } = self.stresses(bond, gradient);
-        let n: [Lanes; D] = Numbers::each(|d| bond.reference[d] * bond.inverse);
+        let n: [Lanes; D] = LaneTuple::each(|d| bond.reference[d] * bond.inverse);
         let mut sum = Self::Sum::splat(0.0);
         for a in 0..D {
             let mut along = piola[a][0] * n[0];
@@ -204,7 +204,7 @@ impl<const D: usize> Law<D> for BondAssociated {
         sum
     }
 
-    fn point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
+    fn update_point(&self, pass: usize, sums: &[f64], numbers: &mut [f64], _: &mut PlasticState) {
         let (direct, inverse) = (Places::direct::<D>(), Places::inverse::<D>());
         let singular = Places::singular::<D>();
         if pass == 0 {
@@ -239,7 +239,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     ) -> [Lanes; D] {
         let stress = self.stresses(bond, gradient).piola;
         let share = bond.inverse * bond.inverse * *weight;
-        Numbers::each(|a| {
+        LaneTuple::each(|a| {
             let mut sum = (stress[a][0] * share + direct[a][0]) * bond.reference[0];
             for b in 1..D {
                 sum += (stress[a][b] * share + direct[a][b]) * bond.reference[b];

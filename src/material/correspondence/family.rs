@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix};
 
 use super::super::{Bond, Rotation, rotation};
-use crate::lanes::{Lanes, Numbers};
+use crate::lanes::{LaneTuple, Lanes};
 
 /// A shape tensor is singular where its determinant is below this share of that of a family of the same
 /// size that looks alike in all directions.
@@ -47,7 +47,7 @@ pub type FamilyShare<const D: usize> = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D
 #[inline(always)]
 pub fn family_share<const D: usize>(bond: &Bond<D>) -> FamilyShare<D> {
     let xi = &bond.reference;
-    let motion = Numbers::each(|k| bond.moved[k / D] * xi[k % D]);
+    let motion = LaneTuple::each(|k| bond.eta[k / D] * xi[k % D]);
     (shape_share(xi), motion)
 }
 
@@ -58,7 +58,7 @@ pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) 
     for (k, (a, b)) in mixed::<D>().enumerate() {
         others[k] = xi[a] * xi[b];
     }
-    (Numbers::each(|d| xi[d] * xi[d]), others)
+    (LaneTuple::each(|d| xi[d] * xi[d]), others)
 }
 
 /// A symmetric tensor from its diagonal and mixed entries.

@@ -28,7 +28,7 @@ use super::{
     Bond, Built, Declaration, Declared, Described, ForceState, Given, Influence, Invariants, Key,
     Kind, Law, PlasticState, Rotation, Values, Word,
 };
-use crate::lanes::{Lanes, Numbers, Simd};
+use crate::lanes::{LaneTuple, Lanes, Simd};
 pub use bond_associated::BondAssociated;
 use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
@@ -186,16 +186,16 @@ fn row<S: Simd, const D: usize>(
         sum = simd.multiply_add(direct[a][b], bond.reference[b], sum);
     }
     for b in 0..D {
-        sum = simd.multiply_add(symmetric(control, a, b), bond.moved[b], sum);
+        sum = simd.multiply_add(symmetric(control, a, b), bond.eta[b], sum);
     }
     sum
 }
 
 impl<const D: usize> Law<D> for Correspondence {
     type Point = Point<D>;
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     /// K by diagonal and mixed entries (m⁵), and Σ ω Ṽ (m³).
-    type WholeSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
+    type ReferenceSum = (([Lanes; D], [Lanes; D]), [Lanes; 1]);
     /// K as in the whole sum, and Σ ω η⊗ξ Ṽ (m⁵).
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
@@ -207,7 +207,7 @@ impl<const D: usize> Law<D> for Correspondence {
     const FORCE_READS_SHORTENING: bool = false;
 
     #[inline(always)]
-    fn whole_share(&self, bond: &Bond<D>) -> Self::WholeSum {
+    fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
         (shape_share(&bond.reference), [Lanes::splat(1.0)])
     }
 
@@ -223,7 +223,7 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     /// The trace of K⁻¹ over that of a whole family.
-    fn overload(&self, sums: &[f64]) -> f64 {
+    fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         shape
             .inverse()
@@ -231,11 +231,16 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     #[inline(always)]
-    fn share<const S: usize>(&self, bond: &Bond<D>, _: &Self::Point, _: &[Lanes; 0]) -> Self::Sum {
+    fn pass_contribution<const S: usize>(
+        &self,
+        bond: &Bond<D>,
+        _: &Self::Point,
+        _: &[Lanes; 0],
+    ) -> Self::Sum {
         family_share(bond)
     }
 
-    fn point(&self, _: usize, sums: &[f64], numbers: &mut [f64], state: &mut PlasticState) {
+    fn update_point(&self, _: usize, sums: &[f64], numbers: &mut [f64], state: &mut PlasticState) {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
         let (constants, found) = numbers.split_at_mut(CONSTANTS);
         let own = D * D + 2 * D;
@@ -268,7 +273,7 @@ impl<const D: usize> Law<D> for Correspondence {
         for a in 0..D {
             for b in 0..D {
                 let of_control = symmetric(control, a, b);
-                force[a] += direct[a][b] * bond.reference[b] + of_control * bond.moved[b];
+                force[a] += direct[a][b] * bond.reference[b] + of_control * bond.eta[b];
             }
         }
         force
@@ -283,9 +288,9 @@ impl<const D: usize> Law<D> for Correspondence {
         _: &[[Lanes; 0]; 2],
         weights: Weights,
     ) -> [Lanes; D] {
-        let pull = times_bond(simd, here, bond);
-        let push = times_bond(simd, there, bond);
-        Numbers::each(|d| simd.whole(weights.sum(pull[d], push[d])))
+        let force_state_i = times_bond(simd, here, bond);
+        let force_state_j = times_bond(simd, there, bond);
+        LaneTuple::each(|d| simd.whole(weights.sum(force_state_i[d], force_state_j[d])))
     }
 
     #[inline(always)]
@@ -305,11 +310,11 @@ impl<const D: usize> Law<D> for Correspondence {
     }
 
     #[inline(always)]
-    fn bond_energy(&self, bond: &Bond<D>, end: &Point<D>, memory: &[Lanes; 0]) -> Lanes {
-        let force = self.force(bond, end, memory);
-        let mut work = force[0] * bond.moved[0];
+    fn bond_energy(&self, bond: &Bond<D>, end: &Point<D>, history: &[Lanes; 0]) -> Lanes {
+        let force = self.force(bond, end, history);
+        let mut work = force[0] * bond.eta[0];
         for d in 1..D {
-            work += force[d] * bond.moved[d];
+            work += force[d] * bond.eta[d];
         }
         work * 0.5
     }
@@ -318,7 +323,7 @@ impl<const D: usize> Law<D> for Correspondence {
         numbers[CONSTANTS + D * D + 2 * D]
     }
 
-    fn flows(&self) -> bool {
+    fn has_plasticity(&self) -> bool {
         self.plastic.is_some()
     }
 

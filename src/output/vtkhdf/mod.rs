@@ -88,7 +88,7 @@ pub struct ResultFile<'a> {
     history: Option<History>,
 }
 
-/// Numbers of the steps that are known in advance.
+/// LaneTuple of the steps that are known in advance.
 struct Table {
     dataset: Dataset,
     rule: Rule,

@@ -1,7 +1,7 @@
 //! What comes of bonds that break.
 //!
 //! A bond breaks where the forces are summed, by what the force states of both ends say, and is not in
-//! these sums any more. Numbers of points that follow from sums over bonds, and the forces that follow
+//! these sums any more. LaneTuple of points that follow from sums over bonds, and the forces that follow
 //! from them, are then found anew: only at the points that a broken bond changes.
 
 use std::ops::Range;
@@ -12,7 +12,7 @@ use crate::families::Which;
 use crate::solver::model::Model;
 
 use super::evaluate::{Acting, ForceTimes, News};
-use super::force::Evolution;
+use super::force::BondUpdate;
 use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
 use super::{Forces, Pass};
@@ -37,10 +37,10 @@ pub struct Broken<const D: usize> {
 
 impl<const D: usize> Broken<D> {
     /// From the sums over the bonds of a point that break.
-    pub(super) fn new(told: &BrokenSums) -> Self {
-        let [count, energy, overshoot, force @ ..] = told.sums;
+    pub(super) fn new(broken_sums: &BrokenSums) -> Self {
+        let [count, energy, overshoot, force @ ..] = broken_sums.sums;
         Self {
-            point: told.point,
+            point: broken_sums.point,
             count: count as u64,
             energy,
             overshoot,
@@ -73,7 +73,7 @@ impl<const D: usize> Forces<D> {
         comm: &dyn Communicator,
         model: &Model<D>,
         mut acting: Acting<'_, D>,
-        evolution: Evolution,
+        bond_update: BondUpdate,
         times: &mut ForceTimes,
     ) {
         self.broken.sort_by_key(|broken| broken.point);
@@ -101,7 +101,7 @@ impl<const D: usize> Forces<D> {
         let halo_before = times.halo;
         let own: Vec<usize> = self.broken.iter().map(|broken| broken.point).collect();
         for points in self.ranges(own.iter().copied()) {
-            self.find_numbers(points, model, &mut acting, evolution);
+            self.find_numbers(points, model, &mut acting, bond_update);
         }
         let changed = self.send_numbers(comm, model, acting.displacement, own, times);
         for points in self.ranges(changed.into_iter()) {
@@ -117,7 +117,7 @@ impl<const D: usize> Forces<D> {
         points: Range<usize>,
         model: &Model<D>,
         acting: &mut Acting<'_, D>,
-        evolution: Evolution,
+        bond_update: BondUpdate,
     ) {
         let Acting {
             displacement,
@@ -130,8 +130,8 @@ impl<const D: usize> Forces<D> {
                 self.update(News::OwnNumbers, Which::Owned, model, displacement);
             }
             self.clear(pass, points.clone());
-            self.run(pass, points.clone(), force, Evolution::None);
-            self.finish(pass, points.clone(), model, evolution, plastic);
+            self.run(pass, points.clone(), force, BondUpdate::None);
+            self.finish(pass, points.clone(), model, bond_update, plastic);
         }
         // Bonds read what lattices show of the points.
         self.update(News::OwnNumbers, Which::Owned, model, displacement);
@@ -183,7 +183,7 @@ impl<const D: usize> Forces<D> {
         halo.bring(comm, &mut columns.collect::<Vec<_>>());
         self.halo = halo;
         times.halo += start.elapsed();
-        self.update(News::Numbers, Which::All, model, displacement);
+        self.update(News::LaneTuple, Which::All, model, displacement);
         let mut changed = own.clone();
         for interaction in &self.interactions {
             for point in &own {
@@ -207,7 +207,7 @@ impl<const D: usize> Forces<D> {
         for column in force.iter_mut() {
             column[points.clone()].fill(0.0);
         }
-        self.run(Pass::Force, points.clone(), force, Evolution::None);
+        self.run(Pass::Force, points.clone(), force, BondUpdate::None);
         for (k, point) in points.enumerate() {
             let lost: [f64; D] = std::array::from_fn(|d| before[d][k] - force[d][point]);
             if lost == [0.0; D] {
@@ -231,7 +231,7 @@ impl<const D: usize> Forces<D> {
 
     /// The points in ascending ranges, each with all points whose bonds are worked on together.
     fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
-        let mut ranges: Vec<Range<usize>> = points.map(|point| self.together(point)).collect();
+        let mut ranges: Vec<Range<usize>> = points.map(|point| self.lane_group(point)).collect();
         ranges.sort_unstable_by_key(|range| range.start);
         let mut merged: Vec<Range<usize>> = Vec::new();
         for range in ranges {

@@ -8,13 +8,13 @@ use rayon::prelude::*;
 use crate::comm::Communicator;
 use crate::damage::Criterion;
 use crate::families::{BlockBonds, Which};
-use crate::lanes::{Column, Lanes, Numbers};
+use crate::lanes::{Column, LaneTuple, Lanes};
 use crate::material::bond::stretch_of;
 use crate::material::{Law, MOST, with_pair};
 use crate::solver::model::Model;
 
 use super::broken::Broken;
-use super::force::{Evolution, Force};
+use super::force::{BondUpdate, Force};
 use super::list_points;
 use super::point_numbers::PlasticColumns;
 use super::point_sums::{PassSum, SmallestStretch};
@@ -36,8 +36,8 @@ const MOST_CHANGING: usize = MOST.point + 3;
 pub(super) enum News {
     Displacement,
     Thresholds,
-    Numbers,
-    /// Numbers again, but only those of the own ends.
+    LaneTuple,
+    /// LaneTuple again, but only those of the own ends.
     OwnNumbers,
     Nothing,
 }
@@ -70,14 +70,14 @@ pub struct Acting<'a, const D: usize> {
 
 impl<const D: usize> Forces<D> {
     /// Brings the ghosts up to date and adds up the internal force densities. The bonds have been
-    /// [shown](Self::with_shown) the owned points. `evolution` says what changes besides the forces; what
+    /// [shown](Self::with_bond_inputs) the owned points. `bond_update` says what changes besides the forces; what
     /// comes of bonds that break is in [`Self::broken`]. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
         acting: Acting<'_, D>,
-        evolution: Evolution,
+        bond_update: BondUpdate,
         times: &mut ForceTimes,
     ) {
         let Acting {
@@ -97,7 +97,7 @@ impl<const D: usize> Forces<D> {
             match news {
                 News::Displacement => halo.pack(displacement.iter().map(Vec::as_slice)),
                 News::Thresholds => halo.pack([&self.limits.thresholds[..]].into_iter()),
-                News::Numbers => {
+                News::LaneTuple => {
                     let (columns, count) = self.changing_columns();
                     halo.pack(columns[..count].iter().map(|column| &**column));
                 }
@@ -116,10 +116,10 @@ impl<const D: usize> Forces<D> {
                 while rest.len() > piece && progress() {
                     let next = self.border(rest.start + piece);
                     let points = rest.start..next;
-                    timed(&mut || self.run(pass, points.clone(), force, evolution));
+                    timed(&mut || self.run(pass, points.clone(), force, bond_update));
                     rest.start = next;
                 }
-                timed(&mut || self.run(pass, rest.clone(), force, evolution));
+                timed(&mut || self.run(pass, rest.clone(), force, bond_update));
             };
             if matches!(news, News::OwnNumbers | News::Nothing) {
                 interior(&mut || false);
@@ -131,7 +131,7 @@ impl<const D: usize> Forces<D> {
                     halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
                 }
                 News::Thresholds => halo.unpack([&mut self.limits.thresholds[..]].into_iter()),
-                News::Numbers => {
+                News::LaneTuple => {
                     let (columns, count) = self.changing_columns();
                     halo.unpack(columns.into_iter().take(count));
                 }
@@ -141,19 +141,19 @@ impl<const D: usize> Forces<D> {
             let start = Instant::now();
             self.update(news, Which::Ghosts, model, displacement);
             let border = model.interior..owned;
-            self.run(pass, border, force, evolution);
-            self.finish(pass, 0..owned, model, evolution, &mut plastic);
+            self.run(pass, border, force, bond_update);
+            self.finish(pass, 0..owned, model, bond_update, &mut plastic);
             in_bonds += start.elapsed();
         }
         times.bonds += in_bonds;
         times.halo += start.elapsed() - in_bonds;
-        if evolution.is_stored() {
+        if bond_update.is_stored() {
             let acting = Acting {
                 displacement,
                 force,
                 plastic,
             };
-            self.settle(comm, model, acting, evolution, times);
+            self.settle(comm, model, acting, bond_update, times);
         }
     }
 
@@ -161,7 +161,7 @@ impl<const D: usize> Forces<D> {
     /// lattice that were cut would add to its last points before their earlier interactions do: their sums
     /// would be rounded otherwise, as messages arrive.
     fn border(&self, from: usize) -> usize {
-        let end = self.together(from - 1).end;
+        let end = self.lane_group(from - 1).end;
         if end == from { from } else { self.border(end) }
     }
 
@@ -189,7 +189,7 @@ impl<const D: usize> Forces<D> {
         ) {
             (None, _) => News::Displacement,
             (Some(Pass::SmallestStretch), _) => News::Thresholds,
-            (Some(Pass::PointSum(_)), Pass::Force) => News::Numbers,
+            (Some(Pass::PointSum(_)), Pass::Force) => News::LaneTuple,
             (Some(Pass::PointSum(_)), _) => News::OwnNumbers,
             _ => News::Nothing,
         }
@@ -209,7 +209,7 @@ impl<const D: usize> Forces<D> {
                 News::Displacement => {}
                 News::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
                 News::OwnNumbers if which == Which::Ghosts => {}
-                News::Numbers | News::OwnNumbers => {
+                News::LaneTuple | News::OwnNumbers => {
                     let first = self.numbers.first_changing;
                     grid.update_numbers(which, first, &self.numbers.columns);
                     grid.update_rotations(which, &self.limits.rotations);
@@ -249,7 +249,7 @@ impl<const D: usize> Forces<D> {
         pass: Pass,
         points: Range<usize>,
         force: &mut [Vec<f64>; D],
-        evolution: Evolution,
+        bond_update: BondUpdate,
     ) {
         match pass {
             Pass::SmallestStretch => {
@@ -268,7 +268,7 @@ impl<const D: usize> Forces<D> {
                     let (bonds, points) = (&mut interaction.bonds, points.clone());
                     with_pair!(interaction.laws, laws => {
                         let law = laws[0];
-                        sum_pass(number, bonds, points, law, evolution, &mut sums, source);
+                        sum_pass(number, bonds, points, law, bond_update, &mut sums, source);
                     });
                 });
                 self.numbers.sums = sums;
@@ -276,18 +276,18 @@ impl<const D: usize> Forces<D> {
             Pass::Force => {
                 let mut broken = std::mem::take(&mut self.broken);
                 self.for_each_interaction(|interaction, source| {
-                    let criterion = if evolution.is_stored() {
+                    let criterion = if bond_update.is_stored() {
                         interaction.criterion
                     } else {
                         Criterion::Never
                     };
                     let influence = interaction.influence;
                     with_pair!(interaction.laws, laws => {
-                        let kernel = Force { laws, criterion, influence, evolution };
+                        let kernel = Force { laws, criterion, influence, bond_update };
                         let results = force.each_mut().map(Vec::as_mut_slice);
                         let bonds = &mut interaction.bonds;
-                        let told = sweep(bonds, points.clone(), results, &kernel, source);
-                        broken.extend(told.iter().map(Broken::new));
+                        let broken_sums = sweep(bonds, points.clone(), results, &kernel, source);
+                        broken.extend(broken_sums.iter().map(Broken::new));
                     });
                 });
                 self.broken = broken;
@@ -301,7 +301,7 @@ impl<const D: usize> Forces<D> {
         pass: Pass,
         points: Range<usize>,
         model: &Model<D>,
-        evolution: Evolution,
+        bond_update: BondUpdate,
         plastic: &mut PlasticColumns<'_>,
     ) {
         let blocks = &self.blocks;
@@ -322,7 +322,7 @@ impl<const D: usize> Forces<D> {
                     });
             }
             Pass::PointSum(number) => {
-                let keeps = evolution.is_stored();
+                let keeps = bond_update.is_stored();
                 if number == 0 {
                     let rotations = &mut self.limits.rotations;
                     (self.numbers).find_rotations(points.clone(), model, blocks, rotations);
@@ -341,7 +341,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
     law: L,
-    evolution: Evolution,
+    bond_update: BondUpdate,
     sums: &mut [Column],
     source: Source<'_, D>,
 ) {
@@ -352,15 +352,15 @@ fn sum_pass<L: Law<D>, const D: usize>(
     // No law has more passes, and no loop is compiled for those that a law does not have.
     match number {
         0 if const { L::PASSES > 0 } => {
-            let kernel = PassSum::<L, 0> { law, evolution };
+            let kernel = PassSum::<L, 0> { law, bond_update };
             sweep(bonds, points, results, &kernel, source);
         }
         1 if const { L::PASSES > 1 } => {
-            let kernel = PassSum::<L, 1> { law, evolution };
+            let kernel = PassSum::<L, 1> { law, bond_update };
             sweep(bonds, points, results, &kernel, source);
         }
         2 if const { L::PASSES > 2 } => {
-            let kernel = PassSum::<L, 2> { law, evolution };
+            let kernel = PassSum::<L, 2> { law, bond_update };
             sweep(bonds, points, results, &kernel, source);
         }
         _ => unreachable!("a law with more passes than loops"),

@@ -1,7 +1,7 @@
 //! The sum of the bond forces, and the breaking of bonds by what both ends' force states say.
 
 use crate::damage::{Criterion, Ends};
-use crate::lanes::{Lanes, Numbers, Simd, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::{Wanted, Weights};
 use crate::material::{ForceState, Law};
 
@@ -9,7 +9,7 @@ use super::kernel::{Group, Kernel};
 
 /// What happens to bonds while forces are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Evolution {
+pub enum BondUpdate {
     /// Bonds break and their history advances, as at the end of a step of this length (s).
     Step(f64),
     /// Forces follow from the history that bonds would have at the end of a step of this length (s). It is not stored,
@@ -19,7 +19,7 @@ pub enum Evolution {
     None,
 }
 
-impl Evolution {
+impl BondUpdate {
     /// The time by which the history of bonds advances, s.
     #[inline(always)]
     pub fn history_step(self) -> Option<f64> {
@@ -48,7 +48,7 @@ pub struct Force<L> {
     /// Whether the weights of bonds are their influence, and not shares of volume.
     pub influence: bool,
     /// Whether bonds remember.
-    pub evolution: Evolution,
+    pub bond_update: BondUpdate,
 }
 
 impl<L> Force<L> {
@@ -64,7 +64,7 @@ impl<L> Force<L> {
         L: Law<D>,
     {
         let (laws, points) = (&self.laws, group.points());
-        L::bond_force(simd, laws, &group.bond, points, &group.memory, weights)
+        L::bond_force(simd, laws, &group.bond, points, &group.history, weights)
     }
 
     /// The work of the acting force states of each bond between whole cells, J/m⁶, from the weighted force density; 0 if
@@ -100,9 +100,9 @@ impl<L> Force<L> {
         }
         let points = group.points();
         let [i, j] = [0, 1].map(|end| {
-            let (law, memory) = (&self.laws[end], &group.memory[end]);
+            let (law, history) = (&self.laws[end], &group.history[end]);
             let rotation = &group.limits[end].rotations;
-            law.end_work(simd, &group.bond, points[end], memory, rotation)
+            law.end_work(simd, &group.bond, points[end], history, rotation)
         });
         weights.sum(i, j)
     }
@@ -141,17 +141,17 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Sums = [Lanes; D];
     type Broken = ([Lanes; 3], [Lanes; D]);
     type Point = L::Point;
-    type Memory = L::Memory;
+    type BondHistory = L::BondHistory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const VERSIONS: Versions = L::VERSIONS;
-    const NEAR: bool = L::VERSIONS.is_each()
+    const ISA_SET: IsaSet = L::ISA_SET;
+    const NEAR: bool = L::ISA_SET.is_each()
         && !L::LINEAR
-        && L::Memory::COUNT == 0
+        && L::BondHistory::COUNT == 0
         && (L::FORCE_READS_STRETCH || L::FORCE_READS_SHORTENING);
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::FORCE_READS_STRETCH,
-        shortening: L::FORCE_READS_SHORTENING,
+        extension_over_deformed: L::FORCE_READS_SHORTENING,
     };
 
     #[inline(always)]
@@ -160,20 +160,20 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     }
 
     #[inline(always)]
-    fn remembers(&self) -> bool {
-        self.evolution.is_stored()
+    fn stores_history(&self) -> bool {
+        self.bond_update.is_stored()
     }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
-        if L::Memory::COUNT > 0
-            && let Some(step) = self.evolution.history_step()
+        if L::BondHistory::COUNT > 0
+            && let Some(step) = self.bond_update.history_step()
         {
             let [own, far] = &self.laws;
             let [here, there] = group.points();
-            group.memory = [
-                own.memory(&group.bond, here, &group.memory[0], step),
-                far.memory(&group.bond, there, &group.memory[1], step),
+            group.history = [
+                own.bond_history(&group.bond, here, &group.history[0], step),
+                far.bond_history(&group.bond, there, &group.history[1], step),
             ];
         }
         let total = self.weighted(simd, group, group.weights);
@@ -198,7 +198,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         &self,
         simd: S,
         group: &mut Group<'_, Self, D>,
-        (told, lost): &mut Self::Broken,
+        (counts, lost): &mut Self::Broken,
     ) {
         let total = self.weighted(simd, group, group.weights);
         let work = self.work(simd, group, total);
@@ -206,7 +206,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         group.intact &= !broken;
         let bond = group.bond.with_stretch(L::LINEAR);
         let share = group.weights.own() * group.own_volume * group.volume;
-        let energy = self.laws[0].bond_energy(&bond, group.own, &group.memory[0]) * share;
+        let energy = self.laws[0].bond_energy(&bond, group.own, &group.history[0]) * share;
         let ends = self.ends(group);
         let late = self.criterion.overshoot::<S, L, D>(simd, &bond, ends, work);
         let overshoot = if self.criterion.reads_work() {
@@ -218,9 +218,9 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         } else {
             energy * late
         };
-        told[0] += simd.keep(Lanes::splat(1.0), broken);
-        told[1] += simd.keep(energy, broken);
-        told[2] += simd.keep(overshoot, broken);
+        counts[0] += simd.keep(Lanes::splat(1.0), broken);
+        counts[1] += simd.keep(energy, broken);
+        counts[2] += simd.keep(overshoot, broken);
         total.add(simd, &bond, group.volume, broken, lost);
     }
 }

@@ -5,14 +5,14 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 
 use crate::damage::Limits;
-use crate::families::{Adjacent, Grid, Offset, Which};
-use crate::lanes::numbers::eight;
-use crate::lanes::{Column, Lanes, Numbers, Simd};
+use crate::families::{Grid, Offset, VectorBonds, Which};
+use crate::lanes::lane_tuple::eight;
+use crate::lanes::{Column, LaneTuple, Lanes, Simd};
 use crate::material::bond::{Reference, Weights, deform};
 
 use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits};
-use super::list_points::load_memory;
+use super::list_points::load_history;
 
 /// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
 /// but are finite.
@@ -75,13 +75,13 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Takes the overloads of the local points.
-    pub fn update_overloads(&mut self, values: &[f64]) {
-        let places = &mut self.limits.overloads;
+    /// Takes the truncation_factors of the local points.
+    pub fn update_truncation_factors(&mut self, values: &[f64]) {
+        let places = &mut self.limits.truncation_factors;
         self.grid.update(Which::All, values, places);
     }
 
-    /// Memory, that of the grid included, bytes.
+    /// BondHistory, that of the grid included, bytes.
     pub fn bytes(&self) -> usize {
         let columns = self.displacement.iter().chain(&self.numbers);
         let count: usize = columns.map(|column| column.len()).sum();
@@ -125,7 +125,7 @@ impl<const D: usize> OwnedPlaces<'_, D> {
 /// The points of a grid as a kernel reads them.
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
-    numbers: <K::Point as Numbers>::Columns<'a>,
+    numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
     limit: f64,
     /// Of the own and the far ends, m³.
@@ -142,7 +142,7 @@ impl<K: Kernel<D>, const D: usize> Copy for GridPoints<'_, K, D> {}
 
 /// What is read of the own ends of bonds.
 #[derive(Clone, Copy)]
-pub struct Here<P, const D: usize> {
+pub struct OwnEnd<P, const D: usize> {
     displacement: [Lanes; D],
     numbers: P,
     limits: Limits,
@@ -206,11 +206,11 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// The place must be that of a vector of the grid.
     #[inline(always)]
-    pub unsafe fn here(&self, place: usize) -> Here<K::Point, D> {
+    pub unsafe fn here(&self, place: usize) -> OwnEnd<K::Point, D> {
         // SAFETY: `new` has checked the lengths.
         unsafe {
-            Here {
-                displacement: Numbers::each(|d| eight(self.displacement[d], place)),
+            OwnEnd {
+                displacement: LaneTuple::each(|d| eight(self.displacement[d], place)),
                 numbers: self.numbers(place),
                 limits: self.limits::<false>(place),
             }
@@ -226,8 +226,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     pub unsafe fn load<'h, S: Simd, const ONLY_NEAR: bool>(
         &self,
         simd: S,
-        here: &'h Here<K::Point, D>,
-        vector: &mut Adjacent<'_>,
+        here: &'h OwnEnd<K::Point, D>,
+        vector: &mut VectorBonds<'_>,
         o: usize,
     ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
@@ -235,16 +235,16 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         let (displacement, numbers, limits) = unsafe {
             let far = vector.far(offset);
             let component = |d| eight(self.displacement[d], far);
-            let displacement: [Lanes; D] = Numbers::each(component);
+            let displacement: [Lanes; D] = LaneTuple::each(component);
             (
                 displacement,
                 self.far_numbers(far),
                 self.limits::<ONLY_NEAR>(far),
             )
         };
-        let eta = Numbers::each(|d: usize| displacement[d] - here.displacement[d]);
+        let eta = LaneTuple::each(|d: usize| displacement[d] - here.displacement[d]);
         let reference = Reference {
-            along: Numbers::each(|d| Lanes::splat(offset.reference[d])),
+            xi: LaneTuple::each(|d| Lanes::splat(offset.reference[d])),
             length: Lanes::splat(offset.length),
             inverse: Lanes::splat(offset.inverse),
             inverse_square: Lanes::splat(offset.inverse_square),
@@ -262,7 +262,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             own: &here.numbers,
             far: numbers,
             limits: [here.limits, limits],
-            memory: load_memory::<K::Memory>(&mut vector.groups, o),
+            history: load_history::<K::BondHistory>(&mut vector.groups, o),
             intact,
             whole: 0,
             breakable: match vector.groups.breakable {

@@ -4,7 +4,7 @@
 //! law and storage: the bonds may be those of one point or those of eight.
 
 use crate::damage::{Criterion, Limits};
-use crate::lanes::{Lanes, Numbers, Simd, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
 
@@ -25,7 +25,7 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     /// What the criterion reads of the own and the far ends.
     pub limits: [Limits; 2],
     /// What the bonds keep for their own and their far ends.
-    pub memory: [K::Memory; 2],
+    pub history: [K::BondHistory; 2],
     /// A bit for each bond that is intact.
     pub intact: u8,
     /// A bit for each bond, broken or not; only for kernels that want it.
@@ -82,17 +82,17 @@ pub enum Combine {
 /// Something that is summed over the bonds of points.
 pub trait Kernel<const D: usize>: Copy + Sync {
     /// Eight sums of each quantity; each is added to a column of numbers of the points.
-    type Sums: Numbers;
+    type Sums: LaneTuple;
 
     /// Eight sums of each quantity to which only bonds add that break; they are told by point, where
     /// there are any.
-    type Broken: Numbers;
+    type Broken: LaneTuple;
 
     /// The numbers of the ends that it reads.
-    type Point: Numbers;
+    type Point: LaneTuple;
 
     /// The numbers of the bonds that it reads.
-    type Memory: Numbers;
+    type BondHistory: LaneTuple;
 
     /// Whether there are bonds for it in `D` dimensions; else no loops are compiled.
     const EXISTS: bool = true;
@@ -102,7 +102,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
 
     /// For which vector instructions its loops are compiled. One that runs for outputs only takes longer to compile
     /// than it could save.
-    const VERSIONS: Versions = Versions::One;
+    const ISA_SET: IsaSet = IsaSet::One;
 
     /// Whether it is worth a loop for bonds none of which is marked.
     const NEAR: bool = false;
@@ -128,7 +128,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
 
     /// Whether it changes what bonds keep.
     #[inline(always)]
-    fn remembers(&self) -> bool {
+    fn stores_history(&self) -> bool {
         false
     }
 

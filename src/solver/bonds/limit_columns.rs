@@ -11,7 +11,7 @@ pub struct LimitsRead {
     /// Thresholds.
     pub thresholds: bool,
     /// Overloads.
-    pub overloads: bool,
+    pub truncation_factors: bool,
     /// Rotations.
     pub rotations: bool,
 }
@@ -25,7 +25,7 @@ impl LimitsRead {
         };
         Self {
             thresholds: any(|law| law.alpha() > 0.0),
-            overloads: any(|law| law.family_correction() > 0.0),
+            truncation_factors: any(|law| law.family_correction() > 0.0),
             rotations: any(DamageLaw::is_objective_work)
                 && !blocks.iter().all(|block| block.law.counts::<D>().central),
         }
@@ -37,7 +37,7 @@ pub struct LimitColumns {
     /// Of the local points, or by place of a grid.
     pub thresholds: Column,
     /// As above.
-    pub overloads: Column,
+    pub truncation_factors: Column,
     /// By component; in the plane only the last one is kept.
     pub rotations: [Column; 3],
 }
@@ -53,7 +53,7 @@ impl LimitColumns {
                 of(number + 2 + k, is_read, 0.0)
             }),
             thresholds: of(number, read.thresholds, 0.0),
-            overloads: of(number + 1, read.overloads, 1.0),
+            truncation_factors: of(number + 1, read.truncation_factors, 1.0),
         }
     }
 
@@ -63,10 +63,10 @@ impl LimitColumns {
         columns.filter(|column| !column.is_empty())
     }
 
-    /// Memory, bytes.
+    /// BondHistory, bytes.
     pub fn bytes(&self) -> usize {
         let [x, y, z] = &self.rotations;
-        let columns = [&self.thresholds, &self.overloads, x, y, z];
+        let columns = [&self.thresholds, &self.truncation_factors, x, y, z];
         size_of::<f64>() * columns.map(|column| column.len()).iter().sum::<usize>()
     }
 }
@@ -75,7 +75,7 @@ impl LimitColumns {
 #[derive(Clone, Copy)]
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
-    overloads: Option<&'a [f64]>,
+    truncation_factors: Option<&'a [f64]>,
     rotations: [Option<&'a [f64]>; 3],
     /// Whether any is read: what loops ask first.
     any: bool,
@@ -95,17 +95,17 @@ impl<'a> ReadLimits<'a> {
             reads.then_some(&column[..])
         };
         let thresholds = read(criterion.reads_thresholds(), &columns.thresholds);
-        let overloads = read(criterion.reads_overloads(), &columns.overloads);
+        let truncation_factors = read(criterion.reads_overloads(), &columns.truncation_factors);
         let rotations = columns
             .rotations
             .each_ref()
             .map(|column| read(criterion.reads_rotations() && !column.is_empty(), column));
         Self {
             thresholds,
-            overloads,
+            truncation_factors,
             rotations,
             any: thresholds.is_some()
-                || overloads.is_some()
+                || truncation_factors.is_some()
                 || rotations.iter().any(Option::is_some),
         }
     }
@@ -118,8 +118,8 @@ impl<'a> ReadLimits<'a> {
             if let Some(column) = self.thresholds {
                 limits.thresholds = take(column);
             }
-            if let Some(column) = self.overloads {
-                limits.overloads = take(column);
+            if let Some(column) = self.truncation_factors {
+                limits.truncation_factors = take(column);
             }
             for (rotation, column) in limits.rotations.iter_mut().zip(self.rotations) {
                 if let Some(column) = column {

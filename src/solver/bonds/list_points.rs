@@ -3,8 +3,8 @@
 
 use crate::damage::Limits;
 use crate::families::{Groups, Row};
-use crate::lanes::numbers::gather;
-use crate::lanes::{Column, Lanes, Numbers, Simd, WIDTH};
+use crate::lanes::lane_tuple::gather;
+use crate::lanes::{Column, LaneTuple, Lanes, Simd, WIDTH};
 use crate::material::bond::{Reference, Weights, deform};
 use crate::solver::model::Model;
 
@@ -43,7 +43,7 @@ pub fn update<const D: usize>(nodes: &mut [Node], displacement: [&[f64]; D]) {
 /// The local points, ghosts included, as a kernel reads them.
 pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     nodes: &'a [Node],
-    numbers: <K::Point as Numbers>::Columns<'a>,
+    numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
     limit: f64,
 }
@@ -58,7 +58,7 @@ impl<K: Kernel<D>, const D: usize> Copy for ListPoints<'_, K, D> {}
 
 /// What is read of the own end of bonds.
 #[derive(Clone, Copy)]
-pub struct Here<P, const D: usize> {
+pub struct OwnEnd<P, const D: usize> {
     reference: [Lanes; D],
     displacement: [Lanes; D],
     volume: Lanes,
@@ -126,7 +126,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// # Safety
     /// The point must be below the reach.
     #[inline(always)]
-    pub unsafe fn here(&self, point: usize) -> Here<K::Point, D> {
+    pub unsafe fn here(&self, point: usize) -> OwnEnd<K::Point, D> {
         debug_assert!(point < self.nodes.len());
         let own = [point as u32; 8];
         // SAFETY: `new` has checked the lengths.
@@ -137,9 +137,9 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
                 self.limits(&own),
             )
         };
-        Here {
-            reference: Numbers::each(|d| Lanes::splat(node[d])),
-            displacement: Numbers::each(|d| Lanes::splat(node[DISPLACEMENT + d])),
+        OwnEnd {
+            reference: LaneTuple::each(|d| Lanes::splat(node[d])),
+            displacement: LaneTuple::each(|d| Lanes::splat(node[DISPLACEMENT + d])),
             volume: Lanes::splat(node[VOLUME]),
             numbers,
             limits,
@@ -154,29 +154,29 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     pub unsafe fn load<'h, S: Simd>(
         &self,
         simd: S,
-        here: &'h Here<K::Point, D>,
+        here: &'h OwnEnd<K::Point, D>,
         row: &mut Row<'_>,
         group: usize,
     ) -> Group<'h, K, D> {
         let neighbours = row.neighbours.group(group);
         let indices = neighbours.indices();
         debug_assert!(indices.iter().all(|n| (*n as usize) < self.nodes.len()));
-        let (first, distances) = neighbours.apart();
+        let (first, distances) = neighbours.base_and_offsets();
         // SAFETY: `new` has checked the length.
         let nodes = unsafe { self.nodes.get_unchecked(first..) };
         // SAFETY: as above.
         let columns = simd.transpose(distances.map(|k| unsafe { &nodes.get_unchecked(k).0 }));
-        let along: [Lanes; D] = Numbers::each(|d| columns[d] - here.reference[d]);
-        let eta = Numbers::each(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
-        let mut square = along[0] * along[0];
-        for xi in &along[1..] {
-            square = simd.multiply_add(*xi, *xi, square);
+        let xi: [Lanes; D] = LaneTuple::each(|d| columns[d] - here.reference[d]);
+        let eta = LaneTuple::each(|d| columns[DISPLACEMENT + d] - here.displacement[d]);
+        let mut square = xi[0] * xi[0];
+        for component in &xi[1..] {
+            square = simd.multiply_add(*component, *component, square);
         }
         // In this order the root waits for nothing but the quotient, and the stretch not for the root.
         let inverse_square = Lanes::splat(1.0) / square;
         let inverse = inverse_square.sqrt();
         let reference = Reference {
-            along,
+            xi,
             length: square * inverse,
             inverse,
             inverse_square,
@@ -196,7 +196,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             own: &here.numbers,
             far: numbers,
             limits: [here.limits, limits],
-            memory: load_memory::<K::Memory>(&mut row.groups, group),
+            history: load_history::<K::BondHistory>(&mut row.groups, group),
             whole: if K::WHOLE { row.whole(group) } else { 0 },
             intact,
             breakable: row.groups.breakable.map_or(u8::MAX, |bits| bits[group]),
@@ -206,7 +206,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
 
 /// What bonds of a group keep for their own and their far ends.
 #[inline(always)]
-pub fn load_memory<M: Numbers>(groups: &mut Groups<'_>, group: usize) -> [M; 2] {
+pub fn load_history<M: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [M; 2] {
     if M::COUNT == 0 {
         return [M::splat(0.0); 2];
     }
@@ -216,9 +216,9 @@ pub fn load_memory<M: Numbers>(groups: &mut Groups<'_>, group: usize) -> [M; 2] 
 
 /// Puts back what bonds keep, where they are intact.
 #[inline(always)]
-pub fn store_memory<M: Numbers>(all: &mut [Lanes], memory: &[M; 2], intact: u8) {
+pub fn store_history<M: LaneTuple>(all: &mut [Lanes], history: &[M; 2], intact: u8) {
     for (k, kept) in all.iter_mut().enumerate() {
-        let value = memory[k / M::COUNT].get(k % M::COUNT);
+        let value = history[k / M::COUNT].get(k % M::COUNT);
         for lane in 0..WIDTH {
             if intact >> lane & 1 == 1 {
                 kept.0[lane] = value.0[lane];

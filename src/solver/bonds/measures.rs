@@ -1,6 +1,6 @@
 //! What is summed over bonds at set-up and for output: volume, energy, stiffness, stress, dilatation.
 
-use crate::lanes::{Lanes, Numbers, Simd, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
 use crate::material::{FamilyShare, ForceState, Law, family_share};
 
@@ -11,7 +11,7 @@ const fn wanted(linear: bool) -> Wanted {
     Wanted {
         linear,
         stretch: true,
-        shortening: true,
+        extension_over_deformed: true,
     }
 }
 
@@ -29,26 +29,26 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
     type Sums = [Lanes; 4];
     type Broken = [Lanes; 0];
     type Point = L::Point;
-    type Memory = L::Memory;
+    type BondHistory = L::BondHistory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const WHOLE: bool = L::Memory::COUNT > 0;
-    const VERSIONS: Versions = Versions::Avx2;
-    const NEAR: bool = L::VERSIONS.is_each() && !L::LINEAR && L::Memory::COUNT == 0;
+    const WHOLE: bool = L::BondHistory::COUNT > 0;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const NEAR: bool = L::ISA_SET.is_each() && !L::LINEAR && L::BondHistory::COUNT == 0;
     const WANTED: Wanted = Wanted {
-        shortening: false,
+        extension_over_deformed: false,
         ..wanted(L::LINEAR)
     };
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
         let (family, own) = (group.family(), group.own);
-        let energy = self.law.bond_energy(&group.bond, own, &group.memory[0]);
+        let energy = self.law.bond_energy(&group.bond, own, &group.history[0]);
         let energy = simd.whole(group.own_share(energy));
         sums[0] += simd.keep(energy, family);
         sums[1] += simd.keep(group.volume, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
-        if L::Memory::COUNT > 0 {
-            let dissipated = self.law.dissipated(group.bond.length, &group.memory[0]);
+        if L::BondHistory::COUNT > 0 {
+            let dissipated = self.law.dissipated(group.bond.length, &group.history[0]);
             sums[3] += simd.keep(group.own_share(dissipated), group.whole);
         }
     }
@@ -63,9 +63,9 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     // At every set-up, after every refinement, and for outputs.
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const UNDEFORMED: bool = true;
     const WANTED: Wanted = wanted(true);
 
@@ -106,10 +106,10 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
     type Sums = [Lanes; 6];
     type Broken = [Lanes; 0];
     type Point = L::Point;
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     // At every set-up and after every refinement.
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const UNDEFORMED: bool = L::Point::COUNT == 0;
     const WANTED: Wanted = wanted(L::LINEAR);
 
@@ -151,14 +151,14 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
     type Sums = [Lanes; 6];
     type Broken = [Lanes; 0];
     type Point = L::Point;
-    type Memory = L::Memory;
+    type BondHistory = L::BondHistory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WANTED: Wanted = wanted(L::LINEAR);
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
         let own = group.own;
-        let force = self.law.force(&group.bond, own, &group.memory[0]);
+        let force = self.law.force(&group.bond, own, &group.history[0]);
         let force = force.times(group.weights.own()).times(group.volume);
         add_tensor::<S, D>(simd, sums, group.intact, |a, b| {
             force.dyad(&group.bond, a, b)
@@ -177,7 +177,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for StressAcross<L> {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
     type Point = L::Point;
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     const EXISTS: bool = D == 2 && L::HAS_BOND_STRESS_ACROSS;
     const WANTED: Wanted = wanted(L::LINEAR);
 
@@ -197,7 +197,7 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     type Sums = FamilyShare<D>;
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
@@ -220,7 +220,7 @@ impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
     type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     const WHOLE: bool = true;
     const WANTED: Wanted = wanted(LINEAR);
 

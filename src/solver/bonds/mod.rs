@@ -8,6 +8,7 @@
 //! Bonds break where the forces are summed, by what the force states of both ends say. What follows for
 //! the numbers of points is then found anew where it changes: see `broken.rs`.
 
+mod bond_inputs;
 mod broken;
 mod evaluate;
 mod force;
@@ -16,12 +17,11 @@ mod interaction;
 mod kernel;
 mod limit_columns;
 mod list_points;
+mod measure;
 mod measures;
 mod point_numbers;
 mod point_sums;
 mod saved;
-mod seen;
-mod shown;
 mod sweep;
 
 use std::ops::Range;
@@ -30,7 +30,7 @@ use std::sync::Arc;
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Fault, Grid, Which};
-use crate::lanes::{Instructions, Numbers};
+use crate::lanes::{Instructions, LaneTuple};
 use crate::material::{Law, with_pair};
 use crate::memory::check_room;
 
@@ -38,19 +38,19 @@ use super::model::Model;
 use grid_points::GridValues;
 use limit_columns::{LimitColumns, LimitsRead};
 use list_points::Node;
+use measure::sweep_all;
 use point_numbers::PointNumbers;
 use point_sums::FamilySum;
-use seen::sweep_all;
 use sweep::Source;
 
+pub use bond_inputs::BondInputs;
 pub use broken::Broken;
 pub use evaluate::{Acting, ForceTimes};
-pub use force::Evolution;
+pub use force::BondUpdate;
 pub use interaction::{BlockLaws, Interaction};
+pub use measure::Stored;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
-pub use seen::Stored;
-pub use shown::Shown;
 
 /// One sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,10 +63,10 @@ enum Pass {
     Force,
 }
 
-/// Numbers that the laws of an interaction keep of a bond.
+/// LaneTuple that the laws of an interaction keep of a bond.
 fn history_width<const D: usize>(interaction: &Interaction) -> usize {
     fn width<L: Law<D>, const D: usize>(_: &[L; 2]) -> usize {
-        2 * L::Memory::COUNT
+        2 * L::BondHistory::COUNT
     }
     with_pair!(&interaction.laws, laws => width::<_, D>(laws))
 }
@@ -103,7 +103,7 @@ pub struct Forces<const D: usize> {
     halo: Halo,
     instructions: Instructions,
     /// Whether bonds of any law keep numbers; the same on all ranks.
-    remembers: bool,
+    has_history: bool,
     /// Whether any bonds can break; the same on all ranks.
     breaks: bool,
     /// What came of bonds that broke in the last evaluation.
@@ -134,10 +134,10 @@ impl<const D: usize> Forces<D> {
         let read = LimitsRead::by::<D>(&blocks);
         let limits = LimitColumns::new::<D>(read, numbers.read, model.volume.len());
         let breaks = blocks.iter().any(|block| block.damage.is_some());
-        let remembers = (blocks.iter()).any(|block| block.law.counts::<D>().memory > 0);
+        let has_history = (blocks.iter()).any(|block| block.law.counts::<D>().bond_history > 0);
         for interaction in &mut interactions {
             let width = history_width::<D>(interaction);
-            interaction.bonds.remember(width);
+            interaction.bonds.allocate_history(width);
         }
         let passes = [
             read.thresholds.then_some(Pass::SmallestStretch),
@@ -164,7 +164,7 @@ impl<const D: usize> Forces<D> {
             passes,
             halo,
             instructions,
-            remembers,
+            has_history,
             breaks,
             broken: Vec::new(),
         })
@@ -174,13 +174,13 @@ impl<const D: usize> Forces<D> {
     /// else is broken yet. Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
-        if !self.numbers.with_constants && !read.overloads {
+        if !self.numbers.with_constants && !read.truncation_factors {
             return;
         }
-        let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.whole_sum];
+        let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.reference_sum];
         self.for_each_interaction(|interaction, source| {
             with_pair!(interaction.laws, laws => {
-                whole_sums(laws[0], &mut interaction.bonds, &mut sums, source);
+                reference_sums(laws[0], &mut interaction.bonds, &mut sums, source);
             });
         });
         let Self {
@@ -189,15 +189,19 @@ impl<const D: usize> Forces<D> {
             halo,
             ..
         } = self;
-        numbers.set_constants(model, &self.blocks, &sums, &mut limits.overloads);
+        numbers.set_constants(model, &self.blocks, &sums, &mut limits.truncation_factors);
         let columns = numbers.columns[..numbers.read].iter_mut();
-        let overloads = read.overloads.then_some(&mut limits.overloads);
-        let columns = columns.chain(overloads).map(|column| &mut column[..]);
+        let truncation_factors = read
+            .truncation_factors
+            .then_some(&mut limits.truncation_factors);
+        let columns = columns
+            .chain(truncation_factors)
+            .map(|column| &mut column[..]);
         halo.bring(comm, &mut columns.collect::<Vec<_>>());
         for grid in &mut self.grids {
             grid.update_numbers(Which::All, 0, &self.numbers.columns);
-            if read.overloads {
-                grid.update_overloads(&self.limits.overloads);
+            if read.truncation_factors {
+                grid.update_truncation_factors(&self.limits.truncation_factors);
             }
         }
     }
@@ -236,7 +240,7 @@ impl<const D: usize> Forces<D> {
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))
     }
 
-    /// Memory of the bonds and of what they read of the points, bytes.
+    /// BondHistory of the bonds and of what they read of the points, bytes.
     pub fn bytes(&self) -> usize {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
         let grids: usize = self.grids.iter().map(GridValues::bytes).sum();
@@ -251,17 +255,19 @@ impl<const D: usize> Forces<D> {
     }
 
     /// The owned points, one after the other, whose bonds are worked on together with those of one of them.
-    fn together(&self, point: usize) -> Range<usize> {
+    fn lane_group(&self, point: usize) -> Range<usize> {
         let bonds = self.interactions.iter().map(|it| &it.bonds);
-        let together = bonds.map(|bonds| bonds.together(point));
+        let together = bonds.map(|bonds| bonds.lane_group(point));
         together.fold(point..point + 1, |all, one| {
             all.start.min(one.start)..all.end.max(one.end)
         })
     }
 
     /// Whether points of any law keep a plastic state; the same on all ranks.
-    pub fn flow(&self) -> bool {
-        self.blocks.iter().any(|block| Law::<D>::flows(&block.law))
+    pub fn has_plasticity(&self) -> bool {
+        self.blocks
+            .iter()
+            .any(|block| Law::<D>::has_plasticity(&block.law))
     }
 
     /// The vector instructions of the loops.
@@ -294,8 +300,8 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Whether bonds of any law keep numbers from step to step; the same on all ranks.
-    pub fn remember(&self) -> bool {
-        self.remembers
+    pub fn has_history(&self) -> bool {
+        self.has_history
     }
 
     /// Calls `found` with the local indices of both ends of every broken bond of the owned points.
@@ -342,13 +348,13 @@ impl<const D: usize> Forces<D> {
 }
 
 /// Adds up what gives the points of a law their constants, if they have any.
-fn whole_sums<L: Law<D>, const D: usize>(
+fn reference_sums<L: Law<D>, const D: usize>(
     law: L,
     bonds: &mut BlockBonds,
     sums: &mut [Vec<f64>],
     source: Source<'_, D>,
 ) {
-    if const { L::WholeSum::COUNT > 0 } {
+    if const { L::ReferenceSum::COUNT > 0 } {
         sweep_all(bonds, sums, &FamilySum { law }, source);
     }
 }

@@ -11,7 +11,7 @@ use super::interaction::BlockLaws;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// Numbers of a point, at most.
+/// LaneTuple of a point, at most.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
 /// The first of the columns of the plastic state among those that a pass works on.
@@ -65,26 +65,26 @@ impl PointNumbers {
     }
 
     /// Finds the constants of the owned points from sums over their whole families, by column, and their
-    /// [overloads](Law::overload), unless that column is empty.
+    /// [truncation_factors](Law::truncation_factor), unless that column is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         model: &Model<D>,
         blocks: &[BlockLaws],
         sums: &[Vec<f64>],
-        overloads: &mut [f64],
+        truncation_factors: &mut [f64],
     ) {
         for point in 0..model.owned() {
             let law = blocks[usize::from(model.block[point])].law;
             let count = law.counts::<D>();
-            let mut own = [0.0; MOST.whole_sum];
+            let mut own = [0.0; MOST.reference_sum];
             for (own, column) in own.iter_mut().zip(sums) {
                 *own = column[point];
             }
-            if let Some(overload) = overloads.get_mut(point) {
-                *overload = Law::<D>::overload(&law, &own[..count.whole_sum]);
+            if let Some(truncation_factor) = truncation_factors.get_mut(point) {
+                *truncation_factor = Law::<D>::truncation_factor(&law, &own[..count.reference_sum]);
             }
             let mut numbers = [0.0; NUMBERS];
-            Law::<D>::constants(&law, &own[..count.whole_sum], &mut numbers);
+            Law::<D>::constants(&law, &own[..count.reference_sum], &mut numbers);
             for (column, number) in self.columns.iter_mut().zip(numbers).take(count.constants) {
                 column[point] = number;
             }
@@ -170,7 +170,7 @@ impl PointNumbers {
                 }
                 let before = PlasticState::of(std::array::from_fn(|p| get(PLASTIC + p)));
                 let mut after = before;
-                Law::<D>::point(law, pass, &sums[..counts.sum], &mut numbers, &mut after);
+                Law::<D>::update_point(law, pass, &sums[..counts.sum], &mut numbers, &mut after);
                 for (column, number) in columns.iter_mut().zip(numbers).take(found) {
                     column[k] = number;
                 }

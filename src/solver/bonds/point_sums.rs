@@ -1,10 +1,10 @@
 //! The sums over bonds that the numbers of points follow from.
 
-use crate::lanes::{Lanes, Numbers, Simd, Versions};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::Law;
 use crate::material::bond::Wanted;
 
-use super::force::Evolution;
+use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
 /// Neither stretches nor forces.
@@ -12,7 +12,7 @@ const fn growth_only(linear: bool) -> Wanted {
     Wanted {
         linear,
         stretch: false,
-        shortening: false,
+        extension_over_deformed: false,
     }
 }
 
@@ -22,35 +22,37 @@ pub struct PassSum<L, const N: usize> {
     /// The law of the own end.
     pub law: L,
     /// Whether the history of bonds advances, as in the sum of the forces that follows.
-    pub evolution: Evolution,
+    pub bond_update: BondUpdate,
 }
 
 impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Sums = L::Sum;
     type Broken = [Lanes; 0];
     type Point = L::Point;
-    type Memory = L::Memory;
+    type BondHistory = L::BondHistory;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const VERSIONS: Versions = L::VERSIONS;
+    const ISA_SET: IsaSet = L::ISA_SET;
     const NEAR: bool =
-        L::VERSIONS.is_each() && !L::LINEAR && L::Memory::COUNT == 0 && L::SUM_READS_STRETCH;
+        L::ISA_SET.is_each() && !L::LINEAR && L::BondHistory::COUNT == 0 && L::SUM_READS_STRETCH;
     const READS_FAR: bool = false;
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::SUM_READS_STRETCH,
-        shortening: false,
+        extension_over_deformed: false,
     };
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::Sum) {
-        let mut history = group.memory[0];
-        if L::Memory::COUNT > 0
+        let mut history = group.history[0];
+        if L::BondHistory::COUNT > 0
             && self.law.reads_advanced_history(N)
-            && let Some(step) = self.evolution.history_step()
+            && let Some(step) = self.bond_update.history_step()
         {
-            history = (self.law).memory(&group.bond, group.own, &history, step);
+            history = (self.law).bond_history(&group.bond, group.own, &history, step);
         }
-        let share = self.law.share::<N>(&group.bond, group.own, &history);
+        let share = self
+            .law
+            .pass_contribution::<N>(&group.bond, group.own, &history);
         let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
             // Length, stretch and direction of a bond that only fills up a group are not numbers.
@@ -75,24 +77,24 @@ pub struct FamilySum<L> {
 }
 
 impl<L: Law<D>, const D: usize> Kernel<D> for FamilySum<L> {
-    type Sums = L::WholeSum;
+    type Sums = L::ReferenceSum;
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const WHOLE: bool = true;
-    const VERSIONS: Versions = Versions::Avx2;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
     const WANTED: Wanted = growth_only(L::LINEAR);
 
     #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::WholeSum) {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::ReferenceSum) {
         let counted = if self.law.needs_shape() {
             group.whole
         } else {
             group.intact
         };
-        let share = self.law.whole_share(&group.bond);
-        for k in 0..L::WholeSum::COUNT {
+        let share = self.law.reference_contribution(&group.bond);
+        for k in 0..L::ReferenceSum::COUNT {
             let share = share.get(k) * group.volume * group.weights.own();
             *sums.get_mut(k) += simd.keep(share, counted);
         }
@@ -108,9 +110,9 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
-    type Memory = [Lanes; 0];
+    type BondHistory = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;
-    const VERSIONS: Versions = Versions::Each;
+    const ISA_SET: IsaSet = IsaSet::Each;
     const WANTED: Wanted = growth_only(false);
 
     #[inline(always)]
@@ -121,7 +123,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, [smallest]: &mut [Lanes; 1]) {
         let none = Lanes::splat(f64::INFINITY);
-        let growth = simd.select(group.bond.growth, group.family(), none);
+        let growth = simd.select(group.bond.relative_square_extension, group.family(), none);
         *smallest = growth.min(*smallest);
     }
 }

@@ -7,16 +7,16 @@ use std::ops::Range;
 
 use rustc_hash::FxHashMap;
 
-use crate::families::{Adjacent, BlockBonds, Row, Rows, Vectors};
+use crate::families::{BlockBonds, Row, Rows, VectorBonds, Vectors};
 use crate::lanes::simd::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
-use crate::lanes::{Column, Instructions, Lanes, Numbers, Simd, Versions, WIDTH};
+use crate::lanes::{Column, Instructions, IsaSet, LaneTuple, Lanes, Simd, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
 use super::kernel::{Combine, Kernel};
 use super::limit_columns::LimitColumns;
-use super::list_points::{ListPoints, Node, store_memory};
+use super::list_points::{ListPoints, Node, store_history};
 
 /// Bonds by groups of eight below which a task is not split further.
 const LEAF: usize = 2048;
@@ -32,7 +32,7 @@ const MOST_KNOWN: usize = 256;
 pub struct Source<'a, const D: usize> {
     /// Geometry for lists; empty where there is no list.
     pub nodes: &'a [Node],
-    /// Numbers of the points by column, for lists.
+    /// LaneTuple of the points by column, for lists.
     pub numbers: &'a [Column],
     /// What criteria read of the points, for lists.
     pub limits: &'a LimitColumns,
@@ -43,7 +43,7 @@ pub struct Source<'a, const D: usize> {
 }
 
 /// The columns of numbers of the points that a kernel adds to.
-type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as Numbers>::ColumnsMut<'a>;
+type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// What a kernel sums over the bonds of a point that break.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +71,7 @@ trait Part: Sized + Send {
 
 /// A kernel with what it reads, for one kind of storage.
 trait Runner<P: Part>: Sync {
-    type Sums: Numbers;
+    type Sums: LaneTuple;
 
     /// Goes through a part; `base` is the local index of the first entry of the results.
     fn run<S: Simd>(
@@ -79,11 +79,11 @@ trait Runner<P: Part>: Sync {
         simd: S,
         part: P,
         base: usize,
-        results: <Self::Sums as Numbers>::ColumnsMut<'_>,
+        results: <Self::Sums as LaneTuple>::ColumnsMut<'_>,
     ) -> Vec<BrokenSums>;
 
     /// For which vector instructions it is compiled.
-    const VERSIONS: Versions;
+    const ISA_SET: IsaSet;
 }
 
 /// Runs the kernel over the bonds of the owned points in a range of local indices. The results are
@@ -174,7 +174,7 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
 fn split<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
-    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    results: <R::Sums as LaneTuple>::ColumnsMut<'_>,
     runner: &R,
     leaf: usize,
     instructions: Instructions,
@@ -188,9 +188,9 @@ fn split<P: Part, R: Runner<P>>(
     let [results_a, results_b] = R::Sums::split_at(results, border - base);
     let half = |part, base, results| {
         let mut work = Some((part, results));
-        move |told: &mut Vec<BrokenSums>| {
+        move |broken_sums: &mut Vec<BrokenSums>| {
             if let Some((part, results)) = work.take() {
-                *told = split(part, base, results, runner, leaf, instructions);
+                *broken_sums = split(part, base, results, runner, leaf, instructions);
             }
         }
     };
@@ -207,26 +207,26 @@ type Half<'a> = &'a mut (dyn FnMut(&mut Vec<BrokenSums>) + Send);
 
 /// Does both halves, on several threads if some are free; compiled once for all loops.
 fn both([first, second]: [Half<'_>; 2]) -> [Vec<BrokenSums>; 2] {
-    let mut told = [Vec::new(), Vec::new()];
-    let [of_first, of_second] = &mut told;
+    let mut broken_sums = [Vec::new(), Vec::new()];
+    let [of_first, of_second] = &mut broken_sums;
     rayon::join(|| first(of_first), || second(of_second));
-    told
+    broken_sums
 }
 
 fn run<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
-    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    results: <R::Sums as LaneTuple>::ColumnsMut<'_>,
     runner: &R,
     instructions: Instructions,
 ) -> Vec<BrokenSums> {
-    if const { R::VERSIONS.is_one() } {
+    if const { R::ISA_SET.is_one() } {
         return runner.run(Portable::<false>, part, base, results);
     }
     match instructions {
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512(simd) => {
-            if const { R::VERSIONS.is_each() } {
+            if const { R::ISA_SET.is_each() } {
                 // SAFETY: the machine has the instructions, as `simd` shows.
                 unsafe { run_avx512(simd, part, base, results, runner) }
             } else {
@@ -248,7 +248,7 @@ fn run_avx512<P: Part, R: Runner<P>>(
     simd: Avx512,
     part: P,
     base: usize,
-    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    results: <R::Sums as LaneTuple>::ColumnsMut<'_>,
     runner: &R,
 ) -> Vec<BrokenSums> {
     runner.run(simd, part, base, results)
@@ -260,7 +260,7 @@ fn run_avx2<P: Part, R: Runner<P>>(
     simd: Avx2,
     part: P,
     base: usize,
-    results: <R::Sums as Numbers>::ColumnsMut<'_>,
+    results: <R::Sums as LaneTuple>::ColumnsMut<'_>,
     runner: &R,
 ) -> Vec<BrokenSums> {
     runner.run(simd, part, base, results)
@@ -304,8 +304,8 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
 
 /// The sums over bonds that break, 0 for those that a kernel does not have.
 #[inline(always)]
-fn all_broken<N: Numbers>(broken: &N) -> [Lanes; MOST_BROKEN] {
-    Numbers::each(|k| {
+fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MOST_BROKEN] {
+    LaneTuple::each(|k| {
         if k < N::COUNT {
             broken.get(k)
         } else {
@@ -317,20 +317,20 @@ fn all_broken<N: Numbers>(broken: &N) -> [Lanes; MOST_BROKEN] {
 /// Notes what comes of the bonds of a point that break.
 #[cold]
 #[inline(never)]
-fn note_point(told: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; MOST_BROKEN]) {
+fn note_point(broken_sums: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; MOST_BROKEN]) {
     let sums = broken.map(Lanes::sum);
-    told.push(BrokenSums { point, sums });
+    broken_sums.push(BrokenSums { point, sums });
 }
 
 /// Notes what comes of the bonds of eight adjacent points that break.
 #[cold]
 #[inline(never)]
-fn note_vector(told: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MOST_BROKEN]) {
+fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MOST_BROKEN]) {
     for lane in 0..WIDTH {
         let sums = broken.map(|lanes| lanes.0[lane]);
         if sums[0] > 0.0 {
             let point = first + lane;
-            told.push(BrokenSums { point, sums });
+            broken_sums.push(BrokenSums { point, sums });
         }
     }
 }
@@ -340,14 +340,14 @@ const PATIENCE: usize = 7;
 
 /// Which loop the next vector goes through. In lists a loop of its own gains nothing: there the time goes into
 /// fetching the far ends.
-struct Turns {
+struct FastPathGate {
     /// Whether there is a loop for vectors without marked bonds.
     near: bool,
     /// How many are not to be tried by it.
     waiting: usize,
 }
 
-impl Turns {
+impl FastPathGate {
     fn new<K: Kernel<D>, const D: usize>(kernel: &K) -> Self {
         Self {
             near: kernel.is_plain_near(),
@@ -361,9 +361,9 @@ impl Turns {
     fn sum<'b, K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
         simd: S,
-        vector: &mut Adjacent<'b>,
-        near: impl FnOnce(&mut Adjacent<'b>) -> Option<K::Sums>,
-        whole: impl FnOnce(&mut Adjacent<'b>) -> (K::Sums, u8),
+        vector: &mut VectorBonds<'b>,
+        near: impl FnOnce(&mut VectorBonds<'b>) -> Option<K::Sums>,
+        whole: impl FnOnce(&mut VectorBonds<'b>) -> (K::Sums, u8),
     ) -> (K::Sums, u8) {
         if const { !K::NEAR } {
             return whole(vector);
@@ -384,11 +384,11 @@ impl Turns {
 /// [undeformed](Kernel::UNDEFORMED).
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
-impl<N: Numbers> Known<N> {
+impl<N: LaneTuple> Known<N> {
     fn sums<'b>(
         &mut self,
-        vector: &mut Adjacent<'b>,
-        sum: impl FnOnce(&mut Adjacent<'b>) -> N,
+        vector: &mut VectorBonds<'b>,
+        sum: impl FnOnce(&mut VectorBonds<'b>) -> N,
     ) -> N {
         if let Some(sums) = self.0.get(&*vector.groups.intact) {
             return *sums;
@@ -411,7 +411,7 @@ unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
     simd: S,
     kernel: K,
     points: GridPoints<'_, K, D>,
-    vector: &mut Adjacent<'_>,
+    vector: &mut VectorBonds<'_>,
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
     // SAFETY: passed on to the caller.
@@ -419,7 +419,7 @@ unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
         let mut bonds = unsafe { points.load::<S, true>(simd, &here, vector, o) };
-        if bonds.bond.marked != 0 {
+        if bonds.bond.beyond_series != 0 {
             return None;
         }
         kernel.add_near(simd, &mut bonds, &mut sums);
@@ -438,7 +438,7 @@ unsafe fn whole_vector<K: Kernel<D>, S: Simd, const D: usize>(
     kernel: K,
     points: GridPoints<'_, K, D>,
     whole: Option<&[u8]>,
-    vector: &mut Adjacent<'_>,
+    vector: &mut VectorBonds<'_>,
 ) -> (K::Sums, u8) {
     let mut sums = kernel.start();
     let mut gone = 0;
@@ -453,8 +453,8 @@ unsafe fn whole_vector<K: Kernel<D>, S: Simd, const D: usize>(
         let before = bonds.intact;
         kernel.add(simd, &mut bonds, &mut sums);
         gone |= before ^ bonds.intact;
-        if K::Memory::COUNT > 0 && kernel.remembers() {
-            store_memory(vector.groups.numbers(o), &bonds.memory, before);
+        if K::BondHistory::COUNT > 0 && kernel.stores_history() {
+            store_history(vector.groups.numbers(o), &bonds.history, before);
         }
     }
     (sums, gone)
@@ -467,7 +467,7 @@ struct OverRows<'a, K: Kernel<D>, const D: usize> {
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
     type Sums = K::Sums;
-    const VERSIONS: Versions = K::VERSIONS;
+    const ISA_SET: IsaSet = K::ISA_SET;
 
     #[inline(always)]
     fn run<S: Simd>(
@@ -477,7 +477,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
         base: usize,
         mut results: Results<'_, K, D>,
     ) -> Vec<BrokenSums> {
-        let mut told = Vec::new();
+        let mut broken_sums = Vec::new();
         let (kernel, points) = (*self.kernel, self.points);
         for k in 0..rows.len() {
             let mut row: Row<'_> = rows.row(k);
@@ -491,8 +491,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 let before = bonds.intact;
                 kernel.add(simd, &mut bonds, &mut sums);
                 gone |= before ^ bonds.intact;
-                if K::Memory::COUNT > 0 && kernel.remembers() {
-                    store_memory(row.groups.numbers(group), &bonds.memory, before);
+                if K::BondHistory::COUNT > 0 && kernel.stores_history() {
+                    store_history(row.groups.numbers(group), &bonds.history, before);
                 }
             }
             for quantity in 0..K::Sums::COUNT {
@@ -505,7 +505,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
             if K::Broken::COUNT > 0 && gone != 0 {
-                let told = &mut told;
+                let broken_sums = &mut broken_sums;
                 simd.aside(move || {
                     let mut broken = K::Broken::splat(0.0);
                     // SAFETY: as above.
@@ -516,11 +516,11 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                         kernel.add_broken(simd, &mut bonds, &mut broken);
                         row.groups.intact[group] = bonds.intact;
                     }
-                    note_point(told, row.point, &all_broken(&broken));
+                    note_point(broken_sums, row.point, &all_broken(&broken));
                 });
             }
         }
-        told
+        broken_sums
     }
 }
 
@@ -533,7 +533,7 @@ struct OverVectors<'a, K: Kernel<D>, const D: usize> {
 
 impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K, D> {
     type Sums = K::Sums;
-    const VERSIONS: Versions = K::VERSIONS;
+    const ISA_SET: IsaSet = K::ISA_SET;
 
     #[inline(always)]
     fn run<S: Simd>(
@@ -543,16 +543,16 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         base: usize,
         mut results: Results<'_, K, D>,
     ) -> Vec<BrokenSums> {
-        let mut told = Vec::new();
+        let mut broken_sums = Vec::new();
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
-        let mut turns = Turns::new(&kernel);
+        let mut gate = FastPathGate::new(&kernel);
         let mut known = Known(FxHashMap::default());
         for k in 0..vectors.len() {
-            let mut vector: Adjacent<'_> = vectors.vector(k);
+            let mut vector: VectorBonds<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
-            let mut sum = |vector: &mut Adjacent<'_>| {
-                turns.sum::<K, S, D>(
+            let mut sum = |vector: &mut VectorBonds<'_>| {
+                gate.sum::<K, S, D>(
                     simd,
                     vector,
                     // SAFETY: the vectors are those of the grid that `points` was made for.
@@ -576,7 +576,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                 }
             }
             if K::Broken::COUNT > 0 && gone != 0 {
-                let told = &mut told;
+                let broken_sums = &mut broken_sums;
                 simd.aside(move || {
                     let mut broken = K::Broken::splat(0.0);
                     // SAFETY: as above.
@@ -588,10 +588,10 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                         kernel.add_broken(simd, &mut bonds, &mut broken);
                         vector.groups.intact[o] = bonds.intact;
                     }
-                    note_vector(told, vector.point, &all_broken(&broken));
+                    note_vector(broken_sums, vector.point, &all_broken(&broken));
                 });
             }
         }
-        told
+        broken_sums
     }
 }

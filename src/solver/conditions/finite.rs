@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use crate::comm::{self, Communicator, agree};
-use crate::deck::expression::Expression;
-use crate::deck::plan::{Action, Plan};
-use crate::deck::shown;
 use crate::error::Result;
+use crate::expression::Expression;
+use crate::message::format_number;
+use crate::problem::{Action, Problem};
 use crate::solver::model::Model;
 
 use super::members;
@@ -20,19 +20,19 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// # Errors
 /// Names the first such entry of the deck and its point with the smallest id; the same on all ranks.
 pub fn are_finite<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     model: &Model<D>,
     time: f64,
 ) -> Result<()> {
-    let looker = Looker {
-        plan,
+    let looker = FiniteCheck {
+        problem,
         comm,
         model,
         time,
     };
     if time == 0.0 {
-        for initial in &plan.initials {
+        for initial in &problem.initials {
             for (quantity, values) in [
                 ("displacement", &initial.displacement),
                 ("velocity", &initial.velocity),
@@ -45,10 +45,10 @@ pub fn are_finite<const D: usize>(
             }
         }
     }
-    let stages = plan.all_stages();
+    let stages = problem.all_stages();
     let now = stages.iter().find(|stage| time < stage.time.end);
     let acting = now.or(stages.last()).map(|stage| &stage.acting);
-    let conditions = plan.conditions.iter().zip(acting.into_iter().flatten());
+    let conditions = problem.conditions.iter().zip(acting.into_iter().flatten());
     for (condition, _) in conditions.filter(|(_, acting)| **acting) {
         let key = format!("[condition.{}] {}", condition.name, condition.quantity);
         let (place, set) = (&condition.place, condition.set);
@@ -71,14 +71,14 @@ pub fn are_finite<const D: usize>(
 }
 
 /// Looks at the values of one entry after the other.
-struct Looker<'a, const D: usize> {
-    plan: &'a Plan,
+struct FiniteCheck<'a, const D: usize> {
+    problem: &'a Problem,
     comm: &'a dyn Communicator,
     model: &'a Model<D>,
     time: f64,
 }
 
-impl<const D: usize> Looker<'_, D> {
+impl<const D: usize> FiniteCheck<'_, D> {
     /// An error if a component, times its factor, is not finite at a point of a set.
     fn look<'e>(
         &self,
@@ -105,7 +105,7 @@ impl<const D: usize> Looker<'_, D> {
                 (!value.is_finite()).then_some((*component, value))
             })
         };
-        let found = members(self.plan, self.model, set)
+        let found = members(self.problem, self.model, set)
             .into_iter()
             .filter_map(|point| Some((self.model.ids[point as usize], point, wrong(point)?)))
             .min_by_key(|(id, ..)| *id);
@@ -117,10 +117,10 @@ impl<const D: usize> Looker<'_, D> {
             let message = format!(
                 "{key}: component {} is {value} at t = {} s at point {id}, {:?} m",
                 AXES[component],
-                shown(self.time),
+                format_number(self.time),
                 &position[..D]
             );
-            Err(self.plan.source.error(place.clone(), message))
+            Err(self.problem.source.error(place.clone(), message))
         });
         agree(self.comm, named)
     }

@@ -1,8 +1,8 @@
 //! Initial displacements and velocities.
 
 use crate::comm::Communicator;
-use crate::deck::plan::Plan;
 use crate::error::Result;
+use crate::problem::Problem;
 use crate::solver::model::Model;
 use crate::solver::motion::Fields;
 
@@ -13,16 +13,16 @@ use super::{members, not_empty};
 /// # Errors
 /// On an empty set; the same on all ranks.
 pub fn apply_initials<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     model: &Model<D>,
     fields: &mut Fields<D>,
 ) -> Result<()> {
-    for initial in &plan.initials {
-        let points = members(plan, model, initial.set);
+    for initial in &problem.initials {
+        let points = members(problem, model, initial.set);
         let key = format!("[initial.{}] set", initial.name);
         not_empty(
-            plan,
+            problem,
             comm,
             initial.set,
             &points,

@@ -1,6 +1,6 @@
 //! Loads: force densities on some points.
 
-use crate::deck::expression::Expression;
+use crate::expression::Expression;
 use crate::solver::motion::walk::Part;
 
 use super::Work;

@@ -8,10 +8,10 @@ mod values;
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{Communicator, total};
-use crate::deck::expression::Expression;
-use crate::deck::plan::{Action, Plan};
 use crate::error::Result;
+use crate::expression::Expression;
 use crate::points::set;
+use crate::problem::{Action, Problem};
 use crate::refine::{Grids, Shares};
 
 use super::model::Model;
@@ -68,11 +68,11 @@ pub struct All<'a, const D: usize> {
 }
 
 /// Local indices of the owned points of a set, by index.
-pub fn members<const D: usize>(plan: &Plan, model: &Model<D>, set: usize) -> Vec<u32> {
+pub fn members<const D: usize>(problem: &Problem, model: &Model<D>, set: usize) -> Vec<u32> {
     let chosen = |point: usize| {
-        let body = plan.body_of(usize::from(model.block[point]));
+        let body = problem.body_of(usize::from(model.block[point]));
         let (id, position) = (model.ids[point], model.position(point));
-        set::contains(&plan.sets[set], plan.horizon, id, position, body)
+        set::contains(&problem.sets[set], problem.horizon, id, position, body)
     };
     (0..model.owned())
         .filter(|point| chosen(*point))
@@ -83,21 +83,21 @@ pub fn members<const D: usize>(plan: &Plan, model: &Model<D>, set: usize) -> Vec
 /// Local indices of the owned points that a load on a set acts on, and with which share where that can be less
 /// than all: so the sum of the load stays the same when the grid is refined.
 fn loaded<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     model: &Model<D>,
     grids: &Grids<'_>,
     set: usize,
 ) -> (Vec<u32>, Option<Vec<f64>>) {
-    if plan.refinement.is_none() {
-        return (members(plan, model, set), None);
+    if problem.refinement.is_none() {
+        return (members(problem, model, set), None);
     }
     let mut shares = Shares::new(grids);
     // Sets of a load are not given by ids here, see `is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
-        set::contains(&plan.sets[set], plan.horizon, 0, position, body)
+        set::contains(&problem.sets[set], problem.horizon, 0, position, body)
     };
     let found = (0..model.owned()).map(|point| {
-        let body = plan.body_of(usize::from(model.block[point]));
+        let body = problem.body_of(usize::from(model.block[point]));
         let share = shares.of((body, model.ids[point], model.position(point)), &chosen);
         (point as u32, share)
     });
@@ -110,21 +110,21 @@ fn loaded<const D: usize>(
 /// # Errors
 /// When the set of the result is empty; the same on all ranks.
 pub fn output_members<const D: usize>(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     model: &Model<D>,
 ) -> Result<Option<Vec<u32>>> {
-    let Some((set, span)) = &plan.output.set else {
+    let Some((set, span)) = &problem.output.set else {
         return Ok(None);
     };
-    let points = members(plan, model, *set);
-    not_empty(plan, comm, *set, &points, ("[output] set", span.clone()))?;
+    let points = members(problem, model, *set);
+    not_empty(problem, comm, *set, &points, ("[output] set", span.clone()))?;
     Ok(Some(points))
 }
 
 /// An input error if a set that something acts on has no points on any rank.
 pub fn not_empty(
-    plan: &Plan,
+    problem: &Problem,
     comm: &dyn Communicator,
     set: usize,
     members: &[u32],
@@ -135,9 +135,9 @@ pub fn not_empty(
     }
     let message = format!(
         "{}: the set `{}` has no points",
-        place.0, plan.sets[set].name
+        place.0, problem.sets[set].name
     );
-    Err(plan.source.error(place.1, message))
+    Err(problem.source.error(place.1, message))
 }
 
 impl<const D: usize> Conditions<D> {
@@ -147,7 +147,7 @@ impl<const D: usize> Conditions<D> {
     /// # Errors
     /// On an empty set; the same on all ranks.
     pub fn new(
-        plan: &Plan,
+        problem: &Problem,
         comm: &dyn Communicator,
         (model, grids): (&Model<D>, &Grids<'_>),
         acting: &[bool],
@@ -160,12 +160,12 @@ impl<const D: usize> Conditions<D> {
         };
         // The points of the supports, until all are known.
         let mut supported: Vec<Vec<u32>> = Vec::new();
-        let of_deck = plan.conditions.iter().zip(acting);
+        let of_deck = problem.conditions.iter().zip(acting);
         for (condition, _) in of_deck.filter(|(_, acting)| **acting) {
-            let points = members(plan, model, condition.set);
+            let points = members(problem, model, condition.set);
             let key = format!("[condition.{}] set", condition.name);
             let place = (&key[..], condition.span.clone());
-            not_empty(plan, comm, condition.set, &points, place)?;
+            not_empty(problem, comm, condition.set, &points, place)?;
             let mut prescribe = |motion, components: &[Option<Expression>]| {
                 for (component, value) in components.iter().enumerate() {
                     let Some(value) = value else { continue };
@@ -183,12 +183,12 @@ impl<const D: usize> Conditions<D> {
                 Action::Velocity(values) => prescribe(Motion::Velocity, values),
                 Action::BodyForce(values, factors) => {
                     let factors = std::array::from_fn(|d| factors[d]);
-                    let points = loaded(plan, model, grids, condition.set);
+                    let points = loaded(problem, model, grids, condition.set);
                     conditions.add_load(model, Load::new(values, factors), points);
                 }
                 Action::Force(values) => {
                     let mut volume = [ExactSum::default()];
-                    let points = loaded(plan, model, grids, condition.set);
+                    let points = loaded(problem, model, grids, condition.set);
                     for (k, point) in points.0.iter().enumerate() {
                         let share = points.1.as_ref().map_or(1.0, |shares| shares[k]);
                         volume[0].add(share * model.volume[*point as usize]);
@@ -379,9 +379,9 @@ impl<'a, const D: usize> Here<'a, D> {
     }
 
     /// After the points have moved: puts supported ones in their place.
-    pub fn place(&self, part: &mut Part<'_, D>) {
+    pub fn apply_displacements(&self, part: &mut Part<'_, D>) {
         for support in &self.on.supports {
-            support.place(self.all.supports, part);
+            support.apply_displacements(self.all.supports, part);
         }
     }
 
@@ -393,7 +393,7 @@ impl<'a, const D: usize> Here<'a, D> {
     }
 
     /// Finds the external forces, if any load is due.
-    pub fn load(&mut self, part: &mut Part<'_, D>) {
+    pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
         if !self.all.loads.iter().any(|load| load.is_due) {
             return;
         }
@@ -407,20 +407,20 @@ impl<'a, const D: usize> Here<'a, D> {
     }
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all of that is finite.
-    pub fn guide(&self, part: &mut Part<'_, D>) -> bool {
+    pub fn apply_velocities(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
-            finite &= support.guide(self.all.supports, part);
+            finite &= support.apply_velocities(self.all.supports, part);
         }
         finite
     }
 
     /// Finds the reactions that keep supported points where they are, at rest. Returns whether they are
     /// finite.
-    pub fn hold(&self, part: &mut Part<'_, D>) -> bool {
+    pub fn project_residual(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
-            finite &= support.hold(self.all.supports, part);
+            finite &= support.project_residual(self.all.supports, part);
         }
         finite
     }

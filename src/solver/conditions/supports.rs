@@ -1,6 +1,6 @@
 //! Supports: prescribed motions, and the reactions that they take.
 
-use crate::deck::expression::Expression;
+use crate::expression::Expression;
 use crate::solver::motion::walk::Part;
 
 use super::Work;
@@ -154,7 +154,11 @@ impl Supported {
 
     /// After the points have moved: puts them in their place, and gives them their mean velocity in the step just
     /// made.
-    pub fn place<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) {
+    pub fn apply_displacements<const D: usize>(
+        &self,
+        supports: &[Support],
+        part: &mut Part<'_, D>,
+    ) {
         let support = &supports[self.support];
         let Place { step, values: at } = &support.place;
         let value = |at: &At, k: usize| support.values.of(at, self.positions[k]);
@@ -182,7 +186,11 @@ impl Supported {
 
     /// Gives the points their velocity, and finds the reactions: what must be added to the other forces so
     /// that the Verlet scheme makes the prescribed motion. Returns whether all of that is finite.
-    pub fn guide<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) -> bool {
+    pub fn apply_velocities<const D: usize>(
+        &self,
+        supports: &[Support],
+        part: &mut Part<'_, D>,
+    ) -> bool {
         let support = &supports[self.support];
         let Guidance { time, step, same } = support.guidance;
         let (model, first) = (part.model, part.first);
@@ -195,7 +203,11 @@ impl Supported {
 
     /// Finds the reactions that keep the points where they are, at rest. Returns whether they are
     /// finite.
-    pub fn hold<const D: usize>(&self, supports: &[Support], part: &mut Part<'_, D>) -> bool {
+    pub fn project_residual<const D: usize>(
+        &self,
+        supports: &[Support],
+        part: &mut Part<'_, D>,
+    ) -> bool {
         // A reaction is then the force with its sign changed, that of 0 as well.
         self.react(supports[self.support].component, part, |_, _| (0.0, -0.0))
     }

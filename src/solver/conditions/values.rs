@@ -1,6 +1,6 @@
 //! Values of an expression at some points.
 
-use crate::deck::expression::{Expression, Variable};
+use crate::expression::{Expression, Variable};
 
 /// An expression, evaluated no more often than it can change.
 pub struct Values {

@@ -11,7 +11,7 @@
 //! N_b is the largest number of bonds of a point that break in a step, over all ranks, which therefore
 //! decide alike.
 
-use crate::deck::plan::Adaptive;
+use crate::problem::Adaptive;
 use crate::solver::Simulation;
 
 /// How much longer than the step the rest of a stage may be to count as one.

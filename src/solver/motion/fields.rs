@@ -3,7 +3,7 @@
 //! Checkpoints, the undoing of a step and the result walk this list; a field that is added to it is
 //! saved, undone and offered as it says here. A field is a column of numbers for each component.
 
-use crate::deck::plan::Field;
+use crate::problem::Field;
 use crate::solver::bonds::{Broken, PlasticColumns};
 use crate::solver::model::Model;
 

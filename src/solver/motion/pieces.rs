@@ -60,7 +60,7 @@ impl<const D: usize> Simulation<'_, D> {
                          support holds along {axis}. The piece has {count} points; point {first} at {:?} m is \
                          one of them. Prescribe its displacement along {axis} at some points, or remove its \
                          loads",
-                        self.plan.block(block).body.name,
+                        self.problem.block(block).body.name,
                         &self.model.position(*point)[..D],
                     ))
                 });

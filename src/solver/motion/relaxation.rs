@@ -32,10 +32,10 @@ use rayon::prelude::*;
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
 use crate::comm::total;
-use crate::deck::plan::Relaxation;
 use crate::error::{Error, Result};
+use crate::problem::Relaxation;
 use crate::solver::Simulation;
-use crate::solver::bonds::Evolution;
+use crate::solver::bonds::BondUpdate;
 use crate::solver::conditions::Work;
 use crate::solver::model::Model;
 
@@ -191,7 +191,7 @@ impl<const D: usize> Simulation<'_, D> {
             Some(self.drift())
         };
         self.evaluate(self.standing_evolution());
-        self.guide();
+        self.apply_velocities();
         self.look(before);
         let forces = self.times.forces.whole() - forces;
         self.times.motion += start.elapsed().saturating_sub(forces);
@@ -215,8 +215,8 @@ impl<const D: usize> Simulation<'_, D> {
         self.extrapolate();
         self.clock.advance();
         let (time, step) = (self.clock.time(), self.clock.step());
-        self.place(time, step);
-        self.load(time, false);
+        self.apply_displacements(time, step);
+        self.apply_loads(time, false);
         self.load_step = LoadStep {
             scale: self.load_step.scale,
             is_settled: false,
@@ -354,11 +354,11 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// How forces follow from the present place without a change of the state: during a load step from the history that
     /// bonds would have if this were its equilibrium.
-    pub(in crate::solver) fn standing_evolution(&self) -> Evolution {
+    pub(in crate::solver) fn standing_evolution(&self) -> BondUpdate {
         if self.load_step.is_settled {
-            Evolution::None
+            BondUpdate::None
         } else {
-            Evolution::Trial(self.time_to_advance())
+            BondUpdate::Trial(self.time_to_advance())
         }
     }
 
@@ -367,7 +367,7 @@ impl<const D: usize> Simulation<'_, D> {
     fn break_or_settle(&mut self) {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;
-        self.evaluate(Evolution::Step(self.time_to_advance()));
+        self.evaluate(BondUpdate::Step(self.time_to_advance()));
         let breaks = total(self.comm, self.forces.broken().len() as u64) > 0;
         match (is_first, breaks) {
             (true, true) => self.add_work_since_equilibrium(Work::FirstEquilibrium),
@@ -380,7 +380,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.load_step.since_breaking = 0;
             self.stop();
             self.evaluate(self.standing_evolution());
-            self.guide();
+            self.apply_velocities();
             self.look(None);
             return;
         }

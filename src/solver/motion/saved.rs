@@ -48,7 +48,7 @@ impl<const D: usize> Simulation<'_, D> {
         let steps = self.step_control.words().into_iter();
         let times = stage.chain(clock).chain(steps);
         let refined = self.refined.words().into_iter();
-        let changes = self.plan.changes_density_scale();
+        let changes = self.problem.changes_density_scale();
         let scaled = changes.then(|| self.density_scale_energy.to_bits());
         let refined = refined.chain(scaled);
         times.chain(refined).chain(self.load_step.words()).collect()
@@ -60,7 +60,7 @@ impl<const D: usize> Simulation<'_, D> {
         let (clock, rest) = rest.split_at(CLOCK);
         let (steps, rest) = rest.split_at(STEP_CONTROL);
         let (refined, rest) = rest.split_at(REFINED);
-        let (scaled, load_step) = rest.split_at(usize::from(self.plan.changes_density_scale()));
+        let (scaled, load_step) = rest.split_at(usize::from(self.problem.changes_density_scale()));
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
@@ -76,7 +76,7 @@ impl<const D: usize> Simulation<'_, D> {
         fields.flat_map(|(_, columns)| columns)
     }
 
-    /// Numbers that are saved a point; the same on all ranks.
+    /// LaneTuple that are saved a point; the same on all ranks.
     pub fn saved_width(&self) -> usize {
         self.state().count()
     }
@@ -140,7 +140,7 @@ impl<const D: usize> Simulation<'_, D> {
             column[..values.len()].copy_from_slice(&values);
         }
         self.continue_from(&saved.progress);
-        self.find_anew();
+        self.recompute_derived();
         Ok(())
     }
 }

@@ -46,6 +46,6 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.forces.undo(&kept.bonds);
         // Loads know their values at the present time.
-        self.load(clock.time(), true);
+        self.apply_loads(clock.time(), true);
     }
 }

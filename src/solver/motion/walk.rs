@@ -4,7 +4,7 @@
 use rayon::iter::split;
 use rayon::prelude::*;
 
-use crate::solver::bonds::Shown;
+use crate::solver::bonds::BondInputs;
 use crate::solver::model::Model;
 
 use super::Fields;
@@ -36,7 +36,7 @@ pub struct Part<'a, const D: usize> {
     pub external_work: Option<Columns<'a, 1>>,
     /// As [`Fields::damping_power`] and [`Fields::damped_energy`].
     pub damping: Option<Columns<'a, 2>>,
-    shown: Shown<'a, D>,
+    shown: BondInputs<'a, D>,
 }
 
 /// A component of the motion of some points, and what moves them.
@@ -53,7 +53,7 @@ pub struct Moving<'a> {
 
 impl<'a, const D: usize> Part<'a, D> {
     /// All owned points.
-    pub fn all(model: &'a Model<D>, fields: &'a mut Fields<D>, shown: Shown<'a, D>) -> Self {
+    pub fn all(model: &'a Model<D>, fields: &'a mut Fields<D>, shown: BondInputs<'a, D>) -> Self {
         let owned = model.owned();
         let vector = |field: &'a mut [Vec<f64>; D]| field.each_mut().map(Vec::as_mut_slice);
         let scalars = fields
@@ -120,9 +120,9 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Shows the bonds the displacements, and begins the sums of their forces with 0.
-    pub fn show(&mut self) {
+    pub fn write_bond_inputs(&mut self) {
         self.shown
-            .show(self.displacement.each_ref().map(|column| &**column));
+            .write_bond_inputs(self.displacement.each_ref().map(|column| &**column));
         for component in &mut self.internal_force {
             component.fill(0.0);
         }

@@ -2,8 +2,8 @@
 //!
 //! Damage is spread over a band some spacings wide. The way to each point of the band from the crack's
 //! start, along the band, is found; the points are sorted into sections by this way, and the parts of a
-//! section that do not hang together lie on different branches. The middles of the parts, joined from
-//! section to section, are the lines (the level-set diagram of Lazarus & Verroust 1999). Where the band is
+//! out_of_plane_measure that do not hang together lie on different branches. The middles of the parts, joined from
+//! out_of_plane_measure to out_of_plane_measure, are the lines (the level-set diagram of Lazarus & Verroust 1999). Where the band is
 //! wide or ragged, nothing but these middles moves a little.
 
 use std::cmp::Ordering;
@@ -45,9 +45,9 @@ pub type Branch = Vec<Vertex>;
 pub struct Reach {
     /// Points up to this distance hang together, m.
     pub link: f64,
-    /// Length of a section, m, at least a link; a branch that is shorter does not count, and the crack
+    /// Length of a out_of_plane_measure, m, at least a link; a branch that is shorter does not count, and the crack
     /// starts with the points up to this distance from its start.
-    pub section: f64,
+    pub out_of_plane_measure: f64,
 }
 
 /// The length of all branches together, m.
@@ -101,7 +101,7 @@ impl PartialOrd for Next {
 }
 
 impl Ways {
-    /// By Dijkstra's method, from all points within a section of the start.
+    /// By Dijkstra's method, from all points within a out_of_plane_measure of the start.
     fn new(from: [f64; 3], places: &[[f64; 3]], bins: &Bins, reach: Reach) -> Self {
         let mut ways = Self {
             length: vec![f64::INFINITY; places.len()],
@@ -111,7 +111,7 @@ impl Ways {
         let mut open = BinaryHeap::new();
         for (point, place) in places.iter().enumerate() {
             let length = distance_squared(from, *place).sqrt();
-            if length <= reach.section * (1.0 + TOLERANCE) {
+            if length <= reach.out_of_plane_measure * (1.0 + TOLERANCE) {
                 ways.length[point] = length;
                 open.push(Next { length, point });
             }
@@ -142,7 +142,7 @@ impl Ways {
     }
 }
 
-/// Points of one section that hang together.
+/// Points of one out_of_plane_measure that hang together.
 struct Part {
     /// The part before, towards the start.
     parent: Option<usize>,
@@ -154,14 +154,15 @@ struct Part {
 
 /// The parts, each behind its parent.
 fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part> {
-    let section = |point: usize| (ways.length[point] / reach.section) as usize;
+    let out_of_plane_measure =
+        |point: usize| (ways.length[point] / reach.out_of_plane_measure) as usize;
     let mut part_of: Vec<Option<usize>> = vec![None; points.len()];
     let mut parts: Vec<Part> = Vec::new();
     for first in &ways.order {
         if part_of[*first].is_some() {
             continue;
         }
-        // The nearest point of a part has its way through an earlier section, or none.
+        // The nearest point of a part has its way through an earlier out_of_plane_measure, or none.
         let parent = ways.before[*first].and_then(|before| part_of[before]);
         let number = parts.len();
         part_of[*first] = Some(number);
@@ -172,7 +173,7 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
             bins.within(points[point].place, |other, _| {
                 let other = other as usize;
                 let is_free = part_of[other].is_none() && ways.length[other].is_finite();
-                if is_free && section(other) == section(point) {
+                if is_free && out_of_plane_measure(other) == out_of_plane_measure(point) {
                     part_of[other] = Some(number);
                     members.push(other);
                 }
@@ -287,7 +288,7 @@ mod tests {
 
     const REACH: Reach = Reach {
         link: 2.0,
-        section: 3.0,
+        out_of_plane_measure: 3.0,
     };
 
     /// Two rows of points of unit spacing along a straight line.

@@ -71,7 +71,7 @@ impl ContactWatch {
     /// For the bodies of a run. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
-        let bodies = simulation.plan.bodies.len();
+        let bodies = simulation.problem.bodies.len();
         if bodies < 2 {
             return Self {
                 pairs: Vec::new(),
@@ -80,7 +80,7 @@ impl ContactWatch {
         }
         let mut bonds = vec![0; bodies * bodies];
         for ([here, there], count) in simulation.forces.bonds_of_blocks() {
-            let [here, there] = [here, there].map(|block| simulation.plan.body_of(block));
+            let [here, there] = [here, there].map(|block| simulation.problem.body_of(block));
             bonds[here * bodies + there] += count;
         }
         comm.sum(&mut bonds);
@@ -88,7 +88,7 @@ impl ContactWatch {
         let pairs = pairs.filter(|[a, b]| bonds[a * bodies + b] == 0).collect();
         let mut spacing = vec![0.0_f64; bodies];
         for (point, block) in model.block.iter().enumerate() {
-            let largest = &mut spacing[simulation.plan.body_of(usize::from(*block))];
+            let largest = &mut spacing[simulation.problem.body_of(usize::from(*block))];
             *largest = largest.max(spacing_of(simulation, point));
         }
         comm.max(&mut spacing);
@@ -128,7 +128,7 @@ impl ContactWatch {
         let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
-            let first = 6 * simulation.plan.body_of(usize::from(model.block[point]));
+            let first = 6 * simulation.problem.body_of(usize::from(model.block[point]));
             for (k, x) in place_of(model, displacement, point).into_iter().enumerate() {
                 corners[first + k] = corners[first + k].min(x);
                 corners[first + 3 + k] = corners[first + 3 + k].min(-x);
@@ -167,7 +167,8 @@ impl ContactWatch {
 
 /// Edge of a cube, square or line of a point's volume, m.
 fn spacing_of<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
-    let extent = simulation.model.volume[point] / simulation.plan.dimension.section();
+    let extent =
+        simulation.model.volume[point] / simulation.problem.dimension.out_of_plane_measure();
     libm::pow(extent, 1.0 / D as f64)
 }
 
@@ -191,7 +192,7 @@ fn candidates<const D: usize>(
 ) -> Vec<Vec<u8>> {
     let ranks = simulation.comm.size();
     let mut outgoing = vec![Vec::new(); ranks];
-    let mut of_body = vec![Vec::new(); simulation.plan.bodies.len()];
+    let mut of_body = vec![Vec::new(); simulation.problem.bodies.len()];
     for (number, meeting) in meetings.iter().enumerate() {
         for (second, body) in meeting.pair.into_iter().enumerate() {
             of_body[body].push((number, second));
@@ -200,7 +201,7 @@ fn candidates<const D: usize>(
     let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
     for (point, block) in model.block.iter().enumerate() {
         let place = place_of(model, displacement, point);
-        for (number, second) in &of_body[simulation.plan.body_of(usize::from(*block))] {
+        for (number, second) in &of_body[simulation.problem.body_of(usize::from(*block))] {
             let meeting = &meetings[*number];
             if (0..3).any(|k| place[k] < meeting.lower[k] || place[k] > meeting.upper[k]) {
                 continue;

@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::comm::all_gather_many;
-use crate::deck::plan;
 use crate::error::Result;
+use crate::problem;
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
@@ -19,7 +19,7 @@ const DIAGONAL: f64 = 1.5;
 
 /// A crack whose path is found.
 pub struct CrackPath {
-    rule: plan::CrackPath,
+    rule: problem::CrackPath,
     points: Vec<u32>,
     reach: Reach,
 }
@@ -40,20 +40,23 @@ impl CrackPath {
     /// When the set is empty; the same on all ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
-        rule: &plan::CrackPath,
+        rule: &problem::CrackPath,
     ) -> Result<Self> {
-        let (plan, model, comm) = (simulation.plan, &simulation.model, simulation.comm);
-        let points = members(plan, model, rule.set);
+        let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
+        let points = members(problem, model, rule.set);
         let key = format!("[history.crack.{}] set", rule.name);
-        not_empty(plan, comm, rule.set, &points, (&key, rule.span.clone()))?;
+        not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
         let volumes = (0..model.owned()).map(|point| model.volume[point]);
         let mut largest = [volumes.fold(0.0, f64::max)];
         comm.max(&mut largest);
-        let spacing = libm::pow(largest[0] / plan.dimension.section(), 1.0 / D as f64);
-        let link = (LINK * plan.horizon).max(DIAGONAL * spacing);
+        let spacing = libm::pow(
+            largest[0] / problem.dimension.out_of_plane_measure(),
+            1.0 / D as f64,
+        );
+        let link = (LINK * problem.horizon).max(DIAGONAL * spacing);
         let reach = Reach {
             link,
-            section: plan.horizon.max(link),
+            out_of_plane_measure: problem.horizon.max(link),
         };
         Ok(Self {
             rule: rule.clone(),

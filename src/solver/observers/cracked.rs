@@ -21,7 +21,7 @@ impl Cracked {
             lower: [f64::MAX; 3],
             upper: [f64::MIN; 3],
         };
-        let threshold = simulation.plan.history.damage_threshold;
+        let threshold = simulation.problem.history.damage_threshold;
         for point in 0..simulation.model.owned() {
             if snapshot.damage(&simulation.family_volume, point) > threshold {
                 let position = simulation.model.position(point);

@@ -1,7 +1,7 @@
 //! Fronts: how far a field has come along a line.
 
-use crate::deck::plan;
 use crate::error::Result;
+use crate::problem;
 
 use super::reach::Course;
 use super::snapshot::Snapshot;
@@ -9,7 +9,7 @@ use crate::solver::Simulation;
 
 /// A front that is followed.
 pub struct Front {
-    rule: plan::Front,
+    rule: problem::Front,
     course: Course,
 }
 
@@ -18,7 +18,10 @@ impl Front {
     ///
     /// # Errors
     /// When there is none; the same on all ranks.
-    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, rule: &plan::Front) -> Result<Self> {
+    pub fn new<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        rule: &problem::Front,
+    ) -> Result<Self> {
         let owned = 0..simulation.model.owned() as u32;
         let course = Course::new(simulation, rule.line, (rule.length, rule.radius), owned);
         if course.is_empty(simulation.comm) {
@@ -26,7 +29,7 @@ impl Front {
                 "[history.front.{}]: no point lies within {} m of the line",
                 rule.name, rule.radius
             );
-            return Err(simulation.plan.source.error(rule.span.clone(), message));
+            return Err(simulation.problem.source.error(rule.span.clone(), message));
         }
         Ok(Self {
             rule: rule.clone(),
@@ -41,7 +44,7 @@ impl Front {
         simulation: &mut Simulation<'_, D>,
         snapshot: &Snapshot,
     ) -> f64 {
-        let plan::Front {
+        let problem::Front {
             field, component, ..
         } = self.rule;
         let values = snapshot.field(simulation, field);

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
-use crate::deck::plan::{self, Reaction};
 use crate::error::Result;
+use crate::problem::{self, Reaction};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
@@ -87,7 +87,7 @@ impl HistoryObserver {
     /// # Errors
     /// On an empty set and on a line without points; the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
-        let (plan, comm) = (simulation.plan, simulation.comm);
+        let (problem, comm) = (simulation.problem, simulation.comm);
         let axes = &AXES[..D];
         let mut columns: Vec<(String, &'static str)> = [
             ("time", "s"),
@@ -107,15 +107,15 @@ impl HistoryObserver {
             columns.push(("residual".to_owned(), "1"));
             columns.push(("iterations".to_owned(), "1"));
         }
-        if plan.adapts() {
+        if problem.adapts() {
             columns.push(("time_step".to_owned(), "s"));
             columns.push(("undone_steps".to_owned(), "1"));
             columns.push(("most_broken_bonds".to_owned(), "1"));
         }
-        if plan.scales_density() {
+        if problem.scales_density() {
             columns.push(("kinetic_ratio".to_owned(), "1"));
         }
-        if plan.changes_density_scale() {
+        if problem.changes_density_scale() {
             columns.push(("density_scale_energy".to_owned(), "J"));
         }
         if simulation.may_refine() {
@@ -133,45 +133,45 @@ impl HistoryObserver {
             columns.push(("singular_points".to_owned(), "1"));
         }
         let mut reactions = Vec::new();
-        for Reaction { set, span } in &plan.history.reactions {
-            let points = members(plan, &simulation.model, *set);
+        for Reaction { set, span } in &problem.history.reactions {
+            let points = members(problem, &simulation.model, *set);
             let place = ("[history] reactions", span.clone());
-            not_empty(plan, comm, *set, &points, place)?;
+            not_empty(problem, comm, *set, &points, place)?;
             reactions.push(points);
             vector(
                 &mut columns,
-                format!("reaction_{}", plan.sets[*set].name),
+                format!("reaction_{}", problem.sets[*set].name),
                 "N",
             );
         }
         let mut support_forces = Vec::new();
-        for rule in &plan.history.support_forces {
-            let points = members(plan, &simulation.model, rule.set);
+        for rule in &problem.history.support_forces {
+            let points = members(problem, &simulation.model, rule.set);
             let key = format!("[history.force.{}] set", rule.name);
-            not_empty(plan, comm, rule.set, &points, (&key, rule.span.clone()))?;
+            not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
             support_forces.push((points, rule.direction));
             columns.push((format!("force_{}", rule.name), "N"));
         }
         let mut probes = Vec::new();
-        for plan::Probe { name, at, .. } in &plan.history.probes {
+        for problem::Probe { name, at, .. } in &problem.history.probes {
             let point = nearest(simulation, *at).own;
             probes.push(Probe { point });
             vector(&mut columns, format!("probe_{name}_displacement"), "m");
             vector(&mut columns, format!("probe_{name}_velocity"), "m/s");
         }
         let mut fronts = Vec::new();
-        for front in &plan.history.fronts {
+        for front in &problem.history.fronts {
             fronts.push(Front::new(simulation, front)?);
             columns.push((format!("front_{}", front.name), "m"));
         }
         let mut cracks = Vec::new();
-        for rule in &plan.history.cracks {
+        for rule in &problem.history.cracks {
             cracks.push(CrackPath::new(simulation, rule)?);
             columns.push((format!("crack_{}_length", rule.name), "m"));
             columns.push((format!("crack_{}_branches", rule.name), "1"));
         }
         let mut tips = Vec::new();
-        for tip in &plan.history.tips {
+        for tip in &problem.history.tips {
             tips.push(Tip::new(simulation, tip)?);
             let name = format!("tip_{}", tip.name);
             columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), "m")));
@@ -318,17 +318,17 @@ impl HistoryObserver {
             let load_step = simulation.load_step;
             values.extend([load_step.residual, load_step.iterations as f64]);
         }
-        if simulation.plan.adapts() {
+        if simulation.problem.adapts() {
             let control = &mut simulation.step_control;
             let most = std::mem::take(&mut control.most_broken);
             let counts = [control.undone, most].map(|count| count as f64);
             values.push(simulation.clock.step());
             values.extend(counts);
         }
-        if simulation.plan.scales_density() {
+        if simulation.problem.scales_density() {
             values.push(energies.kinetic / energies.strain);
         }
-        if simulation.plan.changes_density_scale() {
+        if simulation.problem.changes_density_scale() {
             values.push(simulation.density_scale_energy);
         }
         if self.refines {

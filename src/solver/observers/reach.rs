@@ -4,8 +4,8 @@
 use nalgebra::Vector3;
 
 use crate::comm::{self, Communicator, total};
-use crate::deck::plan::Line;
 use crate::points::distance_squared;
+use crate::problem::Line;
 
 use crate::solver::Simulation;
 
@@ -36,7 +36,7 @@ impl Course {
         (end, radius): (f64, f64),
         among: impl Iterator<Item = u32>,
     ) -> Self {
-        let tolerance = TOLERANCE * simulation.plan.horizon;
+        let tolerance = TOLERANCE * simulation.problem.horizon;
         let from = Vector3::from(line.from);
         let along = |point: u32| {
             let place = Vector3::from(simulation.model.position(point as usize));
@@ -73,7 +73,7 @@ impl Course {
         value: impl Fn(usize) -> f64,
     ) -> Option<Reached> {
         let (model, comm) = (&simulation.model, simulation.comm);
-        let horizon = simulation.plan.horizon;
+        let horizon = simulation.problem.horizon;
         let tolerance = TOLERANCE * horizon;
         let points = || {
             let entry = |(point, along): &(u32, f64)| (*point as usize, *along);

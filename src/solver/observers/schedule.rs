@@ -1,6 +1,6 @@
 //! At which steps something is written.
 
-use crate::deck::plan::Interval;
+use crate::problem::Interval;
 use crate::solver::motion::Clock;
 
 /// When an interval says that something is due; always at the start and at the end.
@@ -19,7 +19,7 @@ impl Schedule {
         match self.0 {
             Interval::Steps(steps) => clock.number().is_multiple_of(steps),
             Interval::Seconds(seconds) => passed(seconds, clock.time_before()),
-            Interval::Seldom { seconds, steps } => {
+            Interval::SecondsAtSteps { seconds, steps } => {
                 // Where steps change, as long before as it would be with the present one.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
@@ -33,7 +33,7 @@ impl Schedule {
         let multiples = |number: u64| match self.0 {
             Interval::Steps(steps) => (number / steps) as f64,
             Interval::Seconds(seconds) => multiples(number as f64 * clock.step(), seconds),
-            Interval::Seldom { seconds, steps } => {
+            Interval::SecondsAtSteps { seconds, steps } => {
                 let rounds = (number / steps) as f64;
                 multiples(rounds * steps as f64 * clock.step(), seconds).min(rounds)
             }
@@ -73,7 +73,7 @@ mod tests {
         assert_eq!(due(Interval::Seconds(0.25), 0.1, 10), [0, 3, 5, 8, 10]);
         assert_eq!(due(Interval::Steps(4), 0.1, 10), [0, 4, 8, 10]);
         assert_eq!(due(Interval::Seconds(0.01), 0.1, 3), [0, 1, 2, 3]);
-        let seldom = |seconds| Interval::Seldom { seconds, steps: 4 };
+        let seldom = |seconds| Interval::SecondsAtSteps { seconds, steps: 4 };
         assert_eq!(due(seldom(0.01), 0.1, 10), [0, 4, 8, 10]);
         assert_eq!(due(seldom(0.01), 0.1, 8), [0, 4, 8]);
         assert_eq!(due(seldom(0.6), 0.1, 20), [0, 8, 12, 20]);

@@ -2,14 +2,14 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use crate::deck::plan::Field;
 use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
 use crate::material::{PlasticState, determinant};
+use crate::problem::Field;
 use crate::solver::Simulation;
 use crate::solver::bonds::Stored;
 use crate::solver::motion::Fields;
-use crate::solver::repeated::Repeated;
+use crate::solver::palette_column::PaletteColumn;
 
 /// What the bonds hold at one moment; found once, used by fields and history.
 pub struct Snapshot {
@@ -40,7 +40,7 @@ impl Snapshot {
 
     /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
     /// al. 2014, eq. 7). A point without family has 0.
-    pub fn damage(&self, family_volume: &Repeated, point: usize) -> f64 {
+    pub fn damage(&self, family_volume: &PaletteColumn, point: usize) -> f64 {
         match family_volume[point] {
             0.0 => 0.0,
             whole => 1.0 - self.stored.volume[point] / whole,
@@ -143,7 +143,7 @@ fn cauchy_stress<const D: usize>(
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
         let in_plane = determinant(gradient);
-        let growth = match simulation.plan.dimension {
+        let growth = match simulation.problem.dimension {
             Dimension::PlaneStress { .. } => {
                 let plastic = plastic_state(&simulation.fields, point);
                 let (forces, model) = (&simulation.forces, &simulation.model);
@@ -177,13 +177,13 @@ fn von_mises(stress: &[f64]) -> f64 {
 /// The elastic constants of an owned point's body.
 fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isotropic {
     let block = usize::from(simulation.model.block[point]);
-    simulation.plan.block(block).body.material.elastic
+    simulation.problem.block(block).body.material.elastic
 }
 
 /// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
 /// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar by ε_yy = ε_zz = −ν ε_xx.
 fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
-    match simulation.plan.dimension {
+    match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
             let ratio = elastic(simulation, point).poisson_ratio;
             (1.0 - 2.0 * ratio) / (1.0 - ratio)
@@ -211,7 +211,7 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
 /// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx under uniaxial strain.
 fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
-    let by_law = match simulation.plan.dimension {
+    let by_law = match simulation.problem.dimension {
         Dimension::PlaneStrain { .. } => {
             let fields = &simulation.fields;
             let plastic = |point| plastic_state(fields, point);
@@ -221,7 +221,7 @@ fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<
     };
     for point in 0..zz.len() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        match simulation.plan.dimension {
+        match simulation.problem.dimension {
             Dimension::PlaneStrain { .. } => {
                 let linear = ratio * (xx[point] + yy[point]);
                 zz[point] = by_law[point].unwrap_or(linear);

@@ -1,7 +1,7 @@
 //! Crack tips: where the damage ends in one direction, and how fast that moves.
 
-use crate::deck::plan;
 use crate::error::Result;
+use crate::problem;
 
 use super::reach::{Course, Reached};
 use crate::solver::Simulation;
@@ -19,25 +19,28 @@ impl Tip {
     ///
     /// # Errors
     /// When the set is empty or lies behind the start; the same on all ranks.
-    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, rule: &plan::Tip) -> Result<Self> {
-        let (plan, model) = (simulation.plan, &simulation.model);
-        let points = members(plan, model, rule.set);
+    pub fn new<const D: usize>(
+        simulation: &Simulation<'_, D>,
+        rule: &problem::Tip,
+    ) -> Result<Self> {
+        let (problem, model) = (simulation.problem, &simulation.model);
+        let points = members(problem, model, rule.set);
         let key = format!("[history.tip.{}] set", rule.name);
         let place = (&key[..], rule.span.clone());
-        not_empty(plan, simulation.comm, rule.set, &points, place)?;
+        not_empty(problem, simulation.comm, rule.set, &points, place)?;
         let everywhere = (f64::INFINITY, f64::INFINITY);
         let course = Course::new(simulation, rule.line, everywhere, points.into_iter());
         if course.is_empty(simulation.comm) {
             let message = format!(
                 "[history.tip.{}]: all points of the set `{}` lie behind `from`",
-                rule.name, plan.sets[rule.set].name
+                rule.name, problem.sets[rule.set].name
             );
-            return Err(plan.source.error(rule.span.clone(), message));
+            return Err(problem.source.error(rule.span.clone(), message));
         }
         Ok(Self {
             threshold: rule.threshold,
             course,
-            growth: Growth::new(plan.horizon),
+            growth: Growth::new(problem.horizon),
         })
     }
 

@@ -18,7 +18,7 @@ pub struct Facets {
 impl Facets {
     /// Of the present bonds. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        let (plan, comm) = (simulation.plan, simulation.comm);
+        let (problem, comm) = (simulation.problem, simulation.comm);
         let model = &simulation.model;
         let mut blocks: Vec<f64> = model.block.iter().map(|block| f64::from(*block)).collect();
         blocks.resize(model.volume.len(), 0.0);
@@ -29,7 +29,7 @@ impl Facets {
                 return;
             }
             let [a, b] = [here, there].map(|point| model.position(point));
-            let edges = [here, there].map(|point| plan.block(blocks[point] as usize).spacing());
+            let edges = [here, there].map(|point| problem.block(blocks[point] as usize).spacing());
             let [Some(first), Some(second)] = edges else {
                 return;
             };
@@ -55,7 +55,7 @@ impl Facets {
             edges,
             axis: axis as u64,
         }));
-        let longest = cutoffs(plan).into_iter().fold(0.0, f64::max);
+        let longest = cutoffs(problem).into_iter().fold(0.0, f64::max);
         let centres: Vec<[f64; 3]> = all.iter().map(|facet| facet.centre).collect();
         let widest = all.iter().flat_map(|facet| facet.edges[..D].iter());
         let widest = widest.copied().fold(0.0, f64::max);

@@ -11,10 +11,10 @@ use std::time::Instant;
 
 use crate::comm::sum::reduce;
 use crate::comm::{self, IdOrder};
-use crate::deck::plan::StepRule;
 use crate::error::Result;
 use crate::points::{Point, distance_squared};
-use crate::refine::{Grids, Pick};
+use crate::problem::StepRule;
+use crate::refine::{Grids, NodeKey};
 
 mod facets;
 mod past;
@@ -67,7 +67,7 @@ impl Refined {
 struct Kept {
     /// The numbers of their state, and at last the block that they had.
     rows: Vec<f64>,
-    /// Numbers of a row.
+    /// LaneTuple of a row.
     width: usize,
     /// How many of their bonds are broken.
     lengths: Vec<u32>,
@@ -83,9 +83,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
         let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
                        have not; refine `[refinement.region]` from the start";
-        let trigger = self.trigger().filter(|_| self.forces.remember());
+        let trigger = self.trigger().filter(|_| self.forces.has_history());
         trigger.map_or(Ok(()), |trigger| {
-            Err(self.plan.source.error(trigger.span.clone(), message))
+            Err(self.problem.source.error(trigger.span.clone(), message))
         })
     }
 
@@ -97,7 +97,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Refines what the triggers of the plan want, and makes coarse what they have not seen for long enough.
+    /// Refines what the triggers of the problem want, and makes coarse what they have not seen for long enough.
     /// Returns what came of it if the points were dealt out anew. Collective.
     ///
     /// # Errors
@@ -155,7 +155,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     ///
     /// # Errors
     /// When METIS fails; the same on all ranks. The points are gone then.
-    fn regrid(&mut self, grids: Grids<'a>, left: &[Pick], facets: &Facets) -> Result<()> {
+    fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
         let Kept {
@@ -179,12 +179,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (time, rule) = (other.clock.time(), other.time_rule());
         if let StepRule::Automatic(safety) = rule.step {
             let rest = rule.end - time;
-            let most = automatic_step(other.plan, &rule, safety, other.stable_step);
+            let most = automatic_step(other.problem, &rule, safety, other.stable_step);
             other.clock.set_step(rest / (rest / most).ceil());
         }
-        other.place(time, 0.0);
-        other.find_anew();
-        other.guide();
+        other.apply_displacements(time, 0.0);
+        other.recompute_derived();
+        other.apply_velocities();
         *self = other;
         Ok(())
     }
@@ -198,14 +198,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// The run at time 0 on other grids.
     fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
-        Self::of_points(self.plan, self.comm, (pieces, grids), None, &mut || Ok(()))
+        Self::of_points(self.problem, self.comm, (pieces, grids), None, &mut || {
+            Ok(())
+        })
     }
 
     /// Goes back to the grids that an earlier part of the run had refined so, at time 0. Collective.
     ///
     /// # Errors
     /// When METIS fails; the same on all ranks.
-    pub fn refine_to(&mut self, state: &[Vec<Pick>; 2]) -> Result<()> {
+    pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
             let pieces = self.pieces_on(&grids);
@@ -217,7 +219,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 
     /// What the points of other grids, of which this rank makes these `pieces`, begin with. Collective.
-    fn kept(&mut self, grids: &Grids<'_>, left: &[Pick], pieces: &[Point]) -> Kept {
+    fn kept(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> Kept {
         let comm = self.comm;
         let past = Past::new(self, grids, left);
         let (ids, rows) = past.rows(self, grids, pieces);
@@ -281,8 +283,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
             Some(*end)
         });
         let starts: Vec<usize> = std::iter::once(0).chain(ends).collect();
-        let cutoffs = cutoffs(self.plan);
-        let count = self.plan.block_count();
+        let cutoffs = cutoffs(self.problem);
+        let count = self.problem.block_count();
         let near: Vec<OnceCell<Vec<u32>>> = vec![OnceCell::new(); model.owned()];
         let concerned = |point: usize| {
             starts[point] < starts[point + 1] || facets.are_near(model.position(point))

@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::points::Point;
-use crate::refine::{Grids, Pick, Place};
+use crate::refine::{Grids, NodeKey, Place};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
@@ -28,9 +28,9 @@ impl Past {
     pub fn new<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
-        left: &[Pick],
+        left: &[NodeKey],
     ) -> Self {
-        let (plan, comm) = (simulation.plan, simulation.comm);
+        let (problem, comm) = (simulation.problem, simulation.comm);
         let model = &simulation.model;
         let (owned, local) = (model.owned(), model.volume.len());
         let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -53,13 +53,13 @@ impl Past {
             simulation.forces.bring(comm, column);
         }
         // New points and those that leave lie between points where one of the grids is refined.
-        let bodies = 0..plan.bodies.len();
+        let bodies = 0..problem.bodies.len();
         let changed =
             bodies.map(|body| [grids, &simulation.grids].map(|grids| grids.changed(body)));
         let changed: Vec<_> = changed.collect();
         let blocks = &columns[columns.len() - 1];
         let place = |point: usize| {
-            let body = plan.body_of(blocks[point] as usize);
+            let body = problem.body_of(blocks[point] as usize);
             let place = grids.place_at(body, simulation.model.position(point))?;
             let cell = grids.cell_of(place);
             let mut changed = changed[body].iter().flatten();
@@ -85,7 +85,7 @@ impl Past {
         &mut self,
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
-        left: &[Pick],
+        left: &[NodeKey],
     ) {
         let comm = simulation.comm;
         let owned = simulation.model.owned();
@@ -143,7 +143,7 @@ impl Past {
     fn with_parents(
         &self,
         grids: &Grids<'_>,
-        [body, _, x, y, z]: &Pick,
+        [body, _, x, y, z]: &NodeKey,
     ) -> Option<(usize, Vec<usize>)> {
         let (body, place) = (*body as usize, [*x, *y, *z]);
         let at = |place: Place| self.at.get(&(body, place)).copied();
@@ -167,7 +167,7 @@ impl Past {
         }
         let mut born = Born::default();
         for piece in pieces.iter().filter(|piece| piece.id >= model.coarsest) {
-            let body = simulation.plan.body_of(piece.block as usize);
+            let body = simulation.problem.body_of(piece.block as usize);
             let Some(place) = grids.place_at(body, piece.position) else {
                 continue;
             };

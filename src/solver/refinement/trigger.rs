@@ -1,11 +1,11 @@
 //! Which points are refined during a run, and when.
 
 use crate::comm::all_gather_many;
-use crate::deck::expression::Expression;
-use crate::deck::plan::{Action, Plan, Selector, Trigger};
 use crate::error::Result;
+use crate::expression::Expression;
 use crate::points::bins::Bins;
-use crate::refine::Pick;
+use crate::problem::{Action, Problem, Selector, Trigger};
+use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
@@ -20,9 +20,9 @@ struct Source {
 /// What the triggers want, of all ranks.
 pub struct Wanted {
     /// Points that are to be refined.
-    pub finer: Vec<Pick>,
+    pub finer: Vec<NodeKey>,
     /// Refined points that are to become coarse again.
-    pub coarser: Vec<Pick>,
+    pub coarser: Vec<NodeKey>,
 }
 
 /// Damage that is more than rounding.
@@ -31,17 +31,17 @@ const LEAST_DAMAGE: f64 = 1e-9;
 /// More places within the horizon of a finer point are not looked at for coarser ones.
 const MOST_PLACES: f64 = 1e4;
 
-/// Whether a run can refine as its plan wants.
+/// Whether a run can refine as its problem wants.
 ///
 /// # Errors
 /// With horizons of very many spacings; with loads on sets given by ids; during a run with relaxation and
 /// steps that are undone.
-pub fn is_possible(plan: &Plan) -> Result<()> {
-    let Some(refinement) = &plan.refinement else {
+pub fn is_possible(problem: &Problem) -> Result<()> {
+    let Some(refinement) = &problem.refinement else {
         return Ok(());
     };
-    let dimension = plan.dimension.count();
-    for block in plan.blocks().filter(|block| block.level > 0) {
+    let dimension = problem.dimension.count();
+    for block in problem.blocks().filter(|block| block.level > 0) {
         let Some(edges) = block.spacing() else {
             continue;
         };
@@ -55,26 +55,28 @@ pub fn is_possible(plan: &Plan) -> Result<()> {
                  metres?",
                 block.level
             );
-            return Err(plan.source.error(plan.places.horizon.clone(), message));
+            return Err(problem
+                .source
+                .error(problem.places.horizon.clone(), message));
         }
     }
     let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
-    let is_by_ids = |set: usize| matches!(plan.sets[set].selector, Selector::Ids { .. });
-    let mut conditions = plan.conditions.iter();
+    let is_by_ids = |set: usize| matches!(problem.sets[set].selector, Selector::Ids { .. });
+    let mut conditions = problem.conditions.iter();
     if let Some(condition) = conditions.find(|c| is_load(&c.action) && is_by_ids(c.set)) {
         let message = format!(
             "[condition.{}] set: a load on points given by their ids cannot follow a refined grid; give \
              the set by `where`",
             condition.name
         );
-        return Err(plan.source.error(condition.span.clone(), message));
+        return Err(problem.source.error(condition.span.clone(), message));
     }
     let Some(trigger) = &refinement.trigger else {
         return Ok(());
     };
-    let other = if plan.relaxes() {
+    let other = if problem.relaxes() {
         "method = \"relaxation\""
-    } else if plan.adapts() {
+    } else if problem.adapts() {
         "an adaptive step"
     } else {
         return Ok(());
@@ -82,22 +84,22 @@ pub fn is_possible(plan: &Plan) -> Result<()> {
     let message = format!(
         "[refinement.trigger]: does not go with {other}; refine `[refinement.region]` from the start"
     );
-    Err(plan.source.error(trigger.span.clone(), message))
+    Err(problem.source.error(trigger.span.clone(), message))
 }
 
-fn trigger(plan: &Plan) -> Option<&Trigger> {
-    let refinement = plan.refinement.as_ref();
+fn trigger(problem: &Problem) -> Option<&Trigger> {
+    let refinement = problem.refinement.as_ref();
     refinement.and_then(|refinement| refinement.trigger.as_ref())
 }
 
 /// Whether grids become coarser again during a run.
-pub fn may_coarsen(plan: &Plan) -> bool {
-    trigger(plan).is_some_and(|trigger| trigger.coarsen_after.is_some())
+pub fn may_coarsen(problem: &Problem) -> bool {
+    trigger(problem).is_some_and(|trigger| trigger.coarsen_after.is_some())
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn trigger(&self) -> Option<&'a Trigger> {
-        trigger(self.plan)
+        trigger(self.problem)
     }
 
     /// Whether points may be born during the run.
@@ -132,14 +134,18 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 });
             let silent: Vec<bool> = silent.collect();
             coarser = self.picks(&silent, |block, position| {
-                self.grids.coarsening(self.plan.body_of(block), position)
+                self.grids.coarsening(self.problem.body_of(block), position)
             });
         }
         Wanted { finer, coarser }
     }
 
     /// What `pick` makes of the blocks and positions of the marked points of all ranks.
-    fn picks(&self, marked: &[bool], pick: impl Fn(usize, [f64; 3]) -> Option<Pick>) -> Vec<Pick> {
+    fn picks(
+        &self,
+        marked: &[bool],
+        pick: impl Fn(usize, [f64; 3]) -> Option<NodeKey>,
+    ) -> Vec<NodeKey> {
         let model = &self.model;
         let points = (0..model.owned()).filter(|point| marked[*point]);
         let own = points.filter_map(|k| pick(usize::from(model.block[k]), model.position(k)));
@@ -183,7 +189,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let own: Vec<Source> = own
             .map(|point| Source {
                 position: model.position(point),
-                horizon: self.plan.block(usize::from(model.block[point])).horizon,
+                horizon: self.problem.block(usize::from(model.block[point])).horizon,
             })
             .collect();
         all_gather_many(self.comm, &own)

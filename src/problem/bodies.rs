@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use super::{Calibration, Law, WorkRule};
-use crate::deck::expression::Expression;
 use crate::elastic::Isotropic;
+use crate::expression::Expression;
 use crate::points::Polygon;
 
 /// A body, which is a block with its own material and damage.

@@ -1,12 +1,12 @@
 //! The law of a material: which one, and the values of its own keys.
 
-use super::expression::Expression;
-use super::number::shown;
-use super::plan::{Damage, DamageRule, Sense};
-use super::source::suggestion;
+use super::{Damage, DamageRule, Sense};
 use crate::dimension::Dimension;
 use crate::error::{Error, Result};
+use crate::expression::Expression;
 use crate::material::{Declaration, Key, Kind, LawFault, OfLength, Value, Values, declarations};
+use crate::message::format_number;
+use crate::message::suggestion;
 
 /// A law with the values of its own keys.
 #[derive(Debug, Clone)]
@@ -143,7 +143,7 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
             Value::Number(number),
         ) => {
             let fits = range.contains(number);
-            let error = || format!("must be {words}, is {}", shown(*number));
+            let error = || format!("must be {words}, is {}", format_number(*number));
             if fits { Ok(()) } else { Err(error()) }
         }
         (Kind::Word(words), Value::Word(given)) => {
@@ -153,9 +153,11 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
             if fits { Ok(()) } else { Err(error()) }
         }
         (Kind::OfLength, Value::OfLength(_)) => Ok(()),
-        (_, Value::Number(number)) => {
-            Err(format!("must be {}, is {}", wanted(key), shown(*number)))
-        }
+        (_, Value::Number(number)) => Err(format!(
+            "must be {}, is {}",
+            wanted(key),
+            format_number(*number)
+        )),
         _ => Err(format!("must be {}", wanted(key))),
     }
 }

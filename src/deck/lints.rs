@@ -6,25 +6,25 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::build::changes_density_scale;
-use super::expression::Expression;
 use super::grammar::{Deck, Tables};
-use super::number::shown;
-use super::plan::{Plan, Selector};
 use super::resolve::Scope;
 use super::source::Source;
 use crate::error::{Error, Result};
+use crate::expression::Expression;
+use crate::message::format_number;
+use crate::problem::{Problem, Selector};
 
 /// A warning for each of them. `scope` is that of the validated deck.
 ///
 /// # Errors
 /// When the deck cannot be written out to look for names.
-pub fn doubts(scope: &Scope, deck: &Deck, plan: &Plan) -> Result<Vec<String>> {
+pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String>> {
     let source = scope.source;
     let mut warnings = unused_parameters(source, deck)?;
     warnings.extend(unused(scope, "material", &deck.material));
     warnings.extend(unused(scope, "damage", &deck.damage));
     warnings.extend(unused(scope, "set", &deck.set));
-    for set in &plan.sets {
+    for set in &problem.sets {
         if let Selector::Where(condition) = &set.selector
             && !condition.is_condition()
         {
@@ -36,16 +36,16 @@ pub fn doubts(scope: &Scope, deck: &Deck, plan: &Plan) -> Result<Vec<String>> {
             warnings.push(source.warning(set.span.clone(), message));
         }
     }
-    let pairs = plan.stages.windows(2).zip(deck.stage.iter().skip(1));
+    let pairs = problem.stages.windows(2).zip(deck.stage.iter().skip(1));
     for (pair, table) in pairs.filter(|(pair, _)| changes_density_scale(pair)) {
         let [before, after] = [0, 1].map(|k| pair[k].time.density_scale);
         let message = format!(
             "[[stage]] density_scale: changes from {} to {} at t = {} s; moving points keep their momentum, so their \
              velocities and their kinetic energy are multiplied by {} (column `density_scale_energy` of the history)",
-            shown(before),
-            shown(after),
-            shown(pair[0].time.end),
-            shown(before / after),
+            format_number(before),
+            format_number(after),
+            format_number(pair[0].time.end),
+            format_number(before / after),
         );
         warnings.push(source.warning(table.span(), message));
     }
@@ -97,7 +97,7 @@ fn names_in(value: &Value, names: &mut IndexSet<String>) {
 mod tests {
     use crate::deck::{Deck, Source};
 
-    fn doubts(extra: &str) -> Vec<String> {
+    fn lints(extra: &str) -> Vec<String> {
         let text = format!(
             "title = 'dx and height'
 dimension = 'plane-stress'
@@ -114,17 +114,17 @@ time.end = 1
             text,
         });
         let deck = deck.unwrap_or_else(|error| panic!("{error}"));
-        let plan = deck.plan().unwrap_or_else(|error| panic!("{error}"));
-        plan.warnings
+        let problem = deck.problem().unwrap_or_else(|error| panic!("{error}"));
+        problem.warnings
     }
 
     #[test]
     fn names_that_nothing_uses() {
         let height = "a.toml:3: [parameters] height: no expression uses it".to_owned();
-        assert_eq!(doubts(""), std::slice::from_ref(&height));
+        assert_eq!(lints(""), std::slice::from_ref(&height));
         let steel = "material.steel.pmb = { density = 2, youngs_modulus = 'height' }";
         let expected = ["a.toml:7: [material.steel]: nothing in the deck uses it"];
-        assert_eq!(doubts(steel), expected);
+        assert_eq!(lints(steel), expected);
         let others = "damage.brittle.critical_stretch = { fracture_energy = 1 }
             set.left.where = 'x < 1'
             set.right.where = 'x > height'
@@ -133,14 +133,14 @@ time.end = 1
             "a.toml:7: [damage.brittle]: nothing in the deck uses it",
             "a.toml:8: [set.left]: nothing in the deck uses it",
         ];
-        assert_eq!(doubts(others), expected);
+        assert_eq!(lints(others), expected);
     }
 
     #[test]
     fn a_set_is_used_wherever_a_deck_may_name_one() {
         let set = "set.some.where = 'x < height'\n";
         let unused = "a.toml:7: [set.some]: nothing in the deck uses it";
-        assert_eq!(doubts(set), [unused]);
+        assert_eq!(lints(set), [unused]);
         for use_of_it in [
             "initial.push = { set = 'some', velocity = [1, 0] }",
             "condition.hold = { set = 'some', displacement = [0, 0] }",
@@ -154,7 +154,7 @@ time.end = 1
             "damage.d.energy = { fracture_energy = 1, no_failure = ['some'] }
             body.other = { material = 'glass', damage = 'd', shape.disc = { centre = [9, 9], radius = 3 } }",
         ] {
-            let found = doubts(&format!("{set}{use_of_it}"));
+            let found = lints(&format!("{set}{use_of_it}"));
             assert_eq!(found, Vec::<String>::new(), "{use_of_it}");
         }
     }
@@ -166,7 +166,7 @@ time.end = 1
                 "set.some.where = '{condition}'
                 history.reactions = ['some']"
             );
-            let warnings = doubts(&text);
+            let warnings = lints(&text);
             warnings
                 .iter()
                 .any(|line| line.contains("a comparison is missing"))

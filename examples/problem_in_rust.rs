@@ -2,19 +2,19 @@
 //! steps:
 //!
 //! ```sh
-//! cargo run --release --example plan_in_rust
+//! cargo run --release --example problem_in_rust
 //! ```
 
 use std::process::ExitCode;
 
 use fissure::comm::Communicator;
-use fissure::deck::expression::Expression;
-use fissure::deck::plan::{
-    Action, Crack, Damage, DamageRule, Interval, Law, Material, Plan, Selector, Shape, Toughness,
-};
 use fissure::dimension::Dimension;
 use fissure::elastic::Isotropic;
 use fissure::error::Result;
+use fissure::expression::Expression;
+use fissure::problem::{
+    Action, Crack, Damage, DamageRule, Interval, Law, Material, Problem, Selector, Shape, Toughness,
+};
 use fissure::run::{Existing, Observer, Options, Row, View};
 
 /// Edge of a cell, m.
@@ -32,7 +32,7 @@ fn main() -> ExitCode {
 
 fn tear(end: f64) -> Result<()> {
     let world = fissure::run::start_mpi()?;
-    let mut options = Options::new("out/plan_in_rust");
+    let mut options = Options::new("out/problem_in_rust");
     options.existing = Existing::Replace;
     let mut printer = Printer {
         speaks: world.rank() == 0,
@@ -42,10 +42,10 @@ fn tear(end: f64) -> Result<()> {
 }
 
 /// A plate of 60 mm × 30 mm whose ends go apart, soon at 2 m/s, up to the end (s).
-pub fn plate(end: f64) -> Result<Plan> {
+pub fn plate(end: f64) -> Result<Problem> {
     let dimension = Dimension::PlaneStress { thickness: 1e-3 };
-    let mut plan = Plan::new(dimension, 3.0 * SPACING, end);
-    plan.title = "A plate built in Rust".to_owned();
+    let mut problem = Problem::new(dimension, 3.0 * SPACING, end);
+    problem.title = "A plate built in Rust".to_owned();
     let glass = Material::new(
         Law::named("pmb")?,
         2440.0,
@@ -62,23 +62,23 @@ pub fn plate(end: f64) -> Result<Plan> {
         DamageRule::CriticalStretch,
         Toughness::FractureEnergy(135.0),
     );
-    plan.add_body("plate", glass, Some(brittle), plate, SPACING);
+    problem.add_body("plate", glass, Some(brittle), plate, SPACING);
     let notch = Crack::Segment {
         from: [0.0, 0.015, 0.0],
         to: [0.02, 0.015, 0.0],
         width: 0.0,
     };
-    plan.add_crack("notch", notch);
+    problem.add_crack("notch", notch);
     for (name, place, velocity) in [
         ("top", "y > 0.027", "ramp(t, 0, 1e-5)"),
         ("bottom", "y < 0.003", "-ramp(t, 0, 1e-5)"),
     ] {
-        let set = plan.add_set(name, Selector::Where(Expression::of(place)?));
+        let set = problem.add_set(name, Selector::Where(Expression::of(place)?));
         let pull = vec![None, Some(Expression::of(velocity)?)];
-        plan.add_condition(name, set, Action::Velocity(pull));
+        problem.add_condition(name, set, Action::Velocity(pull));
     }
-    plan.history.every = Some(Interval::Steps(50));
-    Ok(plan)
+    problem.history.every = Some(Interval::Steps(50));
+    Ok(problem)
 }
 
 /// Prints the energies in each row of the history.

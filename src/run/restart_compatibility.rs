@@ -1,13 +1,13 @@
 //! What must be the same for a run to be continued.
 
-use crate::deck::plan::{Interval, Output, Plan};
 use crate::deck::{self, Source};
 use crate::error::Result;
+use crate::problem::{Interval, Output, Problem};
 
-/// The first line of the physics of a plan without a deck.
-const WITHOUT_DECK: &str = "# a plan without a deck\n";
+/// The first line of the physics of a problem without a deck.
+const WITHOUT_DECK: &str = "# a problem without a deck\n";
 
-/// What parts the physics of such a plan from the definitions of its history.
+/// What parts the physics of such a problem from the definitions of its history.
 const HISTORY: &str = "# its history\n";
 
 /// The longest part of a line that a message shows.
@@ -16,38 +16,38 @@ const SHOWN: usize = 100;
 /// How many of the differences a message shows.
 const MOST_SHOWN: usize = 5;
 
-/// The physics of a run as text: its deck with every default filled in, or else a listing of the plan.
-pub fn describe(plan: &Plan, deck: Option<&str>) -> String {
+/// The physics of a run as text: its deck with every default filled in, or else a listing of the problem.
+pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     if let Some(deck) = deck {
         return deck.to_owned();
     }
-    let mut plan = plan.clone();
+    let mut problem = problem.clone();
     // What may change between the parts of a run.
-    plan.source = Source::default();
-    plan.warnings.clear();
-    plan.title.clear();
-    if let Some(last) = plan.stages.last_mut() {
+    problem.source = Source::default();
+    problem.warnings.clear();
+    problem.title.clear();
+    if let Some(last) = problem.stages.last_mut() {
         last.time.end = 0.0;
     }
-    plan.time.end = 0.0;
-    plan.output = Output {
+    problem.time.end = 0.0;
+    problem.output = Output {
         every: Interval::Steps(1),
         fields: Vec::new(),
         single: false,
         set: None,
     };
-    plan.history.every = Some(Interval::Steps(1));
-    let history = plan.history.clone();
-    plan.history.reactions.clear();
-    plan.history.support_forces.clear();
-    plan.history.damage_threshold = 0.0;
-    plan.history.probes.clear();
-    plan.history.fronts.clear();
-    plan.history.cracks.clear();
-    plan.history.tips.clear();
-    plan.checkpoint = Default::default();
-    plan.balance = None;
-    format!("{WITHOUT_DECK}{plan:#?}\n{HISTORY}{history:#?}\n")
+    problem.history.every = Some(Interval::Steps(1));
+    let history = problem.history.clone();
+    problem.history.reactions.clear();
+    problem.history.support_forces.clear();
+    problem.history.damage_threshold = 0.0;
+    problem.history.probes.clear();
+    problem.history.fronts.clear();
+    problem.history.cracks.clear();
+    problem.history.tips.clear();
+    problem.checkpoint = Default::default();
+    problem.balance = None;
+    format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")
 }
 
 /// What differs in the meaning of the history's columns, in one line; nothing if it is the same.
@@ -80,7 +80,7 @@ fn source(name: &str, text: &str) -> Source {
 pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
     let [old_listed, new_listed] = [old, new].map(|text| text.starts_with(WITHOUT_DECK));
     if old_listed != new_listed {
-        let line = "the one is a deck, the other a plan without a deck";
+        let line = "the one is a deck, the other a problem without a deck";
         return Ok(vec![line.to_owned()]);
     }
     if old_listed {

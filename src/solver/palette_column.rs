@@ -1,4 +1,4 @@
-//! Numbers of points of which few are different, as volumes on a grid.
+//! LaneTuple of points of which few are different, as volumes on a grid.
 
 use std::ops::Index;
 
@@ -6,14 +6,14 @@ use rustc_hash::FxHashMap;
 
 /// A number for each point; a byte a point where at most 256 are different.
 #[derive(Debug, Clone)]
-pub enum Repeated {
+pub enum PaletteColumn {
     /// The different numbers, and which one each point has.
     Few(Vec<f64>, Vec<u8>),
     /// One for each point.
     Many(Vec<f64>),
 }
 
-impl Repeated {
+impl PaletteColumn {
     /// From the numbers of all points.
     pub fn new(numbers: Vec<f64>) -> Self {
         let mut table: Vec<f64> = Vec::new();
@@ -54,7 +54,7 @@ impl Repeated {
     }
 }
 
-impl Index<usize> for Repeated {
+impl Index<usize> for PaletteColumn {
     type Output = f64;
 
     fn index(&self, point: usize) -> &f64 {
@@ -73,8 +73,8 @@ mod tests {
     fn numbers_come_back_whether_few_are_different_or_many() {
         for different in [1, 256, 257] {
             let numbers: Vec<f64> = (0..1000).map(|k| f64::from(k % different) - 0.5).collect();
-            let repeated = Repeated::new(numbers.clone());
-            assert_eq!(matches!(repeated, Repeated::Few(..)), different <= 256);
+            let repeated = PaletteColumn::new(numbers.clone());
+            assert_eq!(matches!(repeated, PaletteColumn::Few(..)), different <= 256);
             assert_eq!(repeated.iter().collect::<Vec<_>>(), numbers);
         }
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::deck::expression::Expression;
+use crate::expression::Expression;
 
 /// Initial values of a set.
 #[derive(Debug, Clone)]

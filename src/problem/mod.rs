@@ -2,8 +2,10 @@
 //!
 //! Positions and vectors have three components; those beyond the dimension are 0.
 
+mod blocks;
 mod bodies;
 mod conditions;
+pub mod law;
 mod outputs;
 mod refinement;
 mod time;
@@ -13,18 +15,18 @@ use std::ops::Range;
 use crate::deck::source::Source;
 use crate::dimension::Dimension;
 
-pub use super::blocks::{Block, Kind};
-pub use super::law::Law;
 pub use crate::damage::{Calibration, Sense, WorkMeasure, WorkRule};
+pub use blocks::{Block, Kind};
 pub use bodies::*;
 pub use conditions::*;
+pub use law::Law;
 pub use outputs::*;
 pub use refinement::*;
 pub use time::*;
 
 /// Everything that a run needs to know.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct Problem {
     /// The deck's text, for errors found later and for the result's metadata.
     pub source: Source,
     /// What the deck may say but most likely does not mean, each with file and line.

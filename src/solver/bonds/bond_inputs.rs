@@ -7,7 +7,7 @@ use super::grid_points::{GridValues, OwnedPlaces};
 use super::list_points::{self, Node};
 
 /// What bonds read of some of the owned points; no two threads have that of the same point.
-pub struct Shown<'a, const D: usize> {
+pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
     /// Of these points; empty if there is no list.
     nodes: &'a mut [Node],
@@ -15,7 +15,7 @@ pub struct Shown<'a, const D: usize> {
     places: &'a [OwnedPlaces<'a, D>],
 }
 
-impl<const D: usize> Shown<'_, D> {
+impl<const D: usize> BondInputs<'_, D> {
     /// Takes out what is of so many of the points, the first ones.
     pub fn split_off_first(&mut self, count: usize) -> Self {
         let middle = self.points.start + count;
@@ -35,7 +35,7 @@ impl<const D: usize> Shown<'_, D> {
     ///
     /// # Panics
     /// When they are those of more or less points.
-    pub fn show(&mut self, displacement: [&[f64]; D]) {
+    pub fn write_bond_inputs(&mut self, displacement: [&[f64]; D]) {
         let count = self.points.len();
         assert!(displacement.iter().all(|column| column.len() == count));
         list_points::update(self.nodes, displacement);
@@ -48,14 +48,18 @@ impl<const D: usize> Shown<'_, D> {
 
 impl<const D: usize> Forces<D> {
     /// Calls `work` with what bonds read of the owned points, of which there are so many.
-    pub fn with_shown<R>(&mut self, owned: usize, work: impl FnOnce(Shown<'_, D>) -> R) -> R {
+    pub fn with_bond_inputs<R>(
+        &mut self,
+        owned: usize,
+        work: impl FnOnce(BondInputs<'_, D>) -> R,
+    ) -> R {
         let places: Vec<_> = self
             .grids
             .iter_mut()
             .map(GridValues::owned_places)
             .collect();
         let of_nodes = owned.min(self.nodes.len());
-        work(Shown {
+        work(BondInputs {
             points: 0..owned,
             nodes: &mut self.nodes[..of_nodes],
             places: &places,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::SMatrix;
 
 use crate::families::BlockBonds;
-use crate::lanes::{Lanes, Numbers};
+use crate::lanes::{LaneTuple, Lanes};
 use crate::material::{Law, PlasticState, ShapeTensor, with_law, with_pair};
 use crate::solver::model::Model;
 
@@ -70,7 +70,7 @@ impl<const D: usize> Forces<D> {
             energy,
             volume,
             neighbours,
-            dissipated: if self.remembers {
+            dissipated: if self.has_history {
                 dissipated
             } else {
                 Vec::new()

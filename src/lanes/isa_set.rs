@@ -2,7 +2,7 @@
 
 /// The versions of a loop on x86-64; other processors have one. All give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Versions {
+pub enum IsaSet {
     /// AVX-512 and AVX2.
     Each,
     /// AVX2, which is not much slower.
@@ -11,7 +11,7 @@ pub enum Versions {
     One,
 }
 
-impl Versions {
+impl IsaSet {
     /// Whether there is one for each set of instructions.
     pub const fn is_each(self) -> bool {
         matches!(self, Self::Each)

@@ -10,7 +10,7 @@ pub enum Interval {
     /// Time steps.
     Steps(u64),
     /// So many seconds of simulated time, but only after multiples of so many steps.
-    Seldom {
+    SecondsAtSteps {
         /// Simulated time, s.
         seconds: f64,
         /// Steps.
@@ -52,7 +52,7 @@ pub struct Output {
 /// The history.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// How often; without, [`Plan::row_interval`](super::Plan::row_interval) decides.
+    /// How often; without, [`Problem::row_interval`](super::Problem::row_interval) decides.
     pub every: Option<Interval>,
     /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,

@@ -1,9 +1,9 @@
-//! The blocks of a plan: its bodies and, with refinement, the parts of them by level.
+//! The blocks of a problem: its bodies and, with refinement, the parts of them by level.
 //!
 //! A block is what has one law, one horizon and, but for parts of refined bodies, one volume for all of
 //! its points.
 
-use super::plan::{Body, HorizonRule, Plan, PointSource};
+use super::{Body, HorizonRule, PointSource, Problem};
 
 /// The points of one level of a refined body fall into so many blocks.
 const KINDS: usize = 3;
@@ -19,7 +19,7 @@ pub enum Kind {
     AtCoarser,
 }
 
-/// A block of a plan.
+/// A block of a problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Block<'a> {
     /// Its body.
@@ -57,7 +57,7 @@ impl<'a> Block<'a> {
     }
 }
 
-impl Plan {
+impl Problem {
     /// Number of blocks.
     pub fn block_count(&self) -> usize {
         let levels = self.refinement.as_ref().map(|refinement| refinement.levels);

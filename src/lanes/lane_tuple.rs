@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 use super::{Lanes, WIDTH};
 
 /// Several quantities of eight bonds or points: `[Lanes; N]`, or a pair of such.
-pub trait Numbers: Copy + Send + Sync {
+pub trait LaneTuple: Copy + Send + Sync {
     /// How many.
     const COUNT: usize;
 
@@ -52,7 +52,7 @@ pub trait Numbers: Copy + Send + Sync {
     }
 }
 
-impl<const N: usize> Numbers for [Lanes; N] {
+impl<const N: usize> LaneTuple for [Lanes; N] {
     const COUNT: usize = N;
     type Columns<'a> = [&'a [f64]; N];
     type ColumnsMut<'a> = [&'a mut [f64]; N];
@@ -107,7 +107,7 @@ impl<const N: usize> Numbers for [Lanes; N] {
 }
 
 /// Row by row.
-impl<const N: usize, const M: usize> Numbers for [[Lanes; N]; M] {
+impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     const COUNT: usize = N * M;
     type Columns<'a> = [[&'a [f64]; N]; M];
     type ColumnsMut<'a> = [[&'a mut [f64]; N]; M];
@@ -166,7 +166,7 @@ impl<const N: usize, const M: usize> Numbers for [[Lanes; N]; M] {
     }
 }
 
-impl<A: Numbers, B: Numbers> Numbers for (A, B) {
+impl<A: LaneTuple, B: LaneTuple> LaneTuple for (A, B) {
     const COUNT: usize = A::COUNT + B::COUNT;
     type Columns<'a> = (A::Columns<'a>, B::Columns<'a>);
     type ColumnsMut<'a> = (A::ColumnsMut<'a>, B::ColumnsMut<'a>);

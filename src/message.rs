@@ -1,0 +1,53 @@
+//! Parts of messages: numbers and names as users read them.
+
+/// Names longer than this resemble no other name.
+const LONGEST_NAME: usize = 64;
+
+/// A number for a message; with an exponent where it would be a long row of digits.
+pub fn format_number(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-3..1e6 => value.to_string(),
+        size if size.is_finite() => format!("{value:e}"),
+        _ => value.to_string(),
+    }
+}
+
+/// The entry of `known` that resembles `name` most; `None` if none is similar.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .filter(|candidate| name.len().max(candidate.len()) <= LONGEST_NAME)
+        .map(|candidate| {
+            let likeness = strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase());
+            (likeness, candidate)
+        })
+        .filter(|(likeness, _)| *likeness > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// Suggestion for an error on an unknown name: `; did you mean …? (known: …)`.
+pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let mean = nearest(name, known.iter().copied())
+        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    if known.is_empty() {
+        format!("{mean} (none is defined)")
+    } else {
+        format!("{mean} (known: {})", known.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_suggestion_names_the_nearest() {
+        assert_eq!(
+            suggestion("horizn", ["spacing", "horizon"]),
+            "; did you mean `horizon`? (known: spacing, horizon)"
+        );
+        assert_eq!(suggestion("a", []), " (none is defined)");
+    }
+}
