@@ -2,7 +2,7 @@
 //! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states.
 
 use crate::lanes::{Lanes, Simd};
-use crate::material::bond::{NEAR, growth_of};
+use crate::material::bond::{NEAR, Weights, growth_of};
 use crate::material::{Bond, Law};
 
 /// When the bonds between two blocks break.
@@ -64,9 +64,9 @@ pub struct Ends<'a, L, P> {
     /// The numbers of the points.
     pub points: [&'a P; 2],
     /// What criteria alone read of them.
-    pub limits: &'a [Limits; 2],
-    /// A bit for each bond that is within the horizon of the end, whose force state acts.
-    pub acting: [u8; 2],
+    pub limits: [&'a Limits; 2],
+    /// Influence and volume share of the bonds.
+    pub weights: Weights,
 }
 
 /// What criteria read of eight points, where they read it.
@@ -76,8 +76,6 @@ pub struct Limits {
     pub thresholds: Lanes,
     /// Their [`Law::truncation_factor`].
     pub truncation_factors: Lanes,
-    /// Their [`Rotation`](crate::material::Rotation); 0 is none.
-    pub rotations: [Lanes; 3],
 }
 
 impl Limits {
@@ -87,7 +85,6 @@ impl Limits {
         Self {
             thresholds: Lanes::splat(0.0),
             truncation_factors: Lanes::splat(1.0),
-            rotations: [Lanes::splat(0.0); 3],
         }
     }
 }
@@ -164,7 +161,7 @@ impl Criterion {
                 Lanes::splat(growth_of(critical)),
             ),
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
-                let [i, j] = ends.acting;
+                let [i, j] = ends.weights.acting();
                 let spent = simd.at_least(work, self.threshold(simd, ends)) & (i | j);
                 match rule.sense {
                     Sense::Pulled => spent & bond.relative_square_extension.above(0.0),
@@ -194,15 +191,11 @@ impl Criterion {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
             Self::Stretch(critical) => Lanes::splat(critical),
-            Self::Work(takes, rule) => {
-                let [i, j] = [0, 1].map(|end| {
-                    let takes = rule.corrected(Lanes::splat(takes[end]), ends.limits[end]);
-                    simd.keep(takes, ends.acting[end])
-                });
-                i + j
+            Self::Work([i, j], rule) => {
+                rule.sum_of_acting(simd, [Lanes::splat(i), Lanes::splat(j)], ends)
             }
             Self::Thresholds(critical) => {
-                let [mut here, mut there] = ends.limits.map(|limits| limits.thresholds);
+                let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if L::SCALED {
                     let growth = scale() - Lanes::splat(1.0);
                     here += growth * critical[0];
@@ -210,14 +203,11 @@ impl Criterion {
                 }
                 here.min(there)
             }
-            Self::WorkThresholds(ratios, rule) => {
-                let [i, j] = ends.limits.map(|limits| limits.thresholds);
-                let [i, j] = [0, 1].map(|end| {
-                    let smaller = (i * ratios[end][0]).min(j * ratios[end][1]) * 0.5;
-                    let takes = rule.corrected(smaller, ends.limits[end]);
-                    simd.keep(takes, ends.acting[end])
-                });
-                i + j
+            Self::WorkThresholds([[ii, ij], [ji, jj]], rule) => {
+                let (i, j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
+                let takes_i = (i * ii).min(j * ij) * 0.5;
+                let takes_j = (i * ji).min(j * jj) * 0.5;
+                rule.sum_of_acting(simd, [takes_i, takes_j], ends)
             }
         }
     }
@@ -267,9 +257,24 @@ impl WorkRule {
         self.family_correction > 0.0
     }
 
+    /// What the acting force states of bonds take together, by what each takes in a whole family. Written out: array
+    /// methods are not always inlined, and the compiler would keep all of a bond in memory for them.
+    #[inline(always)]
+    fn sum_of_acting<S: Simd, L, P>(
+        self,
+        simd: S,
+        [i, j]: [Lanes; 2],
+        ends: Ends<'_, L, P>,
+    ) -> Lanes {
+        let [acts_i, acts_j] = ends.weights.acting();
+        let takes_i = simd.keep(self.corrected(i, ends.limits[0]), acts_i);
+        let takes_j = simd.keep(self.corrected(j, ends.limits[1]), acts_j);
+        takes_i + takes_j
+    }
+
     /// What the force state of an end takes, by what it takes in a whole family.
     #[inline(always)]
-    fn corrected(self, takes: Lanes, end: Limits) -> Lanes {
+    fn corrected(self, takes: Lanes, end: &Limits) -> Lanes {
         if !self.corrects() {
             return takes;
         }

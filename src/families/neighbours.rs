@@ -176,24 +176,12 @@ impl Group<'_> {
         }
     }
 
-    /// An index, and how far the eight lie beyond it, each read by itself: else the compiler makes a vector of
-    /// them, which it has to take apart again where they are to be addresses.
+    /// An index, and how far each of the eight lies beyond it.
     #[inline(always)]
     pub fn base_and_offsets(self) -> (usize, [usize; WIDTH]) {
         match self {
-            Self::Near(first, distances) => {
-                // SAFETY: all of them are there.
-                let distance = |k| unsafe { std::ptr::read_volatile(&distances[k]) };
-                (
-                    first as usize,
-                    std::array::from_fn(|k| distance(k) as usize),
-                )
-            }
-            Self::Full(indices) => {
-                // SAFETY: as above.
-                let index = |k| unsafe { std::ptr::read_volatile(&indices[k]) };
-                (0, std::array::from_fn(|k| index(k) as usize))
-            }
+            Self::Near(first, distances) => (first as usize, distances.map(usize::from)),
+            Self::Full(indices) => (0, std::array::from_fn(|k| indices[k] as usize)),
         }
     }
 }

@@ -9,6 +9,9 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// How many.
     const COUNT: usize;
 
+    /// Whether quantities without a column are 0; else every quantity has a column.
+    const PADDED: bool = false;
+
     /// One column of numbers for each, to read.
     type Columns<'a>: Copy + Send + Sync;
 
@@ -163,6 +166,63 @@ impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     #[inline(always)]
     fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64] {
         columns[quantity / N][quantity % N]
+    }
+}
+
+/// At most `N` quantities; those without a column are 0. What laws share whose number of quantities is known at run
+/// time only.
+#[derive(Debug, Clone, Copy)]
+pub struct UpTo<const N: usize>([Lanes; N]);
+
+impl<const N: usize> LaneTuple for UpTo<N> {
+    const COUNT: usize = N;
+    const PADDED: bool = true;
+    type Columns<'a> = [&'a [f64]; N];
+    type ColumnsMut<'a> = [&'a mut [f64]; N];
+
+    #[inline(always)]
+    fn each(value: impl FnMut(usize) -> Lanes) -> Self {
+        Self(LaneTuple::each(value))
+    }
+
+    #[inline(always)]
+    fn get(&self, quantity: usize) -> Lanes {
+        self.0[quantity]
+    }
+
+    #[inline(always)]
+    fn get_mut(&mut self, quantity: usize) -> &mut Lanes {
+        &mut self.0[quantity]
+    }
+
+    fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_> {
+        std::array::from_fn(|k| all.get(k).map_or(&[][..], |column| &column[..]))
+    }
+
+    fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_> {
+        let mut all = all.iter_mut();
+        std::array::from_fn(|_| all.next().map_or(&mut [][..], |column| &mut column[..]))
+    }
+
+    #[inline(always)]
+    fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64] {
+        columns[quantity]
+    }
+
+    fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2] {
+        let mut firsts = columns;
+        let seconds = std::array::from_fn(|k| {
+            let column = std::mem::take(&mut firsts[k]);
+            let (first, second) = column.split_at_mut(middle.min(column.len()));
+            firsts[k] = first;
+            second
+        });
+        [firsts, seconds]
+    }
+
+    #[inline(always)]
+    fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64] {
+        columns[quantity]
     }
 }
 

@@ -12,7 +12,7 @@ pub mod simd;
 pub use column::Column;
 pub use instructions::Instructions;
 pub use isa_set::IsaSet;
-pub use lane_tuple::LaneTuple;
+pub use lane_tuple::{LaneTuple, UpTo};
 pub use simd::Simd;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};

@@ -39,9 +39,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
         self.select(a, bits, Lanes::splat(0.0))
     }
 
-    /// Does what is rarely needed, out of line: there it takes no registers from a loop, nor keeps the
-    /// compiler from working on whole vectors.
-    fn aside<R>(self, work: impl FnOnce() -> R) -> R;
+    /// Run a task that is rarely needed out of line: it takes no registers from the hot loop.
+    fn aside<T: Task>(self, task: T) -> T::Output;
 
     /// The same, as one vector to the compiler, which else goes through the lanes one by one where
     /// they come from several places.
@@ -55,6 +54,18 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn transpose(self, rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
         std::array::from_fn(|column| Lanes(std::array::from_fn(|row| rows[row][column])))
     }
+}
+
+/// Work that can run out of line with a set of instructions.
+///
+/// [`Self::run`] must be `#[inline(always)]`. A closure would not do: it is a function without these instructions, and a
+/// large one that the compiler does not inline calls every vector operation.
+pub trait Task {
+    /// The result.
+    type Output;
+
+    /// Runs it.
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
 /// What every machine has. Whether a product and a sum are rounded `ONCE` is to choose; that is slow on processors
@@ -77,8 +88,8 @@ impl<const ONCE: bool> Simd for Portable<ONCE> {
 
     #[cold]
     #[inline(never)]
-    fn aside<R>(self, work: impl FnOnce() -> R) -> R {
-        work()
+    fn aside<T: Task>(self, task: T) -> T::Output {
+        task.run(self)
     }
 }
 
@@ -89,7 +100,7 @@ pub use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Lanes, Simd};
+    use super::{Lanes, Simd, Task};
 
     /// AVX2 with fused multiplication and addition. Only [`Avx2::detect`] makes it.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -158,9 +169,9 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn aside<R>(self, work: impl FnOnce() -> R) -> R {
+        fn aside<T: Task>(self, task: T) -> T::Output {
             // SAFETY: as above.
-            unsafe { aside_avx2(work) }
+            unsafe { aside_avx2(self, task) }
         }
 
         #[inline(always)]
@@ -202,9 +213,9 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn aside<R>(self, work: impl FnOnce() -> R) -> R {
+        fn aside<T: Task>(self, task: T) -> T::Output {
             // SAFETY: as above.
-            unsafe { aside_avx512(work) }
+            unsafe { aside_avx512(self, task) }
         }
 
         #[inline(always)]
@@ -217,15 +228,15 @@ mod x86 {
     #[cold]
     #[inline(never)]
     #[target_feature(enable = "avx2,bmi2,fma")]
-    fn aside_avx2<R>(work: impl FnOnce() -> R) -> R {
-        work()
+    fn aside_avx2<T: Task>(simd: Avx2, task: T) -> T::Output {
+        task.run(simd)
     }
 
     #[cold]
     #[inline(never)]
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,bmi2,fma")]
-    fn aside_avx512<R>(work: impl FnOnce() -> R) -> R {
-        work()
+    fn aside_avx512<T: Task>(simd: Avx512, task: T) -> T::Output {
+        task.run(simd)
     }
 
     /// The halves of eight numbers.

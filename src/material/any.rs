@@ -4,7 +4,7 @@
 use nalgebra::SMatrix;
 
 use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Rotation, with_law};
-use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
+use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
 /// How many numbers of each kind the points and bonds of a law have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +70,12 @@ pub const MOST: Counts = {
     most
 };
 
+/// The numbers of a point of any law.
+pub type AnyPoint = UpTo<{ MOST.point }>;
+
+/// The history that a bond keeps for an end of any law.
+pub type AnyHistory = UpTo<{ MOST.bond_history }>;
+
 /// The first of some numbers.
 #[inline(always)]
 fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
@@ -94,6 +100,51 @@ impl AnyLaw {
         with_law!(self, law => law.described())
     }
 
+    /// Whether bonds are those of a [linear law](Law::LINEAR).
+    pub fn is_linear<const D: usize>(&self) -> bool {
+        fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
+            L::LINEAR
+        }
+        with_law!(self, law => of::<_, D>(law))
+    }
+
+    /// Whether the law has [`Law::bond_stress_across`].
+    pub fn has_bond_stress_across<const D: usize>(&self) -> bool {
+        fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
+            L::HAS_BOND_STRESS_ACROSS
+        }
+        with_law!(self, law => of::<_, D>(law))
+    }
+
+    /// Entries of T⊗Y of eight bonds (see [`ForceState::dyad`]) times two factors; 0 beyond the dimension.
+    #[inline(never)]
+    pub fn stress_contribution<const D: usize>(
+        &self,
+        bond: &Bond<D>,
+        (end, history): (&AnyPoint, &AnyHistory),
+        factors: [Lanes; 2],
+        entries: [(usize, usize); 6],
+    ) -> [Lanes; 6] {
+        fn of<F: ForceState<D>, const D: usize>(
+            force: F,
+            bond: &Bond<D>,
+            [weight, volume]: [Lanes; 2],
+            entries: [(usize, usize); 6],
+        ) -> [Lanes; 6] {
+            let force = force.times(weight).times(volume);
+            entries.map(|(a, b)| {
+                if a < D && b < D {
+                    force.dyad(bond, a, b)
+                } else {
+                    Lanes::splat(0.0)
+                }
+            })
+        }
+        with_law!(self, law => {
+            of::<_, D>(law.force(bond, &first(end), &first(history)), bond, factors, entries)
+        })
+    }
+
     /// How many numbers the law has in `D` dimensions.
     pub fn counts<const D: usize>(&self) -> Counts {
         fn of<L: Law<D>, const D: usize>(_: &L) -> Counts {
@@ -106,8 +157,8 @@ impl AnyLaw {
 /// Bonds of linear laws meet no others, so these are bonds of the deformed body. Nothing is inlined: every
 /// loop over such bonds would be compiled with all laws in it.
 impl<const D: usize> Law<D> for AnyLaw {
-    type Point = [Lanes; MOST.point];
-    type BondHistory = [Lanes; MOST.bond_history];
+    type Point = AnyPoint;
+    type BondHistory = AnyHistory;
     type ReferenceSum = [Lanes; MOST.reference_sum];
     type Sum = [Lanes; MOST.sum];
     type Force = [Lanes; D];
@@ -174,9 +225,9 @@ impl<const D: usize> Law<D> for AnyLaw {
         bond: &Bond<D>,
         end: &Self::Point,
         history: &Self::BondHistory,
-        rotation: &[Lanes; 3],
+        rotation: &<Self::Force as ForceState<D>>::Rotation,
     ) -> Lanes {
-        with_law!(self, law => law.end_work(simd, bond, &first(end), &first(history), rotation))
+        with_law!(self, law => law.end_work(simd, bond, &first(end), &first(history), &first(rotation)))
     }
 
     fn reads_advanced_history(&self, pass: usize) -> bool {

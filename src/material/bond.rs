@@ -8,6 +8,7 @@
 //! beyond take the closed forms x/((1 + x) + √(1 + x)) and x/(1 + √(1 + x)), which lose no digits
 //! either. All of that is the same to the bit from both ends of a bond: x is.
 
+use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
 
 /// The largest |x| for which the series are taken.
@@ -70,6 +71,16 @@ pub enum Weights {
 }
 
 impl Weights {
+    /// A bit for each bond, intact or not, that is within the horizon of point i, and of point j: there its force state
+    /// acts.
+    #[inline(always)]
+    pub fn acting(self) -> [u8; 2] {
+        match self {
+            Self::One | Self::Same(_) => [u8::MAX; 2],
+            Self::Each([i, j]) => [i.above(0.0), j.above(0.0)],
+        }
+    }
+
     /// That of the own end.
     #[inline(always)]
     pub fn own(self) -> Lanes {
@@ -224,32 +235,51 @@ fn sum_with_rest(a: Lanes, b: Lanes) -> (Lanes, Lanes) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// `near`; in lanes beyond the series x over the sum of √(1 + x) and `other`, which may be of 1 + x.
-/// LaneTuple go in pairs, with what rounding has taken.
+/// `near`; in lanes beyond the series x over the sum of √(1 + x) and `other`, which may depend on 1 + x.
 #[inline(always)]
-fn with_far<S: Simd>(
+fn with_far<S: Simd, O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)>(
     simd: S,
     relative_square_extension: Lanes,
     beyond_series: u8,
     near: Lanes,
-    other: impl Fn((Lanes, Lanes)) -> (Lanes, Lanes),
+    other: O,
 ) -> Lanes {
     if beyond_series == 0 {
         return simd.whole(near);
     }
-    simd.whole(simd.aside(move || {
-        let far =
-            beyond_series & !simd.at_least(Lanes::splat(NEAR), relative_square_extension.abs());
-        let (square, lost) = sum_with_rest(Lanes::splat(1.0), relative_square_extension);
+    simd.whole(simd.aside(ClosedForm {
+        relative_square_extension,
+        beyond_series,
+        near,
+        other,
+    }))
+}
+
+/// The lanes of [`with_far`] beyond the series. Numbers go in pairs with what rounding has taken.
+struct ClosedForm<O> {
+    relative_square_extension: Lanes,
+    beyond_series: u8,
+    near: Lanes,
+    other: O,
+}
+
+impl<O: Fn((Lanes, Lanes)) -> (Lanes, Lanes)> Task for ClosedForm<O> {
+    type Output = Lanes;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Lanes {
+        let x = self.relative_square_extension;
+        let far = self.beyond_series & !simd.at_least(Lanes::splat(NEAR), x.abs());
+        let (square, lost) = sum_with_rest(Lanes::splat(1.0), x);
         let root = square.sqrt();
         let rest = simd.multiply_add(root * -1.0, root, square) + lost;
         // Where ends meet there is no root to correct.
         let root_lost = simd.keep(rest / (root + root), root.above(0.0));
-        let (other, other_lost) = other((square, lost));
+        let (other, other_lost) = (self.other)((square, lost));
         let (divisor, sum_lost) = sum_with_rest(other, root);
         let divisor = divisor + (sum_lost + (other_lost + root_lost));
-        simd.select(relative_square_extension / divisor, far, near)
-    }))
+        simd.select(x / divisor, far, self.near)
+    }
 }
 
 #[inline(always)]

@@ -9,6 +9,9 @@ pub trait ForceState<const D: usize>: Copy {
     /// Whether it always acts along the bond.
     const CENTRAL: bool;
 
+    /// The [`Rotation`](super::Rotation) of the family that the work depends on; nothing for central forces.
+    type Rotation: LaneTuple;
+
     /// Times a number for each bond.
     fn times(self, factor: Lanes) -> Self;
 
@@ -23,7 +26,13 @@ pub trait ForceState<const D: usize>: Copy {
 
     /// The work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family; the same to the bit
     /// from both ends. A central force works on the extension, whatever the rotation.
-    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, linear: bool, rotation: &[Lanes; 3]) -> Lanes;
+    fn work<S: Simd>(
+        self,
+        simd: S,
+        bond: &Bond<D>,
+        linear: bool,
+        rotation: &Self::Rotation,
+    ) -> Lanes;
 
     /// By component.
     fn vector(self, bond: &Bond<D>) -> [Lanes; D];
@@ -35,6 +44,7 @@ pub struct Along(pub Lanes);
 
 impl<const D: usize> ForceState<D> for Along {
     const CENTRAL: bool = true;
+    type Rotation = [Lanes; 0];
 
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
@@ -61,7 +71,7 @@ impl<const D: usize> ForceState<D> for Along {
 
     /// ½ t |Y| (|Y| − |ξ|), with |Y| (|Y| − |ξ|) = |ξ|² P (1 + x).
     #[inline(always)]
-    fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 3]) -> Lanes {
+    fn work<S: Simd>(self, _: S, bond: &Bond<D>, linear: bool, _: &[Lanes; 0]) -> Lanes {
         let share = if linear {
             bond.relative_square_extension
         } else {
@@ -79,6 +89,7 @@ impl<const D: usize> ForceState<D> for Along {
 /// In any direction, N/m⁶.
 impl<const D: usize> ForceState<D> for [Lanes; D] {
     const CENTRAL: bool = false;
+    type Rotation = [Lanes; 4];
 
     #[inline(always)]
     fn times(self, factor: Lanes) -> Self {
@@ -103,11 +114,14 @@ impl<const D: usize> ForceState<D> for [Lanes; D] {
     }
 
     #[inline(always)]
-    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, _: bool, rotation: &[Lanes; 3]) -> Lanes {
-        let turned = rotation::displacement(&bond.reference, rotation);
+    fn work<S: Simd>(self, simd: S, bond: &Bond<D>, _: bool, rotation: &[Lanes; 4]) -> Lanes {
+        let turned = rotation::displacement(simd, &bond.reference, rotation);
         let mut sum = self[0] * (bond.eta[0] - turned[0]);
-        for d in 1..D {
-            sum = simd.multiply_add(self[d], bond.eta[d] - turned[d], sum);
+        if D > 1 {
+            sum = simd.multiply_add(self[1], bond.eta[1] - turned[1], sum);
+        }
+        if D > 2 {
+            sum = simd.multiply_add(self[2], bond.eta[2] - turned[2], sum);
         }
         sum * 0.5
     }

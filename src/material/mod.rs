@@ -21,9 +21,9 @@ mod ordinary_viscoelastic;
 mod plastic_state;
 mod pmb;
 mod registration;
-mod rotation;
+pub mod rotation;
 
-pub use any::{Counts, MOST};
+pub use any::{AnyHistory, AnyPoint, Counts, MOST};
 pub use bond::Bond;
 pub use correspondence::{FamilyShare, ShapeTensor, determinant, family_share};
 pub use declaration::{
@@ -209,7 +209,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         bond: &Bond<D>,
         end: &Self::Point,
         history: &Self::BondHistory,
-        rotation: &[Lanes; 3],
+        rotation: &<Self::Force as ForceState<D>>::Rotation,
     ) -> Lanes {
         let force = self.force(bond, end, history);
         force.work(simd, bond, Self::LINEAR, rotation)
@@ -217,7 +217,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Rotation of a family from the sums of the first pass, for laws whose forces do not act along the bonds.
     fn rotation(&self, _sums: &[f64]) -> Rotation {
-        [0.0; 3]
+        rotation::NONE
     }
 
     /// What a bond adds to the strain energy density of one end, J/m⁶.

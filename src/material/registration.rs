@@ -37,6 +37,14 @@ macro_rules! register {
                     _ => Self::Mixed([here, there]),
                 }
             }
+
+            /// The laws of points i and j.
+            pub fn laws(&self) -> [AnyLaw; 2] {
+                match *self {
+                    $(Self::$law([i, j]) => [i.into(), j.into()],)+
+                    Self::Mixed(laws) => laws,
+                }
+            }
         }
 
         /// Runs code for whichever law an [`AnyLaw`] is; compiled for each.

@@ -1,19 +1,21 @@
 //! Rotation of a family: the orthogonal factor R of its deformation gradient F = R U.
 //!
-//! R is stored as modified Rodrigues parameters σ = n tan(φ/4) of the axis n and the angle φ, |φ| ≤ π, so that |σ| ≤ 1
-//! (Schaub & Junkins 1996):
+//! R is stored as the unit quaternion (q, q₀) = (n sin(φ/2), cos(φ/2)) of the axis n and the angle φ, |φ| ≤ π:
 //!
-//! R − I = (8 [σ×]² + 4 (1 − σ²) [σ×])/(1 + σ²)²
+//! (R − I) ξ = q₀ t + q × t with t = 2 q × ξ
 //!
-//! keeps all digits at small angles. In the plane only σ_z is not 0. R is found with additions, products, quotients and
-//! square roots alone, so that its bits are the same on every machine.
+//! keeps all digits at small angles and takes no division in the loops. In the plane only q_z and q₀ are not 0. R is
+//! found with additions, products, quotients and square roots alone, so that its bits are the same on every machine.
 
 use nalgebra::{Matrix3, SMatrix};
 
-use crate::lanes::{LaneTuple, Lanes};
+use crate::lanes::{Lanes, Simd};
 
-/// σ of a rotation, by component; 0 is none.
-pub type Rotation = [f64; 3];
+/// q by component, then q₀.
+pub type Rotation = [f64; 4];
+
+/// R = I.
+pub const NONE: Rotation = [0.0, 0.0, 0.0, 1.0];
 
 /// Iterations of the polar decomposition at most; strains of a factor of a thousand take about fifteen.
 const MOST_ITERATIONS: usize = 40;
@@ -27,7 +29,7 @@ pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     f.view_mut((0, 0), (D, D)).copy_from(gradient);
     match D {
         2 => in_plane(&f),
-        _ => orthogonal_factor(f).map_or([0.0; 3], |r| parameters(&r)),
+        _ => orthogonal_factor(f).map_or(NONE, |r| quaternion(&r)),
     }
 }
 
@@ -36,24 +38,24 @@ fn in_plane(f: &Matrix3<f64>) -> Rotation {
     let (cosine, sine) = (f[(0, 0)] + f[(1, 1)], f[(1, 0)] - f[(0, 1)]);
     let length = (cosine * cosine + sine * sine).sqrt();
     if length > 0.0 {
-        [0.0, 0.0, quarter_tangent(cosine / length, sine / length)]
+        let [cosine, sine] = of_half_angle(cosine / length, sine / length);
+        [0.0, 0.0, sine, cosine]
     } else {
-        [0.0; 3]
+        NONE
     }
 }
 
-/// tan(φ/4) from cos φ and sin φ, |φ| ≤ π.
-fn quarter_tangent(cosine: f64, sine: f64) -> f64 {
-    // tan(φ/2) = sin φ/(1 + cos φ) = (1 − cos φ)/sin φ, and the same once more for the half angle.
-    let [cosine, sine] = if cosine > -0.5 {
+/// cos(φ/2) and sin(φ/2) from cos φ and sin φ, |φ| ≤ π.
+fn of_half_angle(cosine: f64, sine: f64) -> [f64; 2] {
+    // The larger of both follows from a root, the other one from sin φ = 2 sin(φ/2) cos(φ/2).
+    if cosine > -0.5 {
         let half = (0.5 * (1.0 + cosine)).sqrt();
         [half, 0.5 * sine / half]
     } else {
         let half = (0.5 * (1.0 - cosine)).sqrt();
         let half = if sine < 0.0 { -half } else { half };
         [(0.5 * sine / half).abs(), half]
-    };
-    sine / (1.0 + cosine)
+    }
 }
 
 /// R of F = R U by Newton's iteration X ← ½ (X + X⁻ᵀ) (Higham 1986), if det F > 0.
@@ -78,9 +80,8 @@ fn orthogonal_factor(f: Matrix3<f64>) -> Option<Matrix3<f64>> {
     None
 }
 
-/// σ of a rotation matrix, from the quaternion (q, p) with q ≥ 0: σ = p/(1 + q). The largest of its entries is found
-/// first (Shepperd 1978).
-fn parameters(r: &Matrix3<f64>) -> Rotation {
+/// The quaternion of a rotation matrix, q₀ ≥ 0. The largest of its entries is found first (Shepperd 1978).
+fn quaternion(r: &Matrix3<f64>) -> Rotation {
     let [x, y, z] = [r[(0, 0)], r[(1, 1)], r[(2, 2)]];
     let squares = [
         1.0 + x + y + z,
@@ -98,46 +99,43 @@ fn parameters(r: &Matrix3<f64>) -> Rotation {
     let share = 0.25 / entry;
     let difference = |a: usize, b: usize| (r[(b, a)] - r[(a, b)]) * share;
     let sum = |a: usize, b: usize| (r[(b, a)] + r[(a, b)]) * share;
-    let quaternion = match largest {
+    let [q0, x, y, z] = match largest {
         0 => [entry, difference(1, 2), difference(2, 0), difference(0, 1)],
         1 => [difference(1, 2), entry, sum(0, 1), sum(0, 2)],
         2 => [difference(2, 0), sum(0, 1), entry, sum(1, 2)],
         _ => [difference(0, 1), sum(0, 2), sum(1, 2), entry],
     };
-    let [q, p @ ..] = quaternion;
-    let share = if q < 0.0 { -1.0 } else { 1.0 } / (1.0 + q.abs());
-    p.map(|p| p * share)
+    let sign = if q0 < 0.0 { -1.0 } else { 1.0 };
+    [x, y, z, q0].map(|entry| entry * sign)
 }
 
-/// (R − I) ξ of eight bonds, m.
+/// (R − I) ξ of eight bonds, m. Written out by component: the compiler keeps what a loop indexes in memory.
 #[inline(always)]
-pub fn displacement<const D: usize>(xi: &[Lanes; D], sigma: &[Lanes; 3]) -> [Lanes; D] {
-    let one = Lanes::splat(1.0);
+pub fn displacement<S: Simd, const D: usize>(
+    simd: S,
+    xi: &[Lanes; D],
+    [x, y, z, q0]: &[Lanes; 4],
+) -> [Lanes; D] {
     if D < 3 {
-        let z = sigma[2];
-        let square = z * z;
-        let scale = Lanes::splat(4.0) / ((one + square) * (one + square));
-        let (sine, cosine) = (z * (one - square) * scale, square * 2.0 * scale);
-        let across = |d: usize| {
-            if d == 0 {
-                Lanes::splat(0.0) - xi[1 % D]
-            } else {
-                xi[0]
-            }
-        };
-        return LaneTuple::each(|d| sine * across(d) - cosine * xi[d]);
+        let twice = *z * 2.0;
+        let mut turned = [Lanes::splat(0.0); D];
+        if D > 1 {
+            let (tx, ty) = (twice * xi[1] * -1.0, twice * xi[0]);
+            turned[0] = simd.whole(simd.multiply_add(*q0, tx, *z * ty * -1.0));
+            turned[1] = simd.whole(simd.multiply_add(*q0, ty, *z * tx));
+        }
+        return turned;
     }
-    let cross = |b: [Lanes; 3]| -> [Lanes; 3] {
-        LaneTuple::each(|k| {
-            let (m, n) = ((k + 1) % 3, (k + 2) % 3);
-            sigma[m] * b[n] - sigma[n] * b[m]
-        })
-    };
-    let square = sigma[0] * sigma[0] + sigma[1] * sigma[1] + sigma[2] * sigma[2];
-    let scale = Lanes::splat(4.0) / ((one + square) * (one + square));
-    let once = cross(LaneTuple::each(|k| xi[k % D]));
-    let twice = cross(once);
-    LaneTuple::each(|d| ((one - square) * once[d] + twice[d] * 2.0) * scale)
+    let cross = |a: [Lanes; 2], b: [Lanes; 2]| simd.multiply_add(a[0], b[1], a[1] * b[0] * -1.0);
+    let t = [
+        cross([*y, *z], [xi[1], xi[2]]) * 2.0,
+        cross([*z, *x], [xi[2], xi[0]]) * 2.0,
+        cross([*x, *y], [xi[0], xi[1]]) * 2.0,
+    ];
+    let mut turned = [simd.whole(simd.multiply_add(*q0, t[0], cross([*y, *z], [t[1], t[2]]))); D];
+    turned[1] = simd.whole(simd.multiply_add(*q0, t[1], cross([*z, *x], [t[2], t[0]])));
+    turned[2] = simd.whole(simd.multiply_add(*q0, t[2], cross([*x, *y], [t[0], t[1]])));
+    turned
 }
 
 #[cfg(test)]
@@ -145,10 +143,15 @@ mod tests {
     use nalgebra::{Matrix2, Rotation3, Vector3};
 
     use super::*;
+    use crate::lanes::simd::Portable;
 
     /// R ξ.
     fn turned<const D: usize>(rotation: &Rotation, xi: [f64; D]) -> [f64; D] {
-        let change = displacement(&xi.map(Lanes::splat), &rotation.map(Lanes::splat));
+        let change = displacement(
+            Portable::<true>,
+            &xi.map(Lanes::splat),
+            &rotation.map(Lanes::splat),
+        );
         std::array::from_fn(|d| xi[d] + change[d].0[0])
     }
 
@@ -178,10 +181,10 @@ mod tests {
                 6.0,
             ] {
                 let wanted = Rotation3::new(axis.normalize() * angle).into_inner();
-                let sigma = of_gradient(&(wanted * stretch));
-                assert!(sigma.iter().map(|s| s * s).sum::<f64>() < 1.0 + 1e-12);
+                let quaternion = of_gradient(&(wanted * stretch));
+                assert!((quaternion.iter().map(|q| q * q).sum::<f64>() - 1.0).abs() < 1e-14);
                 let xi = [0.3, -1.2, 0.7];
-                let found = Vector3::from(turned(&sigma, xi));
+                let found = Vector3::from(turned(&quaternion, xi));
                 let error = (found - wanted * Vector3::from(xi)).norm();
                 assert!(error < 1e-14, "{axis} {angle}: {error}");
             }
@@ -195,8 +198,8 @@ mod tests {
             let angle = std::f64::consts::PI / 36.0 * f64::from(k);
             let (sine, cosine) = angle.sin_cos();
             let rotation = Matrix2::new(cosine, -sine, sine, cosine);
-            let sigma = of_gradient(&(rotation * stretch));
-            let [x, y] = turned(&sigma, [0.6, -0.9]);
+            let quaternion = of_gradient(&(rotation * stretch));
+            let [x, y] = turned(&quaternion, [0.6, -0.9]);
             let wanted = rotation * nalgebra::Vector2::new(0.6, -0.9);
             let error = (x - wanted[0]).abs().max((y - wanted[1]).abs());
             assert!(error < 1e-14, "{angle}: {error}");
@@ -208,6 +211,7 @@ mod tests {
         let angle = 1e-8;
         let gradient = Matrix2::new(1.0, -angle, angle, 1.0);
         let change = displacement(
+            Portable::<true>,
             &[Lanes::splat(2.0), Lanes::splat(0.0)],
             &of_gradient(&gradient).map(Lanes::splat),
         );
@@ -217,11 +221,8 @@ mod tests {
     #[test]
     fn a_family_that_is_turned_inside_out_has_none() {
         let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
-        assert_eq!(of_gradient(&mirror), [0.0; 3]);
-        assert_eq!(
-            of_gradient(&Matrix3::<f64>::from_element(f64::NAN)),
-            [0.0; 3]
-        );
-        assert_eq!(of_gradient(&Matrix2::<f64>::zeros()), [0.0; 3]);
+        assert_eq!(of_gradient(&mirror), NONE);
+        assert_eq!(of_gradient(&Matrix3::<f64>::from_element(f64::NAN)), NONE);
+        assert_eq!(of_gradient(&Matrix2::<f64>::zeros()), NONE);
     }
 }

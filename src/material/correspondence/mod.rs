@@ -300,7 +300,7 @@ impl<const D: usize> Law<D> for Correspondence {
         bond: &Bond<D>,
         (_, end): &Point<D>,
         _: &[Lanes; 0],
-        rotation: &[Lanes; 3],
+        rotation: &[Lanes; 4],
     ) -> Lanes {
         times_bond(simd, end, bond).work(simd, bond, false, rotation)
     }

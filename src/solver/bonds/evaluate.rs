@@ -10,7 +10,7 @@ use crate::damage::Criterion;
 use crate::families::{BlockBonds, Which};
 use crate::lanes::{Column, LaneTuple, Lanes};
 use crate::material::bond::stretch_of;
-use crate::material::{Law, MOST, with_pair};
+use crate::material::{Law, MOST, with_law, with_pair};
 use crate::solver::model::Model;
 
 use super::broken::Broken;
@@ -29,7 +29,7 @@ const CHUNK: usize = 4096;
 const PIECE: usize = 4096;
 
 /// Columns of [`Forces::changing_columns`] at most.
-const MOST_CHANGING: usize = MOST.point + 3;
+const MOST_CHANGING: usize = MOST.point + 4;
 
 /// What a pass reads anew from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -266,8 +266,7 @@ impl<const D: usize> Forces<D> {
                 let mut sums = std::mem::take(&mut self.numbers.sums);
                 self.for_each_interaction(|interaction, source| {
                     let (bonds, points) = (&mut interaction.bonds, points.clone());
-                    with_pair!(interaction.laws, laws => {
-                        let law = laws[0];
+                    with_law!(interaction.laws.laws()[0], law => {
                         sum_pass(number, bonds, points, law, bond_update, &mut sums, source);
                     });
                 });

@@ -85,8 +85,9 @@ impl<L> Force<L> {
         let weights = match group.weights {
             weights if self.influence => weights,
             Weights::One | Weights::Same(_) => Weights::One,
-            Weights::Each(ends) => {
-                Weights::Each(ends.map(|end| simd.keep(Lanes::splat(1.0), end.above(0.0))))
+            Weights::Each(_) => {
+                let ([i, j], one) = (group.weights.acting(), Lanes::splat(1.0));
+                Weights::Each([simd.keep(one, i), simd.keep(one, j)])
             }
         };
         if L::Force::CENTRAL {
@@ -95,15 +96,12 @@ impl<L> Force<L> {
             } else {
                 self.weighted(simd, group, weights)
             };
-            let rotation = &group.limits[0].rotations;
-            return total.work(simd, &group.bond, L::LINEAR, rotation);
+            return total.work(simd, &group.bond, L::LINEAR, group.rotation_i);
         }
-        let points = group.points();
-        let [i, j] = [0, 1].map(|end| {
-            let (law, history) = (&self.laws[end], &group.history[end]);
-            let rotation = &group.limits[end].rotations;
-            law.end_work(simd, &group.bond, points[end], history, rotation)
-        });
+        let ([law_i, law_j], [point_i, point_j]) = (&self.laws, group.points());
+        let ([history_i, history_j], bond) = (&group.history, &group.bond);
+        let i = law_i.end_work(simd, bond, point_i, history_i, group.rotation_i);
+        let j = law_j.end_work(simd, bond, point_j, history_j, &group.rotation_j);
         weights.sum(i, j)
     }
 
@@ -131,8 +129,8 @@ impl<L> Force<L> {
         Ends {
             laws: &self.laws,
             points: group.points(),
-            limits: &group.limits,
-            acting: group.acting(),
+            limits: [group.limits_i, &group.limits_j],
+            weights: group.weights,
         }
     }
 }
@@ -142,6 +140,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Broken = ([Lanes; 3], [Lanes; D]);
     type Point = L::Point;
     type BondHistory = L::BondHistory;
+    type Rotation = <L::Force as ForceState<D>>::Rotation;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const ISA_SET: IsaSet = L::ISA_SET;
     const NEAR: bool = L::ISA_SET.is_each()
@@ -211,7 +210,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         let late = self.criterion.overshoot::<S, L, D>(simd, &bond, ends, work);
         let overshoot = if self.criterion.reads_work() {
             // The work of a bond belongs to its acting ends in equal parts.
-            let [own, far] = ends.acting;
+            let [own, far] = ends.weights.acting();
             let half = simd.keep(Lanes::splat(0.5), own & far);
             let part = simd.select(half, own & far, simd.keep(Lanes::splat(1.0), own));
             work * part * share * late

@@ -11,7 +11,7 @@ use crate::lanes::{Column, LaneTuple, Lanes, Simd};
 use crate::material::bond::{Reference, Weights, deform};
 
 use super::kernel::{Group, Kernel};
-use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits};
+use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits, ReadRotations};
 use super::list_points::load_history;
 
 /// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
@@ -36,6 +36,11 @@ impl<const D: usize> GridValues<D> {
             limits: LimitColumns::new::<D>(limits, D + numbers, count),
             grid,
         }
+    }
+
+    /// Whether this is the grid of the values.
+    pub fn is_of(&self, grid: &Arc<Grid>) -> bool {
+        Arc::ptr_eq(&self.grid, grid)
     }
 
     /// Takes the displacements of the ghosts.
@@ -67,7 +72,7 @@ impl<const D: usize> GridValues<D> {
     }
 
     /// Takes the rotations of some of the local points.
-    pub fn update_rotations(&mut self, which: Which, rotations: &[Column; 3]) {
+    pub fn update_rotations(&mut self, which: Which, rotations: &[Column; 4]) {
         for (places, values) in self.limits.rotations.iter_mut().zip(rotations) {
             if !values.is_empty() {
                 self.grid.update(which, values, places);
@@ -127,7 +132,9 @@ pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
+    rotations: ReadRotations<'a, K::Rotation>,
     limit: f64,
+    is_linear: bool,
     /// Of the own and the far ends, m³.
     volumes: [Lanes; 2],
 }
@@ -142,10 +149,11 @@ impl<K: Kernel<D>, const D: usize> Copy for GridPoints<'_, K, D> {}
 
 /// What is read of the own ends of bonds.
 #[derive(Clone, Copy)]
-pub struct OwnEnd<P, const D: usize> {
+pub struct OwnEnd<P, R, const D: usize> {
     displacement: [Lanes; D],
     numbers: P,
     limits: Limits,
+    rotation: R,
 }
 
 impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
@@ -158,14 +166,23 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         let covers = |column: &[f64]| column.len() >= values.grid.places();
         assert!(
             values.displacement.iter().all(|column| covers(column))
-                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k))),
+                && (0..K::Point::COUNT).all(|k| {
+                    let column = K::Point::column(&numbers, k);
+                    covers(column) || K::Point::PADDED && column.is_empty()
+                }),
             "an array is too short for the grid"
         );
         Self {
             displacement: values.displacement.each_ref().map(|column| &column[..]),
             numbers,
             limits: ReadLimits::new(kernel.criterion(), &values.limits, values.grid.places()),
+            rotations: ReadRotations::new::<D>(
+                kernel.criterion(),
+                &values.limits,
+                values.grid.places(),
+            ),
             limit: kernel.criterion().limit(),
+            is_linear: kernel.is_linear(),
             volumes: volumes.map(Lanes::splat),
         }
     }
@@ -174,8 +191,14 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// The place must be one of the grid, with seven more after it.
     #[inline(always)]
     unsafe fn numbers(&self, place: usize) -> K::Point {
-        // SAFETY: `new` has checked the length.
-        K::Point::each(|k| unsafe { eight(K::Point::column(&self.numbers, k), place) })
+        K::Point::each(|k| {
+            let column = K::Point::column(&self.numbers, k);
+            if K::Point::PADDED && column.is_empty() {
+                return Lanes::splat(0.0);
+            }
+            // SAFETY: `new` has checked the length.
+            unsafe { eight(column, place) }
+        })
     }
 
     /// # Safety
@@ -201,18 +224,30 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         (self.limits).eight(|column| unsafe { eight(column, place) })
     }
 
+    /// # Safety
+    /// As for [`Self::numbers`].
+    #[inline(always)]
+    unsafe fn rotations<const ONLY_NEAR: bool>(&self, place: usize) -> K::Rotation {
+        if ONLY_NEAR {
+            return K::Rotation::splat(0.0);
+        }
+        // SAFETY: `ReadRotations::new` has checked the lengths.
+        (self.rotations).eight::<D>(|column| unsafe { eight(column, place) })
+    }
+
     /// The own ends of the bonds of eight points from a place on.
     ///
     /// # Safety
     /// The place must be that of a vector of the grid.
     #[inline(always)]
-    pub unsafe fn here(&self, place: usize) -> OwnEnd<K::Point, D> {
+    pub unsafe fn here(&self, place: usize) -> OwnEnd<K::Point, K::Rotation, D> {
         // SAFETY: `new` has checked the lengths.
         unsafe {
             OwnEnd {
                 displacement: LaneTuple::each(|d| eight(self.displacement[d], place)),
                 numbers: self.numbers(place),
                 limits: self.limits::<false>(place),
+                rotation: self.rotations::<false>(place),
             }
         }
     }
@@ -226,13 +261,13 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     pub unsafe fn load<'h, S: Simd, const ONLY_NEAR: bool>(
         &self,
         simd: S,
-        here: &'h OwnEnd<K::Point, D>,
+        here: &'h OwnEnd<K::Point, K::Rotation, D>,
         vector: &mut VectorBonds<'_>,
         o: usize,
     ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
         // SAFETY: the offset is one of the vector's, so `far` is a place of the grid with seven more after it.
-        let (displacement, numbers, limits) = unsafe {
+        let (displacement, numbers, limits, rotation) = unsafe {
             let far = vector.far(offset);
             let component = |d| eight(self.displacement[d], far);
             let displacement: [Lanes; D] = LaneTuple::each(component);
@@ -240,6 +275,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
                 displacement,
                 self.far_numbers(far),
                 self.limits::<ONLY_NEAR>(far),
+                self.rotations::<ONLY_NEAR>(far),
             )
         };
         let eta = LaneTuple::each(|d: usize| displacement[d] - here.displacement[d]);
@@ -251,7 +287,14 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         };
         let intact = vector.groups.intact[o];
         Group {
-            bond: deform::<_, ONLY_NEAR, D>(simd, &reference, eta, intact, self.limit, K::WANTED),
+            bond: deform::<_, ONLY_NEAR, D>(
+                simd,
+                &reference,
+                eta,
+                intact,
+                self.limit,
+                K::wanted(self.is_linear),
+            ),
             own_volume: self.volumes[0],
             volume: self.volumes[1],
             weights: match vector.weighted {
@@ -261,7 +304,10 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             },
             own: &here.numbers,
             far: numbers,
-            limits: [here.limits, limits],
+            limits_i: &here.limits,
+            limits_j: limits,
+            rotation_i: &here.rotation,
+            rotation_j: rotation,
             history: load_history::<K::BondHistory>(&mut vector.groups, o),
             intact,
             whole: 0,

@@ -22,8 +22,14 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub own: &'a K::Point,
     /// The numbers of the far ends.
     pub far: K::Point,
-    /// What the criterion reads of the own and the far ends.
-    pub limits: [Limits; 2],
+    /// What the criterion reads of points i.
+    pub limits_i: &'a Limits,
+    /// What the criterion reads of points j.
+    pub limits_j: Limits,
+    /// Rotations of the families of points i.
+    pub rotation_i: &'a K::Rotation,
+    /// Rotations of the families of points j.
+    pub rotation_j: K::Rotation,
     /// What the bonds keep for their own and their far ends.
     pub history: [K::BondHistory; 2],
     /// A bit for each bond that is intact.
@@ -47,15 +53,6 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         match self.weights {
             Weights::One => self.intact,
             weights => self.intact & weights.own().above(0.0),
-        }
-    }
-
-    /// A bit for each bond, intact or not, that is within the horizon of point i, and of point j.
-    #[inline(always)]
-    pub fn acting(&self) -> [u8; 2] {
-        match self.weights {
-            Weights::One | Weights::Same(_) => [u8::MAX; 2],
-            Weights::Each(ends) => ends.map(|end| end.above(0.0)),
         }
     }
 
@@ -94,6 +91,9 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// The numbers of the bonds that it reads.
     type BondHistory: LaneTuple;
 
+    /// The rotations of the ends, if its criterion can read them.
+    type Rotation: LaneTuple;
+
     /// Whether there are bonds for it in `D` dimensions; else no loops are compiled.
     const EXISTS: bool = true;
 
@@ -110,7 +110,7 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Whether it wants to know of broken bonds.
     const WHOLE: bool = false;
 
-    /// Whether its sums follow from where points lie undeformed and which bonds are intact, and it neither breaks nor
+    /// Whether its sums may follow from where points lie undeformed and which bonds are intact, and it neither breaks nor
     /// changes any: in a lattice they are then found once for all points that are alike in that.
     const UNDEFORMED: bool = false;
 
@@ -119,6 +119,31 @@ pub trait Kernel<const D: usize>: Copy + Sync {
 
     /// What it wants to know of deformed bonds.
     const WANTED: Wanted;
+
+    /// Whether the law of its bonds is known at run time only, and with it whether bonds are linear.
+    const ANY_LAW: bool = false;
+
+    /// Whether bonds are those of a linear law, see [`Bond`].
+    #[inline(always)]
+    fn is_linear(&self) -> bool {
+        Self::WANTED.linear
+    }
+
+    /// [`Self::WANTED`] for bonds that are linear or not.
+    #[inline(always)]
+    fn wanted(is_linear: bool) -> Wanted {
+        let mut wanted = Self::WANTED;
+        if Self::ANY_LAW {
+            wanted.linear = is_linear;
+        }
+        wanted
+    }
+
+    /// Whether sums are [those of the undeformed](Self::UNDEFORMED); asked only where that is possible.
+    #[inline(always)]
+    fn is_undeformed(&self) -> bool {
+        Self::UNDEFORMED
+    }
 
     /// When it breaks bonds: what it needs of them for that is found.
     #[inline(always)]

@@ -1,7 +1,8 @@
 //! What criteria alone read of the points, by column.
 
 use crate::damage::{Criterion, DamageLaw, Limits};
-use crate::lanes::{Column, Lanes};
+use crate::lanes::{Column, LaneTuple, Lanes};
+use crate::material::rotation::NONE;
 
 use super::interaction::BlockLaws;
 
@@ -38,19 +39,18 @@ pub struct LimitColumns {
     pub thresholds: Column,
     /// As above.
     pub truncation_factors: Column,
-    /// By component; in the plane only the last one is kept.
-    pub rotations: [Column; 3],
+    /// By component; in the plane q_z and q₀ alone are stored.
+    pub rotations: [Column; 4],
 }
 
 impl LimitColumns {
     /// The columns that are read, for so many points in `D` dimensions; `number` others are read with them.
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
-        let first_rotation = if D < 3 { 2 } else { 0 };
         Self {
             rotations: std::array::from_fn(|k| {
-                let is_read = read.rotations && k >= first_rotation;
-                of(number + 2 + k, is_read, 0.0)
+                let is_read = read.rotations && k >= first_component::<D>();
+                of(number + 2 + k, is_read, NONE[k])
             }),
             thresholds: of(number, read.thresholds, 0.0),
             truncation_factors: of(number + 1, read.truncation_factors, 1.0),
@@ -63,21 +63,20 @@ impl LimitColumns {
         columns.filter(|column| !column.is_empty())
     }
 
-    /// BondHistory, bytes.
+    /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        let [x, y, z] = &self.rotations;
-        let columns = [&self.thresholds, &self.truncation_factors, x, y, z];
+        let [x, y, z, q0] = &self.rotations;
+        let columns = [&self.thresholds, &self.truncation_factors, x, y, z, q0];
         size_of::<f64>() * columns.map(|column| column.len()).iter().sum::<usize>()
     }
 }
 
-/// The columns as a kernel with a criterion reads them.
+/// Thresholds and truncation factors as a kernel with a criterion reads them.
 #[derive(Clone, Copy)]
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    rotations: [Option<&'a [f64]>; 3],
-    /// Whether any is read: what loops ask first.
+    /// Whether any is read: one branch in the loops of criteria that read none.
     any: bool,
 }
 
@@ -96,21 +95,14 @@ impl<'a> ReadLimits<'a> {
         };
         let thresholds = read(criterion.reads_thresholds(), &columns.thresholds);
         let truncation_factors = read(criterion.reads_overloads(), &columns.truncation_factors);
-        let rotations = columns
-            .rotations
-            .each_ref()
-            .map(|column| read(criterion.reads_rotations() && !column.is_empty(), column));
         Self {
             thresholds,
             truncation_factors,
-            rotations,
-            any: thresholds.is_some()
-                || truncation_factors.is_some()
-                || rotations.iter().any(Option::is_some),
+            any: thresholds.is_some() || truncation_factors.is_some(),
         }
     }
 
-    /// Eight points, by how they are taken from a column; `take` only gets columns that reach as far as was asked for.
+    /// Limits of eight points; `take` only gets columns of the length that was checked.
     #[inline(always)]
     pub fn eight(&self, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();
@@ -121,12 +113,59 @@ impl<'a> ReadLimits<'a> {
             if let Some(column) = self.truncation_factors {
                 limits.truncation_factors = take(column);
             }
-            for (rotation, column) in limits.rotations.iter_mut().zip(self.rotations) {
-                if let Some(column) = column {
-                    *rotation = take(column);
-                }
-            }
         }
         limits
     }
+}
+
+/// Rotations as a kernel with a criterion reads them; `R` has four components, or none for laws whose forces act along
+/// the bonds.
+#[derive(Clone, Copy)]
+pub struct ReadRotations<'a, R: LaneTuple> {
+    columns: R::Columns<'a>,
+    is_read: bool,
+}
+
+impl<'a, R: LaneTuple> ReadRotations<'a, R> {
+    /// For a criterion, in `D` dimensions.
+    ///
+    /// # Panics
+    /// When a column that it reads has fewer entries than `reach`.
+    pub fn new<const D: usize>(
+        criterion: Criterion,
+        columns: &'a LimitColumns,
+        reach: usize,
+    ) -> Self {
+        let is_read = R::COUNT > 0 && criterion.reads_rotations();
+        let columns = R::columns(&columns.rotations);
+        let components = first_component::<D>()..R::COUNT;
+        assert!(
+            !is_read
+                || components
+                    .into_iter()
+                    .all(|k| R::column(&columns, k).len() >= reach),
+            "a column of rotations is too short"
+        );
+        Self { columns, is_read }
+    }
+
+    /// Rotations of eight points; `take` only gets columns of the length that was checked.
+    #[inline(always)]
+    pub fn eight<const D: usize>(&self, take: impl Fn(&[f64]) -> Lanes) -> R {
+        if !self.is_read {
+            return R::splat(0.0);
+        }
+        R::each(|k| {
+            if k < first_component::<D>() {
+                Lanes::splat(0.0)
+            } else {
+                take(R::column(&self.columns, k))
+            }
+        })
+    }
+}
+
+/// The first component of rotations that is stored: in the plane q_x and q_y are 0.
+const fn first_component<const D: usize>() -> usize {
+    if D < 3 { 2 } else { 0 }
 }

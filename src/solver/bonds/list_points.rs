@@ -9,7 +9,7 @@ use crate::material::bond::{Reference, Weights, deform};
 use crate::solver::model::Model;
 
 use super::kernel::{Group, Kernel};
-use super::limit_columns::{LimitColumns, ReadLimits};
+use super::limit_columns::{LimitColumns, ReadLimits, ReadRotations};
 
 /// Reference position (m), displacement (m) and volume (m³) of a point, three components each.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,9 @@ pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     nodes: &'a [Node],
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
+    rotations: ReadRotations<'a, K::Rotation>,
     limit: f64,
+    is_linear: bool,
 }
 
 impl<K: Kernel<D>, const D: usize> Clone for ListPoints<'_, K, D> {
@@ -58,12 +60,13 @@ impl<K: Kernel<D>, const D: usize> Copy for ListPoints<'_, K, D> {}
 
 /// What is read of the own end of bonds.
 #[derive(Clone, Copy)]
-pub struct OwnEnd<P, const D: usize> {
+pub struct OwnEnd<P, R, const D: usize> {
     reference: [Lanes; D],
     displacement: [Lanes; D],
     volume: Lanes,
     numbers: P,
     limits: Limits,
+    rotation: R,
 }
 
 impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
@@ -79,7 +82,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         limits: &'a LimitColumns,
     ) -> Self {
         let numbers = K::Point::columns(numbers);
-        let covers = |column: &[f64]| column.len() >= reach;
+        let covers =
+            |column: &[f64]| column.len() >= reach || K::Point::PADDED && column.is_empty();
         assert!(
             nodes.len() >= reach
                 && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k))),
@@ -89,7 +93,9 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             nodes,
             numbers,
             limits: ReadLimits::new(kernel.criterion(), limits, reach),
+            rotations: ReadRotations::new::<D>(kernel.criterion(), limits, reach),
             limit: kernel.criterion().limit(),
+            is_linear: kernel.is_linear(),
         }
     }
 
@@ -97,8 +103,14 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// The indices must be below the reach.
     #[inline(always)]
     unsafe fn numbers(&self, indices: &[u32; 8]) -> K::Point {
-        // SAFETY: `new` has checked the length.
-        K::Point::each(|k| unsafe { gather(K::Point::column(&self.numbers, k), indices) })
+        K::Point::each(|k| {
+            let column = K::Point::column(&self.numbers, k);
+            if K::Point::PADDED && column.is_empty() {
+                return Lanes::splat(0.0);
+            }
+            // SAFETY: `new` has checked the length.
+            unsafe { gather(column, indices) }
+        })
     }
 
     /// # Safety
@@ -121,20 +133,29 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         (self.limits).eight(|column| unsafe { gather(column, indices) })
     }
 
+    /// # Safety
+    /// The indices must be below the reach.
+    #[inline(always)]
+    unsafe fn rotations(&self, indices: &[u32; 8]) -> K::Rotation {
+        // SAFETY: `ReadRotations::new` has checked the lengths.
+        (self.rotations).eight::<D>(|column| unsafe { gather(column, indices) })
+    }
+
     /// The own end of a point's bonds.
     ///
     /// # Safety
     /// The point must be below the reach.
     #[inline(always)]
-    pub unsafe fn here(&self, point: usize) -> OwnEnd<K::Point, D> {
+    pub unsafe fn here(&self, point: usize) -> OwnEnd<K::Point, K::Rotation, D> {
         debug_assert!(point < self.nodes.len());
         let own = [point as u32; 8];
         // SAFETY: `new` has checked the lengths.
-        let (node, numbers, limits) = unsafe {
+        let (node, numbers, limits, rotation) = unsafe {
             (
                 &self.nodes.get_unchecked(point).0,
                 self.numbers(&own),
                 self.limits(&own),
+                self.rotations(&own),
             )
         };
         OwnEnd {
@@ -143,6 +164,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             volume: Lanes::splat(node[VOLUME]),
             numbers,
             limits,
+            rotation,
         }
     }
 
@@ -154,7 +176,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     pub unsafe fn load<'h, S: Simd>(
         &self,
         simd: S,
-        here: &'h OwnEnd<K::Point, D>,
+        here: &'h OwnEnd<K::Point, K::Rotation, D>,
         row: &mut Row<'_>,
         group: usize,
     ) -> Group<'h, K, D> {
@@ -182,10 +204,19 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             inverse_square,
         };
         // SAFETY: as above.
-        let (numbers, limits) = unsafe { (self.far_numbers(&indices), self.limits(&indices)) };
+        let numbers = unsafe { self.far_numbers(&indices) };
+        // SAFETY: as above.
+        let (limits, rotation) = unsafe { (self.limits(&indices), self.rotations(&indices)) };
         let intact = row.groups.intact[group];
         Group {
-            bond: deform::<_, false, D>(simd, &reference, eta, intact, self.limit, K::WANTED),
+            bond: deform::<_, false, D>(
+                simd,
+                &reference,
+                eta,
+                intact,
+                self.limit,
+                K::wanted(self.is_linear),
+            ),
             own_volume: here.volume,
             volume: columns[VOLUME],
             weights: match row.weights {
@@ -195,7 +226,10 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             },
             own: &here.numbers,
             far: numbers,
-            limits: [here.limits, limits],
+            limits_i: &here.limits,
+            limits_j: limits,
+            rotation_i: &here.rotation,
+            rotation_j: rotation,
             history: load_history::<K::BondHistory>(&mut row.groups, group),
             whole: if K::WHOLE { row.whole(group) } else { 0 },
             intact,
@@ -204,24 +238,39 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 }
 
-/// What bonds of a group keep for their own and their far ends.
+/// The history that bonds of a group keep for point i and for point j. A kernel that reads that of point i alone may have
+/// fewer numbers than are kept.
 #[inline(always)]
-pub fn load_history<M: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [M; 2] {
-    if M::COUNT == 0 {
-        return [M::splat(0.0); 2];
+pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 2] {
+    if H::COUNT == 0 {
+        return [H::splat(0.0); 2];
     }
     let all = groups.numbers(group);
-    [M::each(|k| all[k]), M::each(|k| all[M::COUNT + k])]
+    if H::PADDED {
+        let of_each = all.len() / 2;
+        let load = |first: usize| {
+            H::each(|k| {
+                if k < of_each {
+                    all[first + k]
+                } else {
+                    Lanes::splat(0.0)
+                }
+            })
+        };
+        return [load(0), load(of_each)];
+    }
+    [H::each(|k| all[k]), H::each(|k| all[H::COUNT + k])]
 }
 
-/// Puts back what bonds keep, where they are intact.
+/// Stores the history of the intact bonds of a group.
 #[inline(always)]
-pub fn store_history<M: LaneTuple>(all: &mut [Lanes], history: &[M; 2], intact: u8) {
-    for (k, kept) in all.iter_mut().enumerate() {
-        let value = history[k / M::COUNT].get(k % M::COUNT);
+pub fn store_history<H: LaneTuple>(all: &mut [Lanes], history: &[H; 2], intact: u8) {
+    let of_each = if H::PADDED { all.len() / 2 } else { H::COUNT };
+    for (k, stored) in all.iter_mut().enumerate() {
+        let value = history[k / of_each].get(k % of_each);
         for lane in 0..WIDTH {
             if intact >> lane & 1 == 1 {
-                kept.0[lane] = value.0[lane];
+                stored.0[lane] = value.0[lane];
             }
         }
     }

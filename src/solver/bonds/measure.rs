@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 
 use crate::families::BlockBonds;
 use crate::lanes::{LaneTuple, Lanes};
-use crate::material::{Law, PlasticState, ShapeTensor, with_law, with_pair};
+use crate::material::{Law, PlasticState, ShapeTensor};
 use crate::solver::model::Model;
 
 use super::Forces;
@@ -52,12 +52,12 @@ impl<const D: usize> Forces<D> {
     pub(super) fn stored_at(&mut self, model: &Model<D>, points: Range<usize>) -> Stored {
         let mut columns: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; points.len()]);
         self.for_each_interaction(|interaction, source| {
-            with_pair!(interaction.laws, laws => {
-                let kernel = measures::Stored { law: laws[0] };
-                let results = <[Lanes; 4]>::columns_mut(&mut columns);
-                let (bonds, base) = (&mut interaction.bonds, points.start);
-                sweep_from(bonds, points.clone(), base, results, &kernel, source);
-            });
+            let [law, _] = interaction.laws.laws();
+            let keeps_history = law.counts::<D>().bond_history > 0;
+            let kernel = measures::Stored { law, keeps_history };
+            let results = <[Lanes; 4]>::columns_mut(&mut columns);
+            let (bonds, base) = (&mut interaction.bonds, points.start);
+            sweep_from(bonds, points.clone(), base, results, &kernel, source);
         });
         let [mut energy, volume, neighbours, dissipated] = columns;
         if self.numbers.passes > 0 {
@@ -100,10 +100,9 @@ impl<const D: usize> Forces<D> {
     /// D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.
     pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
-            with_pair!(interaction.laws, laws => {
-                let kernel = measures::Stiffness { laws };
-                sweep_all(&mut interaction.bonds, sums, &kernel, source);
-            });
+            let laws = interaction.laws.laws();
+            let kernel = measures::Stiffness { laws };
+            sweep_all(&mut interaction.bonds, sums, &kernel, source);
         });
         columns.try_into().expect("six columns")
     }
@@ -112,10 +111,9 @@ impl<const D: usize> Forces<D> {
     /// last [evaluation](Self::evaluate).
     pub fn stress(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
-            with_pair!(interaction.laws, laws => {
-                let kernel = measures::Stress { law: laws[0] };
-                sweep_all(&mut interaction.bonds, sums, &kernel, source);
-            });
+            let [law, _] = interaction.laws.laws();
+            let kernel = measures::Stress { law };
+            sweep_all(&mut interaction.bonds, sums, &kernel, source);
         });
         columns.try_into().expect("six columns")
     }
@@ -127,21 +125,19 @@ impl<const D: usize> Forces<D> {
         model: &Model<D>,
         plastic: impl Fn(usize) -> PlasticState,
     ) -> Vec<Option<f64>> {
-        fn is_of_bonds<L: Law<D>, const D: usize>(_: &L) -> bool {
-            L::HAS_BOND_STRESS_ACROSS
-        }
         let gradients = self.deformation_gradient(model);
         let columns = self.measure(model.owned(), 1, |interaction, sums, source| {
-            with_pair!(interaction.laws, laws => {
-                stress_across_of_bonds(laws[0], &mut interaction.bonds, sums, source);
-            });
+            let [law, _] = interaction.laws.laws();
+            if law.has_bond_stress_across::<D>() {
+                let kernel = measures::StressAcross { law };
+                sweep_all(&mut interaction.bonds, sums, &kernel, source);
+            }
         });
         let across = |point: usize| {
             let law = &self.blocks[usize::from(model.block[point])].law;
             let gradient = gradients[point] - SMatrix::identity();
             let of_point = Law::<D>::stress_across(law, &gradient, &plastic(point))?;
-            let is_of_bonds = with_law!(law, law => is_of_bonds::<_, D>(law));
-            Some(if is_of_bonds {
+            Some(if law.has_bond_stress_across::<D>() {
                 columns[0][point]
             } else {
                 of_point
@@ -212,15 +208,10 @@ impl<const D: usize> Forces<D> {
     /// [evaluation](Self::evaluate).
     pub fn dilatation(&mut self, model: &Model<D>) -> [Vec<f64>; 2] {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
-            fn is_linear<L: Law<D>, const D: usize>(_: &[L; 2]) -> bool {
-                L::LINEAR
-            }
-            let bonds = &mut interaction.bonds;
-            if with_pair!(&interaction.laws, laws => is_linear::<_, D>(laws)) {
-                sweep_all(bonds, sums, &measures::Dilatation::<true>, source);
-            } else {
-                sweep_all(bonds, sums, &measures::Dilatation::<false>, source);
-            }
+            let [law, _] = interaction.laws.laws();
+            let is_linear = law.is_linear::<D>();
+            let kernel = measures::Dilatation { is_linear };
+            sweep_all(&mut interaction.bonds, sums, &kernel, source);
         });
         let [mut weighted_volume, mut growth] = columns.try_into().expect("two columns");
         for (point, volume) in weighted_volume.iter_mut().enumerate() {
@@ -237,18 +228,6 @@ impl<const D: usize> Forces<D> {
             };
         }
         [weighted_volume, growth]
-    }
-}
-
-/// Sum [`Law::bond_stress_across`] over all bonds between two blocks, if the law has it.
-fn stress_across_of_bonds<L: Law<D>, const D: usize>(
-    law: L,
-    bonds: &mut BlockBonds,
-    sums: &mut [Vec<f64>],
-    source: Source<'_, D>,
-) {
-    if const { <measures::StressAcross<L> as Kernel<D>>::EXISTS } {
-        sweep_all(bonds, sums, &measures::StressAcross { law }, source);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
-use crate::material::{FamilyShare, ForceState, Law, family_share};
+use crate::material::{AnyHistory, AnyLaw, AnyPoint, FamilyShare, Law, family_share};
 
 use super::kernel::{Group, Kernel};
 
@@ -20,24 +20,30 @@ const fn wanted(linear: bool) -> Wanted {
 /// those included that have the point in their family only; then what all bonds have dissipated
 /// without breaking (J/m³).
 #[derive(Clone, Copy)]
-pub struct Stored<L> {
-    /// Law of the own end.
-    pub law: L,
+pub struct Stored {
+    /// The law of point i.
+    pub law: AnyLaw,
+    /// Whether its bonds keep a history.
+    pub keeps_history: bool,
 }
 
-impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
+impl<const D: usize> Kernel<D> for Stored {
     type Sums = [Lanes; 4];
     type Broken = [Lanes; 0];
-    type Point = L::Point;
-    type BondHistory = L::BondHistory;
-    const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const WHOLE: bool = L::BondHistory::COUNT > 0;
+    type Point = AnyPoint;
+    type BondHistory = AnyHistory;
+    type Rotation = [Lanes; 0];
+    const WHOLE: bool = true;
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const NEAR: bool = L::ISA_SET.is_each() && !L::LINEAR && L::BondHistory::COUNT == 0;
+    const ANY_LAW: bool = true;
     const WANTED: Wanted = Wanted {
         extension_over_deformed: false,
-        ..wanted(L::LINEAR)
+        ..wanted(false)
     };
+
+    fn is_linear(&self) -> bool {
+        self.law.is_linear::<D>()
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
@@ -47,8 +53,8 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stored<L> {
         sums[0] += simd.keep(energy, family);
         sums[1] += simd.keep(group.volume, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
-        if L::BondHistory::COUNT > 0 {
-            let dissipated = self.law.dissipated(group.bond.length, &group.history[0]);
+        if self.keeps_history {
+            let dissipated = Law::<D>::dissipated(&self.law, group.bond.length, &group.history[0]);
             sums[3] += simd.keep(group.own_share(dissipated), group.whole);
         }
     }
@@ -64,6 +70,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
+    type Rotation = [Lanes; 0];
     // At every set-up, after every refinement, and for outputs.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const UNDEFORMED: bool = true;
@@ -85,11 +92,11 @@ fn add_tensor<S: Simd, const D: usize>(
     simd: S,
     sums: &mut [Lanes; 6],
     intact: u8,
-    entry: impl Fn(usize, usize) -> Lanes,
+    entry: impl Fn(usize, usize, usize) -> Lanes,
 ) {
-    for (sum, (a, b)) in sums.iter_mut().zip(PAIRS) {
+    for (k, (a, b)) in PAIRS.into_iter().enumerate() {
         if a < D && b < D {
-            *sum += simd.keep(entry(a, b), intact);
+            sums[k] += simd.keep(entry(k, a, b), intact);
         }
     }
 }
@@ -97,37 +104,46 @@ fn add_tensor<S: Simd, const D: usize>(
 /// Sums D = Σ V C n⊗n over the intact bonds, undeformed (N/m⁴), as xx, yy, zz, xy, yz, xz; C adds up
 /// [`Law::stiffness`] of both ends.
 #[derive(Clone, Copy)]
-pub struct Stiffness<L> {
+pub struct Stiffness {
     /// Laws of the own and of the far end.
-    pub laws: [L; 2],
+    pub laws: [AnyLaw; 2],
 }
 
-impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
+impl<const D: usize> Kernel<D> for Stiffness {
     type Sums = [Lanes; 6];
     type Broken = [Lanes; 0];
-    type Point = L::Point;
+    type Point = AnyPoint;
     type BondHistory = [Lanes; 0];
-    const EXISTS: bool = D >= L::LEAST_DIMENSION;
+    type Rotation = [Lanes; 0];
     // At every set-up and after every refinement.
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const UNDEFORMED: bool = L::Point::COUNT == 0;
-    const WANTED: Wanted = wanted(L::LINEAR);
+    const UNDEFORMED: bool = true;
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = wanted(false);
+
+    fn is_linear(&self) -> bool {
+        self.laws[0].is_linear::<D>()
+    }
+
+    fn is_undeformed(&self) -> bool {
+        self.laws.iter().all(|law| law.counts::<D>().point == 0)
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
         let length = group.bond.length;
         let xi = &group.bond.reference;
-        let own = self.laws[0].stiffness(length, group.own) * group.weights.own();
-        let far = self.laws[1].stiffness(length, &group.far) * group.weights.far();
+        let own = Law::<D>::stiffness(&self.laws[0], length, group.own) * group.weights.own();
+        let far = Law::<D>::stiffness(&self.laws[1], length, &group.far) * group.weights.far();
         // Either all of a spring or the share along the bond.
-        let [own_across, far_across] = self.laws.map(|law| law.resists_across());
+        let [own_across, far_across] = self.laws.map(|law| Law::<D>::resists_across(&law));
         let none = Lanes::splat(0.0);
         let sum = |across: bool| {
             let share = |end, is| if is == across { end } else { none };
             (share(own, own_across) + share(far, far_across)) * group.volume
         };
         let weight = sum(false) / (length * length);
-        add_tensor::<S, D>(simd, sums, group.intact, |a, b| weight * xi[a] * xi[b]);
+        add_tensor::<S, D>(simd, sums, group.intact, |_, a, b| weight * xi[a] * xi[b]);
         if own_across || far_across {
             for sum_across in &mut sums[..D] {
                 *sum_across += simd.keep(sum(true), group.intact);
@@ -142,44 +158,53 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Stiffness<L> {
 /// Σ T⊗ξ Ṽ; times Fᵀ it is this, the Kirchhoff stress, symmetric and turning with the body. Linear
 /// laws have ξ in place of Y.
 #[derive(Clone, Copy)]
-pub struct Stress<L> {
+pub struct Stress {
     /// Law of the own end.
-    pub law: L,
+    pub law: AnyLaw,
 }
 
-impl<L: Law<D>, const D: usize> Kernel<D> for Stress<L> {
+impl<const D: usize> Kernel<D> for Stress {
     type Sums = [Lanes; 6];
     type Broken = [Lanes; 0];
-    type Point = L::Point;
-    type BondHistory = L::BondHistory;
-    const EXISTS: bool = D >= L::LEAST_DIMENSION;
-    const WANTED: Wanted = wanted(L::LINEAR);
+    type Point = AnyPoint;
+    type BondHistory = AnyHistory;
+    type Rotation = [Lanes; 0];
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = wanted(false);
+
+    fn is_linear(&self) -> bool {
+        self.law.is_linear::<D>()
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 6]) {
-        let own = group.own;
-        let force = self.law.force(&group.bond, own, &group.history[0]);
-        let force = force.times(group.weights.own()).times(group.volume);
-        add_tensor::<S, D>(simd, sums, group.intact, |a, b| {
-            force.dyad(&group.bond, a, b)
-        });
+        let numbers = (group.own, &group.history[0]);
+        let factors = [group.weights.own(), group.volume];
+        let stress = (self.law).stress_contribution(&group.bond, numbers, factors, PAIRS);
+        add_tensor::<S, D>(simd, sums, group.intact, |k, _, _| stress[k]);
     }
 }
 
 /// Sum of [`Law::bond_stress_across`] over the intact bonds, Pa.
 #[derive(Clone, Copy)]
-pub struct StressAcross<L> {
+pub struct StressAcross {
     /// Law of the own end.
-    pub law: L,
+    pub law: AnyLaw,
 }
 
-impl<L: Law<D>, const D: usize> Kernel<D> for StressAcross<L> {
+impl<const D: usize> Kernel<D> for StressAcross {
     type Sums = [Lanes; 1];
     type Broken = [Lanes; 0];
-    type Point = L::Point;
+    type Point = AnyPoint;
     type BondHistory = [Lanes; 0];
-    const EXISTS: bool = D == 2 && L::HAS_BOND_STRESS_ACROSS;
-    const WANTED: Wanted = wanted(L::LINEAR);
+    type Rotation = [Lanes; 0];
+    const EXISTS: bool = D == 2;
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = wanted(false);
+
+    fn is_linear(&self) -> bool {
+        self.law.is_linear::<D>()
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
@@ -198,6 +223,7 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
+    type Rotation = [Lanes; 0];
     const WANTED: Wanted = wanted(true);
 
     #[inline(always)]
@@ -214,15 +240,24 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
 /// Sums what gives the dilatation θ = (d/m) Σ ω|ξ|εṼ: the weighted volume m = Σ ω|ξ|²Ṽ of the whole
 /// family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵), with ε linear in η if so wanted.
 #[derive(Clone, Copy)]
-pub struct Dilatation<const LINEAR: bool>;
+pub struct Dilatation {
+    /// Whether ε is linear in η.
+    pub is_linear: bool,
+}
 
-impl<const LINEAR: bool, const D: usize> Kernel<D> for Dilatation<LINEAR> {
+impl<const D: usize> Kernel<D> for Dilatation {
     type Sums = [Lanes; 2];
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
+    type Rotation = [Lanes; 0];
     const WHOLE: bool = true;
-    const WANTED: Wanted = wanted(LINEAR);
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = wanted(false);
+
+    fn is_linear(&self) -> bool {
+        self.is_linear
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 2]) {

@@ -30,8 +30,8 @@ use std::sync::Arc;
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Fault, Grid, Which};
-use crate::lanes::{Instructions, LaneTuple};
-use crate::material::{Law, with_pair};
+use crate::lanes::Instructions;
+use crate::material::Law;
 use crate::memory::check_room;
 
 use super::model::Model;
@@ -63,12 +63,13 @@ enum Pass {
     Force,
 }
 
-/// LaneTuple that the laws of an interaction keep of a bond.
+/// Numbers that the laws of an interaction keep of a bond: as many for each end.
 fn history_width<const D: usize>(interaction: &Interaction) -> usize {
-    fn width<L: Law<D>, const D: usize>(_: &[L; 2]) -> usize {
-        2 * L::BondHistory::COUNT
-    }
-    with_pair!(&interaction.laws, laws => width::<_, D>(laws))
+    let [i, j] = interaction.laws.laws();
+    2 * i
+        .counts::<D>()
+        .bond_history
+        .max(j.counts::<D>().bond_history)
 }
 
 /// An error if the numbers that laws keep of bonds do not fit in memory.
@@ -125,12 +126,7 @@ impl<const D: usize> Forces<D> {
         blocks: Vec<BlockLaws>,
     ) -> Result<Self> {
         let instructions = Instructions::of_all(comm)?;
-        // The same on all ranks, whatever bonds they have.
-        let kind = |block: &BlockLaws| std::mem::discriminant(&block.law);
-        let mixed = blocks
-            .windows(2)
-            .any(|pair| kind(&pair[0]) != kind(&pair[1]));
-        let numbers = PointNumbers::new(&blocks, mixed, model);
+        let numbers = PointNumbers::new(&blocks, model);
         let read = LimitsRead::by::<D>(&blocks);
         let limits = LimitColumns::new::<D>(read, numbers.read, model.volume.len());
         let breaks = blocks.iter().any(|block| block.damage.is_some());
@@ -179,9 +175,15 @@ impl<const D: usize> Forces<D> {
         }
         let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.reference_sum];
         self.for_each_interaction(|interaction, source| {
-            with_pair!(interaction.laws, laws => {
-                reference_sums(laws[0], &mut interaction.bonds, &mut sums, source);
-            });
+            let [law, _] = interaction.laws.laws();
+            if law.counts::<D>().reference_sum > 0 {
+                sweep_all(
+                    &mut interaction.bonds,
+                    &mut sums,
+                    &FamilySum::<D> { law },
+                    source,
+                );
+            }
         });
         let Self {
             numbers,
@@ -210,7 +212,8 @@ impl<const D: usize> Forces<D> {
     fn for_each_interaction(&mut self, mut work: impl FnMut(&mut Interaction, Source<'_, D>)) {
         let source = Source {
             nodes: &self.nodes,
-            numbers: &self.numbers.columns,
+            // Those beyond belong to owned points alone.
+            numbers: &self.numbers.columns[..self.numbers.read],
             limits: &self.limits,
             grids: &self.grids,
             instructions: self.instructions,
@@ -344,17 +347,5 @@ impl<const D: usize> Forces<D> {
                 interaction.bonds.protect(is_protected);
             }
         }
-    }
-}
-
-/// Adds up what gives the points of a law their constants, if they have any.
-fn reference_sums<L: Law<D>, const D: usize>(
-    law: L,
-    bonds: &mut BlockBonds,
-    sums: &mut [Vec<f64>],
-    source: Source<'_, D>,
-) {
-    if const { L::ReferenceSum::COUNT > 0 } {
-        sweep_all(bonds, sums, &FamilySum { law }, source);
     }
 }

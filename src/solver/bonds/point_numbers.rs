@@ -11,7 +11,7 @@ use super::interaction::BlockLaws;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// LaneTuple of a point, at most.
+/// Numbers of a point, at most.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
 /// The first of the columns of the plastic state among those that a pass works on.
@@ -41,16 +41,15 @@ pub struct PointNumbers {
 }
 
 impl PointNumbers {
-    /// For the laws of a deck, the same on all ranks; all numbers are 0. `mixed` says whether bonds
-    /// join blocks of different laws, which read the numbers of all laws.
-    pub fn new<const D: usize>(blocks: &[BlockLaws], mixed: bool, model: &Model<D>) -> Self {
+    /// For the laws of the blocks, the same on all ranks; all numbers are 0.
+    pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);
-        let read = if mixed { MOST.point } else { most(|c| c.point) };
+        let read = most(|c| c.point);
         let all = read.max(most(|c| c.point + c.own));
         let (owned, local) = (model.owned(), model.volume.len());
         let length = |column: usize| if column < read { local } else { owned };
-        let sums = if mixed { MOST.sum } else { most(|c| c.sum) };
+        let sums = most(|c| c.sum);
         let changing = counts.iter().filter(|c| c.passes > 0);
         Self {
             columns: (0..all).map(|k| Column::new(k, length(k), 0.0)).collect(),
@@ -104,7 +103,7 @@ impl PointNumbers {
         points: Range<usize>,
         model: &Model<D>,
         blocks: &[BlockLaws],
-        rotations: &mut [Column; 3],
+        rotations: &mut [Column; 4],
     ) {
         let columns = rotations.each_mut().map(|column| {
             let own = column.get_mut(points.clone());

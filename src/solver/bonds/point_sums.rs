@@ -1,8 +1,8 @@
 //! The sums over bonds that the numbers of points follow from.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
-use crate::material::Law;
 use crate::material::bond::Wanted;
+use crate::material::{AnyLaw, Law};
 
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
@@ -30,6 +30,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Broken = [Lanes; 0];
     type Point = L::Point;
     type BondHistory = L::BondHistory;
+    type Rotation = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const ISA_SET: IsaSet = L::ISA_SET;
     const NEAR: bool =
@@ -71,30 +72,41 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
 /// pre-cracks cut. A law that needs a shape tensor compares what is left of a family with all of it, so for such laws
 /// the cut bonds count, too.
 #[derive(Clone, Copy)]
-pub struct FamilySum<L> {
-    /// The law of the own end.
-    pub law: L,
+pub struct FamilySum<const D: usize> {
+    /// The law of point i.
+    pub law: AnyLaw,
 }
 
-impl<L: Law<D>, const D: usize> Kernel<D> for FamilySum<L> {
-    type Sums = L::ReferenceSum;
+impl<const D: usize> Kernel<D> for FamilySum<D> {
+    type Sums = <AnyLaw as Law<D>>::ReferenceSum;
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
-    const EXISTS: bool = D >= L::LEAST_DIMENSION;
+    type Rotation = [Lanes; 0];
     const WHOLE: bool = true;
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const WANTED: Wanted = growth_only(L::LINEAR);
+    const UNDEFORMED: bool = true;
+    const ANY_LAW: bool = true;
+    const WANTED: Wanted = growth_only(false);
+
+    fn is_linear(&self) -> bool {
+        self.law.is_linear::<D>()
+    }
+
+    fn is_undeformed(&self) -> bool {
+        // Else broken bonds count as well.
+        !Law::<D>::needs_shape(&self.law)
+    }
 
     #[inline(always)]
-    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut L::ReferenceSum) {
-        let counted = if self.law.needs_shape() {
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
+        let counted = if Law::<D>::needs_shape(&self.law) {
             group.whole
         } else {
             group.intact
         };
         let share = self.law.reference_contribution(&group.bond);
-        for k in 0..L::ReferenceSum::COUNT {
+        for k in 0..Self::Sums::COUNT {
             let share = share.get(k) * group.volume * group.weights.own();
             *sums.get_mut(k) += simd.keep(share, counted);
         }
@@ -111,6 +123,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     type Broken = [Lanes; 0];
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
+    type Rotation = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;
     const ISA_SET: IsaSet = IsaSet::Each;
     const WANTED: Wanted = growth_only(false);

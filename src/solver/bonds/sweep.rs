@@ -8,9 +8,9 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use crate::families::{BlockBonds, Row, Rows, VectorBonds, Vectors};
-use crate::lanes::simd::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::simd::{Avx2, Avx512};
+use crate::lanes::simd::{Portable, Task};
 use crate::lanes::{Column, Instructions, IsaSet, LaneTuple, Lanes, Simd, WIDTH};
 
 use super::grid_points::{GridPoints, GridValues};
@@ -156,13 +156,22 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
                 Vec::new()
             };
             let volumes = [lattice.own_volume, lattice.volume];
-            let points = GridPoints::new(kernel, &source.grids[lattice.index], volumes);
+            let values = &source.grids[lattice.index];
+            assert!(
+                values.is_of(&lattice.grid),
+                "the values are those of another grid than the lattice's"
+            );
+            let points = GridPoints::new(kernel, values, volumes);
             let runner = OverVectors {
                 kernel,
                 points,
                 whole,
             };
-            let most = if K::UNDEFORMED { UNDEFORMED_LEAF } else { LEAF };
+            let most = if K::UNDEFORMED && kernel.is_undeformed() {
+                UNDEFORMED_LEAF
+            } else {
+                LEAF
+            };
             let leaf = leaf(most, lattice.offsets());
             let part = lattice.vectors(vectors);
             split(part, base, results, &runner, leaf, instructions)
@@ -355,28 +364,31 @@ impl FastPathGate {
         }
     }
 
-    /// The sums over the bonds of a vector, by `near` if none of them is marked, else by `whole`; and
-    /// the bits of bonds that break.
+    /// The sums over the bonds of a vector and the bits of those that break: by the loop without marked bonds where that
+    /// is worth a try.
+    ///
+    /// # Safety
+    /// As for [`near_vector`].
     #[inline(always)]
-    fn sum<'b, K: Kernel<D>, S: Simd, const D: usize>(
+    unsafe fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
         simd: S,
-        vector: &mut VectorBonds<'b>,
-        near: impl FnOnce(&mut VectorBonds<'b>) -> Option<K::Sums>,
-        whole: impl FnOnce(&mut VectorBonds<'b>) -> (K::Sums, u8),
+        mut task: WholeVector<'_, '_, '_, K, D>,
     ) -> (K::Sums, u8) {
         if const { !K::NEAR } {
-            return whole(vector);
+            return task.run(simd);
         }
         if self.near && self.waiting == 0 {
-            if let Some(sums) = near(vector) {
+            // SAFETY: passed on to the caller.
+            let sums = unsafe { near_vector(simd, task.kernel, task.points, &mut task.vector) };
+            if let Some(sums) = sums {
                 return (sums, 0);
             }
             self.waiting = PATIENCE;
         } else {
             self.waiting = self.waiting.saturating_sub(1);
         }
-        simd.aside(|| whole(vector))
+        simd.aside(task)
     }
 }
 
@@ -385,20 +397,12 @@ impl FastPathGate {
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
 impl<N: LaneTuple> Known<N> {
-    fn sums<'b>(
-        &mut self,
-        vector: &mut VectorBonds<'b>,
-        sum: impl FnOnce(&mut VectorBonds<'b>) -> N,
-    ) -> N {
-        if let Some(sums) = self.0.get(&*vector.groups.intact) {
-            return *sums;
-        }
-        let sums = sum(vector);
+    /// Stores the sums of a vector.
+    fn insert(&mut self, vector: &VectorBonds<'_>, sums: N) {
         if self.0.len() == MOST_KNOWN {
             self.0.clear();
         }
         self.0.insert(Box::from(&*vector.groups.intact), sums);
-        sums
     }
 }
 
@@ -427,37 +431,95 @@ unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// The sums over the bonds of a vector, and the bits of those that break; `whole` are the bits of all, if the
-/// kernel wants them.
-///
-/// # Safety
-/// As for [`near_vector`].
-#[inline(always)]
-unsafe fn whole_vector<K: Kernel<D>, S: Simd, const D: usize>(
-    simd: S,
+/// The sums over all bonds of a vector, and the bits of those that break.
+struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    points: GridPoints<'_, K, D>,
-    whole: Option<&[u8]>,
-    vector: &mut VectorBonds<'_>,
-) -> (K::Sums, u8) {
-    let mut sums = kernel.start();
-    let mut gone = 0;
-    // SAFETY: passed on to the caller.
-    let here = unsafe { points.here(vector.place) };
-    for o in 0..vector.offsets.len() {
-        // SAFETY: as above.
-        let mut bonds = unsafe { points.load::<S, false>(simd, &here, vector, o) };
-        if K::WHOLE {
-            bonds.whole = whole.map_or(0, |bits| bits[o]);
+    /// Made for the grid of the vector.
+    points: GridPoints<'p, K, D>,
+    /// The bits of all bonds, broken or not, if the kernel reads them.
+    whole: Option<&'t [u8]>,
+    vector: &'t mut VectorBonds<'v>,
+}
+
+impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
+    type Output = (K::Sums, u8);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> (K::Sums, u8) {
+        let (kernel, points, vector) = (self.kernel, self.points, self.vector);
+        let mut sums = kernel.start();
+        let mut gone = 0;
+        // SAFETY: `points` was made for the grid of the vector.
+        let own = unsafe { points.here(vector.place) };
+        for o in 0..vector.offsets.len() {
+            // SAFETY: as above.
+            let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
+            if K::WHOLE {
+                bonds.whole = self.whole.map_or(0, |bits| bits[o]);
+            }
+            let before = bonds.intact;
+            kernel.add(simd, &mut bonds, &mut sums);
+            gone |= before ^ bonds.intact;
+            if K::BondHistory::COUNT > 0 && kernel.stores_history() {
+                store_history(vector.groups.numbers(o), &bonds.history, before);
+            }
         }
-        let before = bonds.intact;
-        kernel.add(simd, &mut bonds, &mut sums);
-        gone |= before ^ bonds.intact;
-        if K::BondHistory::COUNT > 0 && kernel.stores_history() {
-            store_history(vector.groups.numbers(o), &bonds.history, before);
-        }
+        (sums, gone)
     }
-    (sums, gone)
+}
+
+/// The sums over the bonds of a vector that break; clears their bits.
+struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
+    kernel: K,
+    /// Made for the grid of the vector.
+    points: GridPoints<'p, K, D>,
+    vector: &'t mut VectorBonds<'v>,
+}
+
+impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
+    type Output = [Lanes; MOST_BROKEN];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let (kernel, points, vector) = (self.kernel, self.points, self.vector);
+        let mut broken = K::Broken::splat(0.0);
+        // SAFETY: `points` was made for the grid of the vector.
+        let own = unsafe { points.here(vector.place) };
+        for o in 0..vector.offsets.len() {
+            // SAFETY: as above.
+            let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
+            kernel.add_broken(simd, &mut bonds, &mut broken);
+            vector.groups.intact[o] = bonds.intact;
+        }
+        all_broken(&broken)
+    }
+}
+
+/// The sums over the bonds of a row that break; clears their bits.
+struct BrokenOfRow<'t, 'r, 'p, K: Kernel<D>, const D: usize> {
+    kernel: K,
+    /// Made for the list of the row.
+    points: ListPoints<'p, K, D>,
+    row: &'t mut Row<'r>,
+}
+
+impl<K: Kernel<D>, const D: usize> Task for BrokenOfRow<'_, '_, '_, K, D> {
+    type Output = [Lanes; MOST_BROKEN];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let (kernel, points, row) = (self.kernel, self.points, self.row);
+        let mut broken = K::Broken::splat(0.0);
+        // SAFETY: `points` was made for the list of the row.
+        let own = unsafe { points.here(row.point) };
+        for group in 0..row.neighbours.len() {
+            // SAFETY: as above.
+            let mut bonds = unsafe { points.load(simd, &own, row, group) };
+            kernel.add_broken(simd, &mut bonds, &mut broken);
+            row.groups.intact[group] = bonds.intact;
+        }
+        all_broken(&broken)
+    }
 }
 
 struct OverRows<'a, K: Kernel<D>, const D: usize> {
@@ -505,19 +567,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 combine(K::COMBINE, &mut column[row.point - base], value);
             }
             if K::Broken::COUNT > 0 && gone != 0 {
-                let broken_sums = &mut broken_sums;
-                simd.aside(move || {
-                    let mut broken = K::Broken::splat(0.0);
-                    // SAFETY: as above.
-                    let here = unsafe { points.here(row.point) };
-                    for group in 0..row.neighbours.len() {
-                        // SAFETY: as above.
-                        let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };
-                        kernel.add_broken(simd, &mut bonds, &mut broken);
-                        row.groups.intact[group] = bonds.intact;
-                    }
-                    note_point(broken_sums, row.point, &all_broken(&broken));
+                let point = row.point;
+                let row = &mut row;
+                let broken = simd.aside(BrokenOfRow {
+                    kernel,
+                    points,
+                    row,
                 });
+                note_point(&mut broken_sums, point, &broken);
             }
         }
         broken_sums
@@ -547,23 +604,32 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
         let mut gate = FastPathGate::new(&kernel);
+        let is_undeformed = kernel.is_undeformed();
         let mut known = Known(FxHashMap::default());
         for k in 0..vectors.len() {
             let mut vector: VectorBonds<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
-            let mut sum = |vector: &mut VectorBonds<'_>| {
-                gate.sum::<K, S, D>(
-                    simd,
-                    vector,
-                    // SAFETY: the vectors are those of the grid that `points` was made for.
-                    |vector| unsafe { near_vector(simd, kernel, points, vector) },
-                    |vector| unsafe { whole_vector(simd, kernel, points, whole, vector) },
-                )
-            };
-            let (sums, gone) = if const { K::UNDEFORMED } {
-                (known.sums(&mut vector, |vector| sum(vector).0), 0)
+            let known_sums = if K::UNDEFORMED && is_undeformed {
+                known.0.get(&*vector.groups.intact).copied()
             } else {
-                sum(&mut vector)
+                None
+            };
+            let (sums, gone) = match known_sums {
+                Some(sums) => (sums, 0),
+                None => {
+                    let task = WholeVector {
+                        kernel,
+                        points,
+                        whole,
+                        vector: &mut vector,
+                    };
+                    // SAFETY: the vectors are those of the grid that `points` was made for.
+                    let found = unsafe { gate.sum::<K, S, D>(simd, task) };
+                    if K::UNDEFORMED && is_undeformed {
+                        known.insert(&vector, found.0);
+                    }
+                    found
+                }
             };
             let first = vector.point - base;
             for quantity in 0..K::Sums::COUNT {
@@ -576,20 +642,14 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                 }
             }
             if K::Broken::COUNT > 0 && gone != 0 {
-                let broken_sums = &mut broken_sums;
-                simd.aside(move || {
-                    let mut broken = K::Broken::splat(0.0);
-                    // SAFETY: as above.
-                    let here = unsafe { points.here(vector.place) };
-                    for o in 0..vector.offsets.len() {
-                        // SAFETY: as above.
-                        let mut bonds =
-                            unsafe { points.load::<S, false>(simd, &here, &mut vector, o) };
-                        kernel.add_broken(simd, &mut bonds, &mut broken);
-                        vector.groups.intact[o] = bonds.intact;
-                    }
-                    note_vector(broken_sums, vector.point, &all_broken(&broken));
+                let point = vector.point;
+                let vector = &mut vector;
+                let broken = simd.aside(BrokenOfVector {
+                    kernel,
+                    points,
+                    vector,
                 });
+                note_vector(&mut broken_sums, point, &broken);
             }
         }
         broken_sums
