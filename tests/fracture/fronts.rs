@@ -121,7 +121,7 @@ fn a_tip_follows_a_cut_in_any_direction_on_any_number_of_ranks() {
 
 #[test]
 fn the_tip_of_a_running_crack() {
-    let deck = include_str!("../inputs/crack_branching.toml").to_owned()
+    let deck = include_str!("../../inputs/crack_branching.toml").to_owned()
         + "\n[history.tip.crack]\nfrom = [0, 0]\ndirection = [1, 0]\n";
     simulate::<2, _>(&deck, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();

@@ -132,7 +132,7 @@ fn there_is_no_crack_before_there_is_damage() {
 #[test]
 fn the_branches_of_the_benchmark_are_found_written_and_drawn() {
     let folder = Folder::new("crack_paths");
-    let deck = include_str!("../inputs/crack_branching.toml").to_owned()
+    let deck = include_str!("../../inputs/crack_branching.toml").to_owned()
         + "\n[history.crack.main]\nfrom = [0, 0]\n";
     let deck = folder.write("branching.toml", &deck);
     let run = |ranks, out: &str| {

@@ -13,7 +13,7 @@ fn classical() -> f64 {
 
 /// The deck with some of its lines changed.
 fn deck(changes: &[(&str, &str)]) -> String {
-    let mut text = include_str!("../inputs/eoi_alon.toml").to_owned();
+    let mut text = include_str!("../../inputs/eoi_alon.toml").to_owned();
     for (old, new) in changes {
         assert_eq!(text.matches(old).count(), 1, "{old}");
         text = text.replace(old, new);
