@@ -25,10 +25,7 @@ extern "C" fn PMPI_File_sync(_: mpi_sys::MPI_File) -> c_int {
 
 #[test]
 fn outputs_that_have_room_do_not_wait_for_the_disc() {
-    if !is_rank(
-        2,
-        "outputs_that_have_room_do_not_wait_for_the_disc",
-    ) {
+    if !is_rank(2, "outputs_that_have_room_do_not_wait_for_the_disc") {
         return;
     }
     let world = fissure::run::start_mpi().unwrap();

@@ -40,7 +40,10 @@ fn a_panic_during_an_exchange_leaves_nothing_under_way() {
 
 #[test]
 fn large_messages_arrive_while_work_is_done() {
-    if !is_rank(2, "parallel::communicator::large_messages_arrive_while_work_is_done") {
+    if !is_rank(
+        2,
+        "parallel::communicator::large_messages_arrive_while_work_is_done",
+    ) {
         return;
     }
     let world = World::start().unwrap();

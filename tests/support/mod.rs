@@ -4,6 +4,7 @@
 
 pub mod command;
 pub mod datasets;
+pub mod history;
 pub mod saved;
 
 use std::path::Path;
