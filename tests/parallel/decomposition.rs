@@ -229,13 +229,13 @@ fn same_everywhere(name: &str, text: &str, must_break: bool) {
     }
 }
 
-/// The command, on ranks that `mpirun` starts, writes what [`same_everywhere`] compares.
+/// The command, on ranks that `mpirun` starts, writes the bits of one rank that is a thread.
 fn same_under_mpirun(name: &str, text: &str, must_break: bool) {
     let folder = Folder::new(&format!("{name}-mpirun"));
     let (deck, problem) = deck_in(&folder, text);
     let expected = record(&problem, 1, 1).datasets;
     assert_events(&expected, text, must_break);
-    for (ranks, threads) in LAYOUTS {
+    for (ranks, threads) in [(1, 2), (2, 2), (3, 1), (4, 1)] {
         let out = folder.join(format!("{ranks}x{threads}"));
         let mut command = fissure(ranks);
         command.arg("run").arg(&deck).arg("--output").arg(&out);
