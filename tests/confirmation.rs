@@ -1,5 +1,5 @@
 //! When ranks wait for the disc to confirm a result: not at outputs that have room, but where the file grows and
-//! where that is asked for.
+//! where that is asked for. A program of its own, in which a function of MPI is another one.
 
 use std::os::raw::c_int;
 use std::path::PathBuf;
@@ -8,7 +8,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use fissure::comm::Communicator;
 use fissure::output::{Contents, Creation, FieldDescription, Piece, ResultFile};
 
-use crate::support::command::{Folder, is_rank};
+use command::{Folder, is_rank};
+
+#[allow(dead_code, reason = "the other tests use all of it")]
+#[path = "support/command.rs"]
+mod command;
 
 static ASKED: AtomicUsize = AtomicUsize::new(0);
 
@@ -21,10 +25,7 @@ extern "C" fn PMPI_File_sync(_: mpi_sys::MPI_File) -> c_int {
 
 #[test]
 fn outputs_that_have_room_do_not_wait_for_the_disc() {
-    if !is_rank(
-        2,
-        "confirmation::outputs_that_have_room_do_not_wait_for_the_disc",
-    ) {
+    if !is_rank(2, "outputs_that_have_room_do_not_wait_for_the_disc") {
         return;
     }
     let world = fissure::run::start_mpi().unwrap();

@@ -1,41 +1,64 @@
 //! All tests but those of single files, as one program: what they call is generic, and would be
-//! compiled anew for each.
+//! compiled anew for each. `tests/README.md` says what each folder holds.
 
-mod adaptive;
-mod commands;
-mod communicator;
-mod confirmation;
-mod contact;
-mod correspondence;
-mod correspondence_plastic;
-mod crack_branching;
-mod crack_paths;
-mod decks;
-mod decomposition;
-mod dynamics;
-mod edge_on_impact;
-mod elasticity;
-mod emmrich_weckner;
-mod failures;
-mod families;
-mod fracture_energy;
-mod fronts;
-mod interfaces;
-mod invariants;
-mod joined_steps;
-mod laws;
-mod library;
-mod ordinary_history;
-mod plasticity;
-mod pmma;
-mod readers;
-mod refinement;
-mod relaxation;
-mod restart;
-mod stable_step;
-mod stages;
 mod support;
-mod surfaces;
-mod survey;
-mod undo;
-mod waves;
+
+mod deck {
+    mod decks;
+    mod survey;
+}
+
+mod command {
+    mod commands;
+    mod failures;
+    mod library;
+    mod readers;
+}
+
+mod laws {
+    mod correspondence;
+    mod correspondence_plastic;
+    mod declarations;
+    mod elasticity;
+    mod interfaces;
+    mod invariants;
+    mod ordinary_history;
+    mod plasticity;
+}
+
+mod physics {
+    mod contact;
+    mod dynamics;
+    mod refinement;
+    mod relaxation;
+    mod stable_step;
+    mod stages;
+    mod waves;
+}
+
+mod fracture {
+    mod adaptive;
+    mod crack_paths;
+    mod fracture_energy;
+    mod fronts;
+    mod surfaces;
+}
+
+mod parallel {
+    mod communicator;
+    mod decomposition;
+    mod families;
+    mod joined_steps;
+}
+
+mod restart {
+    mod checkpoints;
+    mod undo;
+}
+
+mod papers {
+    mod crack_branching;
+    mod edge_on_impact;
+    mod emmrich_weckner;
+    mod pmma;
+}

@@ -37,6 +37,48 @@ impl Folder {
     }
 }
 
+/// A file system of its own in a folder, unmounted when dropped.
+pub struct SmallDisc(PathBuf);
+
+impl SmallDisc {
+    /// Mounts one of a size such as `2m`; `None` where the test is [skipped](skip), for only root can.
+    pub fn mount(folder: &Folder, size: &str) -> Option<Self> {
+        let path = folder.join("small");
+        std::fs::create_dir(&path).unwrap();
+        let mounted = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
+            .arg(&path)
+            .stderr(Stdio::null())
+            .status();
+        if mounted.is_ok_and(|status| status.success()) {
+            return Some(Self(path));
+        }
+        skip("only root can mount the small disc that this test fills");
+        None
+    }
+
+    /// A path on it.
+    pub fn join(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for SmallDisc {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+/// Says that a test is skipped, and why.
+///
+/// # Panics
+/// Where the environment variable `CI` is set: nothing may be missing there.
+pub fn skip(why: &str) {
+    let in_ci = std::env::var_os("CI").is_some();
+    assert!(!in_ci, "{why}; where CI is set, no test is skipped");
+    eprintln!("skipped: {why}");
+}
+
 impl Drop for Folder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);

@@ -15,25 +15,28 @@ pub fn datasets(result: &Path) -> BTreeMap<String, Vec<u64>> {
     all.insert("steps".to_owned(), reader.steps().unwrap());
     for step in 0..times.len() {
         let ids = reader.ids(step).unwrap();
-        let mut order: Vec<usize> = (0..ids.len()).collect();
-        order.sort_by_key(|k| ids[*k]);
-        let sorted = |values: &[f64]| {
-            let width = values.len() / ids.len();
-            let row = |k: &usize| values[k * width..(k + 1) * width].to_vec();
-            bits(&order.iter().flat_map(row).collect::<Vec<f64>>())
-        };
         let positions = reader.positions(step).unwrap();
         let name = format!("positions {step}");
-        all.insert(name, sorted(positions.as_flattened()));
+        all.insert(name, sorted(&ids, positions.as_flattened()));
         for field in reader.fields().unwrap() {
             let values = reader.field(&field.name, step).unwrap();
-            all.insert(format!("{} {step}", field.name), sorted(&values));
+            all.insert(format!("{} {step}", field.name), sorted(&ids, &values));
         }
     }
     for column in reader.history().unwrap() {
         all.insert(format!("history {}", column.name), bits(&column.values));
     }
     all
+}
+
+/// The bits of values of points, the rows sorted by the ids of the points.
+pub fn sorted(ids: &[u64], values: &[f64]) -> Vec<u64> {
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_by_key(|k| ids[*k]);
+    let width = values.len() / ids.len();
+    let row = |k: &usize| &values[k * width..(k + 1) * width];
+    let values = order.iter().flat_map(row);
+    values.map(|value| value.to_bits()).collect()
 }
 
 /// Whether there were fewer points in some row of the history than in the one before.

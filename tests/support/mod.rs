@@ -4,6 +4,8 @@
 
 pub mod command;
 pub mod datasets;
+pub mod history;
+pub mod recorded;
 pub mod saved;
 
 use std::path::Path;

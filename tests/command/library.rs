@@ -12,10 +12,10 @@ use fissure::problem::{Interval, Problem, StepRule};
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Row, Unobserved, View};
 
 #[allow(dead_code, reason = "the test calls what the example's main calls")]
-#[path = "../examples/problem_in_rust.rs"]
+#[path = "../../examples/problem_in_rust.rs"]
 mod problem_in_rust;
 #[allow(dead_code, reason = "as above")]
-#[path = "../examples/run_deck.rs"]
+#[path = "../../examples/run_deck.rs"]
 mod run_deck;
 
 /// The plate of `examples/problem_in_rust.rs` as a deck.

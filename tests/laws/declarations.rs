@@ -58,7 +58,7 @@ fn the_readme_has_the_table_of_laws() {
         "| law | force | its own keys |\n|---|---|---|\n{}\n",
         rows.join("\n")
     );
-    let readme = include_str!("../README.md");
+    let readme = include_str!("../../README.md");
     assert!(readme.contains(&table), "not in README.md:\n{table}");
 }
 

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::command::{Folder, finish, fissure, rank_processes, succeed, text, wait};
+use crate::support::command::{
+    Folder, SmallDisc, finish, fissure, rank_processes, succeed, text, wait,
+};
 use crate::support::datasets::{datasets, difference, points_left};
 use fissure::output::ResultReader;
 
@@ -527,21 +529,9 @@ fn a_damaged_checkpoint_is_recognised_and_the_other_one_used() {
 #[test]
 fn a_full_disc_leaves_the_checkpoint_before() {
     let folder = Folder::new("fullcheck");
-    let disc = folder.join("small");
-    std::fs::create_dir(&disc).unwrap();
-    let mount = |arguments: &[&str]| {
-        let mut command = Command::new("mount");
-        let status = command
-            .args(arguments)
-            .arg(&disc)
-            .stderr(Stdio::null())
-            .status();
-        status.is_ok_and(|status| status.success())
-    };
-    if !mount(&["-t", "tmpfs", "-o", "size=20m", "tmpfs"]) {
-        eprintln!("skipped: only root can mount the small disc that this test fills");
+    let Some(disc) = SmallDisc::mount(&folder, "20m") else {
         return;
-    }
+    };
     let deck = folder.write("deck.toml", &plate("3e-5", "checkpoint.every_steps = 1000"));
     let out = disc.join("out");
     let mut command = run(2, &deck, &out, &[]);
@@ -582,13 +572,6 @@ fn a_full_disc_leaves_the_checkpoint_before() {
     assert_eq!(
         difference(&datasets(&result(&whole)), &datasets(&result(&out))),
         None
-    );
-    assert!(
-        Command::new("umount")
-            .arg(&disc)
-            .status()
-            .unwrap()
-            .success()
     );
 }
 

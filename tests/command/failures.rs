@@ -1,12 +1,12 @@
 //! What goes wrong on one rank ends all of them, soon, with one message and the right exit code; what
 //! was written before stays readable.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::support::command::{
-    Folder, finish, fissure, is_running, rank_processes, succeed, text, wait,
+    Folder, SmallDisc, finish, fissure, is_running, rank_processes, succeed, text, wait,
 };
 use fissure::output::ResultReader;
 
@@ -94,27 +94,6 @@ fn a_value_that_is_not_finite() {
     assert_eq!(messages.len(), 1, "the same point on any number of ranks");
 }
 
-/// Mounts a disc of some size, such as `2m`; `None` where only root could.
-fn small_disc(folder: &Folder, size: &str) -> Option<PathBuf> {
-    let disc = folder.join("small");
-    std::fs::create_dir(&disc).unwrap();
-    let mounted = Command::new("mount")
-        .args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
-        .arg(&disc)
-        .stderr(Stdio::null())
-        .status();
-    if mounted.is_ok_and(|status| status.success()) {
-        return Some(disc);
-    }
-    eprintln!("skipped: only root can mount the small disc that this test fills");
-    None
-}
-
-fn unmount(disc: &Path) {
-    let unmounted = Command::new("umount").arg(disc).status();
-    assert!(unmounted.unwrap().success());
-}
-
 /// A run that ends because its disc is full; says so once.
 fn fill(ranks: usize, deck: &Path, out: &Path) {
     let mut command = fissure(ranks);
@@ -129,7 +108,7 @@ fn fill(ranks: usize, deck: &Path, out: &Path) {
 #[test]
 fn a_full_disc() {
     let folder = Folder::new("disc");
-    let Some(disc) = small_disc(&folder, "2m") else {
+    let Some(disc) = SmallDisc::mount(&folder, "2m") else {
         return;
     };
     let deck = folder.write("deck.toml", &bar("end = 100"));
@@ -140,13 +119,12 @@ fn a_full_disc() {
         assert!(!out.join("result.vtkhdf").exists());
         std::fs::remove_dir_all(&out).unwrap();
     }
-    unmount(&disc);
 }
 
 #[test]
 fn a_full_disc_while_points_are_born() {
     let folder = Folder::new("disc-growing");
-    let Some(disc) = small_disc(&folder, "2m") else {
+    let Some(disc) = SmallDisc::mount(&folder, "2m") else {
         return;
     };
     let text = "dimension = 'plane-stress'
@@ -172,7 +150,6 @@ fn a_full_disc_while_points_are_born() {
         }
         std::fs::remove_dir_all(&out).unwrap();
     }
-    unmount(&disc);
 }
 
 #[test]

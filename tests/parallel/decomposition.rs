@@ -1,9 +1,14 @@
-//! The same deck on any number of ranks and threads gives the same bits.
+//! The same deck on any number of ranks and threads gives the same bits. Ranks are threads of the test, which costs
+//! no start of MPI; four decks run as the command under `mpirun` as well.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use crate::support::command::{Folder, fissure, succeed};
 use crate::support::datasets::{datasets, difference, points_left};
+use crate::support::recorded::record;
+use fissure::deck;
+use fissure::problem::Problem;
 
 /// A plate of two materials: damage with α, a no-failure zone, supports, loads, a notch, probes.
 const PLATE: &str = "
@@ -209,48 +214,78 @@ fn scattered_points() -> String {
     text
 }
 
+/// A deck on every number of ranks, which are threads, and threads of a rank.
 fn same_everywhere(name: &str, text: &str, must_break: bool) {
     let folder = Folder::new(name);
+    let problem = deck_in(&folder, text).1;
+    let expected = record(&problem, 1, 1).datasets;
+    assert_events(&expected, text, must_break);
+    for (ranks, threads) in LAYOUTS.into_iter().skip(1) {
+        let found = record(&problem, ranks, threads);
+        let (moves, moved) = (ranks > 1 && text.contains("[balance]"), found.repartitions);
+        assert_eq!(moved > 1, moves, "{moved} repartitions");
+        let difference = difference(&expected, &found.datasets);
+        assert_eq!(difference, None, "on {ranks} × {threads}");
+    }
+}
+
+/// The command, on ranks that `mpirun` starts, writes the bits of one rank that is a thread.
+fn same_under_mpirun(name: &str, text: &str, must_break: bool) {
+    let folder = Folder::new(&format!("{name}-mpirun"));
+    let (deck, problem) = deck_in(&folder, text);
+    let expected = record(&problem, 1, 1).datasets;
+    assert_events(&expected, text, must_break);
+    for (ranks, threads) in [(1, 2), (2, 2), (3, 1), (4, 1)] {
+        let out = folder.join(format!("{ranks}x{threads}"));
+        let mut command = fissure(ranks);
+        command.arg("run").arg(&deck).arg("--output").arg(&out);
+        let printed = succeed(command.args(["--threads", &threads.to_string(), "-v"]));
+        assert!(printed.contains("all writes were collective"), "{printed}");
+        let moves = ranks > 1 && text.contains("[balance]");
+        let moved = printed.matches("changed their rank").count();
+        assert_eq!(moved > 1, moves, "{moved} repartitions: {printed}");
+        let difference = difference(&expected, &datasets(&out.join("result.vtkhdf")));
+        assert_eq!(difference, None, "on {ranks} × {threads}");
+    }
+}
+
+/// Numbers of ranks and of threads of each.
+const LAYOUTS: [(usize, usize); 8] = [
+    (1, 1),
+    (1, 2),
+    (2, 1),
+    (2, 2),
+    (3, 1),
+    (3, 2),
+    (4, 1),
+    (4, 2),
+];
+
+/// A deck in a folder with its file of points, and its problem.
+fn deck_in(folder: &Folder, text: &str) -> (PathBuf, Problem) {
     folder.write("points.csv", &scattered_points());
-    let deck = folder.write("deck.toml", text);
-    let mut expected = BTreeMap::new();
-    for ranks in 1..=4 {
-        for threads in ["1", "2"] {
-            let out = folder.join(format!("{ranks}x{threads}"));
-            let mut command = fissure(ranks);
-            command.arg("run").arg(&deck).arg("--output").arg(&out);
-            let printed = succeed(command.args(["--threads", threads, "-v"]));
-            assert!(printed.contains("all writes were collective"), "{printed}");
-            let moves = ranks > 1 && text.contains("[balance]");
-            let moved = printed.matches("changed their rank").count();
-            assert_eq!(moved > 1, moves, "{moved} repartitions: {printed}");
-            let found = datasets(&out.join("result.vtkhdf"));
-            if expected.is_empty() {
-                let last = |column: &str| {
-                    let bits = found[&format!("history {column}")].last();
-                    f64::from_bits(*bits.unwrap())
-                };
-                let broken = last("broken_bonds");
-                assert_eq!(broken > 0.0, must_break, "{broken} bonds broke");
-                if text.contains("[refinement.trigger]") {
-                    let points = &found["history points"];
-                    assert!(points.last() > points.first(), "no point was born");
-                }
-                if text.contains("coarsen_after") {
-                    assert!(points_left(&found), "no point has left");
-                }
-                if text.contains("yield_str") {
-                    assert!(last("dissipated_energy") > 0.0, "nothing has yielded");
-                }
-                expected = found;
-                continue;
-            }
-            assert_eq!(
-                difference(&expected, &found),
-                None,
-                "on {ranks} × {threads}"
-            );
-        }
+    let path = folder.write("deck.toml", text);
+    let problem = deck::read(&path, &[]).and_then(|deck| deck.problem());
+    (path, problem.unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// What a deck is there for has happened.
+fn assert_events(found: &BTreeMap<String, Vec<u64>>, text: &str, must_break: bool) {
+    let last = |column: &str| {
+        let bits = found[&format!("history {column}")].last();
+        f64::from_bits(*bits.unwrap())
+    };
+    let broken = last("broken_bonds");
+    assert_eq!(broken > 0.0, must_break, "{broken} bonds broke");
+    if text.contains("[refinement.trigger]") {
+        let points = &found["history points"];
+        assert!(points.last() > points.first(), "no point was born");
+    }
+    if text.contains("coarsen_after") {
+        assert!(points_left(found), "no point has left");
+    }
+    if text.contains("yield_str") {
+        assert!(last("dissipated_energy") > 0.0, "nothing has yielded");
     }
 }
 
@@ -470,4 +505,24 @@ fn a_plate_relaxed_and_let_go() {
 #[test]
 fn fewer_points_than_ranks() {
     same_everywhere("few", FEW, false);
+}
+
+#[test]
+fn a_plate_of_two_materials_under_mpirun() {
+    same_under_mpirun("plate", PLATE, true);
+}
+
+#[test]
+fn a_plate_that_is_refined_while_it_is_torn_and_dealt_out_anew_under_mpirun() {
+    same_under_mpirun("growing", &growing(), true);
+}
+
+#[test]
+fn scattered_points_from_a_file_under_mpirun() {
+    same_under_mpirun("block", BLOCK, true);
+}
+
+#[test]
+fn fewer_points_than_ranks_under_mpirun() {
+    same_under_mpirun("few", FEW, false);
 }

@@ -1,14 +1,14 @@
 //! Fronts along lines and crack tips, as the history has them.
 
+use crate::support::history::{column, row};
 use crate::support::{displace, simulate, simulate_on};
 use fissure::solver::Simulation;
-use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::observers::HistoryObserver;
 
 /// The last entries of the present row: those of the fronts and tips.
 fn last<const D: usize, const N: usize>(simulation: &mut Simulation<D>) -> [f64; N] {
     let mut observer = HistoryObserver::new(simulation).unwrap_or_else(|error| panic!("{error}"));
-    let snapshot = Snapshot::new(simulation);
-    let values = observer.row(simulation, &snapshot).values;
+    let values = row(&mut observer, simulation).values;
     values[values.len() - N..].try_into().unwrap()
 }
 
@@ -121,25 +121,18 @@ fn a_tip_follows_a_cut_in_any_direction_on_any_number_of_ranks() {
 
 #[test]
 fn the_tip_of_a_running_crack() {
-    let deck = include_str!("../inputs/crack_branching.toml").to_owned()
+    let deck = include_str!("../../inputs/crack_branching.toml").to_owned()
         + "\n[history.tip.crack]\nfrom = [0, 0]\ndirection = [1, 0]\n";
     simulate::<2, _>(&deck, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let names: Vec<String> = observer
-            .columns()
-            .iter()
-            .map(|column| column.0.clone())
-            .collect();
-        let column = |name: &str| names.iter().position(|known| known == name).unwrap();
         let mut rows = Vec::new();
         while simulation.clock.number() < simulation.clock.last() {
             if simulation.clock.number() % 5 == 0 {
-                let snapshot = Snapshot::new(&mut simulation);
-                rows.push(observer.row(&mut simulation, &snapshot).values);
+                rows.push(row(&mut observer, &mut simulation).values);
             }
             simulation.advance();
         }
-        let of = |row: &[f64], name: &str| row[column(name)];
+        let of = |row: &[f64], name: &str| row[column(&observer, name)];
         for row in &rows {
             // The box around the cracked points knows nothing of the tip.
             let ahead = of(row, "tip_crack_length") - of(row, "cracked_upper_x");

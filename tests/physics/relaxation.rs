@@ -2,6 +2,7 @@
 //! the load steps; bonds break between equilibria, without the overshoot of a wave; it can be stopped
 //! within a load step and goes on to the same bits.
 
+use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
@@ -158,10 +159,7 @@ fn finds_the_static_solution_of_the_same_bonds() {
     let deck = plate_with_hole("load_steps = 1, tolerance = 1e-9");
     let (places, relaxed, work) = simulate(&deck, |mut simulation: Simulation<2>| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let mut row = |simulation: &mut Simulation<2>| {
-            let snapshot = Snapshot::new(simulation);
-            observer.row(simulation, &snapshot).energies
-        };
+        let mut row = |simulation: &mut Simulation<2>| row(&mut observer, simulation).energies;
         row(&mut simulation);
         to_the_end(&mut simulation);
         let model = &simulation.model;
@@ -330,8 +328,7 @@ fn a_body_that_is_carried_without_loads_comes_to_rest() {
         let rows = simulate_on::<2, _>(2, &deck, |mut simulation| {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
             to_the_end(&mut simulation);
-            let snapshot = Snapshot::new(&mut simulation);
-            let row = observer.row(&mut simulation, &snapshot);
+            let row = row(&mut observer, &mut simulation);
             let [sin, cos] = [libm::sin(0.3), libm::cos(0.3)];
             for point in 0..simulation.model.owned() {
                 let [x, y, _] = simulation.model.position(point);
@@ -400,8 +397,7 @@ fn a_strip_that_parts_in_its_first_load_step_carries_nothing_then() {
         let rows = simulate_on::<2, _>(ranks, PARTS_AT_ONCE, |mut simulation| {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
             to_the_end(&mut simulation);
-            let snapshot = Snapshot::new(&mut simulation);
-            let row = observer.row(&mut simulation, &snapshot);
+            let row = row(&mut observer, &mut simulation);
             let reaction = row.values[row.values.len() - 2];
             // Without the notch E h b ε = 1e9 · 1e-3 · 8e-3 · 3e-4 N.
             assert!(reaction.abs() < 1e-3 * 2.4, "{reaction}");
@@ -429,8 +425,7 @@ fn energies_of_load_steps(deck: &str) -> Vec<Energies> {
         let mut rows = Vec::new();
         while !simulation.is_over() {
             load_step(&mut simulation);
-            let snapshot = Snapshot::new(&mut simulation);
-            rows.push(observer.row(&mut simulation, &snapshot).energies);
+            rows.push(row(&mut observer, &mut simulation).energies);
         }
         rows
     })
@@ -559,17 +554,13 @@ const BAR: &str = "
 fn a_bar_breaks_when_it_must_and_carries_nothing_from_then_on() {
     simulate(BAR, |mut simulation: Simulation<1>| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let columns: Vec<String> = observer.columns().iter().map(|c| c.0.clone()).collect();
-        let find = |name: &str| columns.iter().position(|column| column == name).unwrap();
-        let (force, broken) = (find("reaction_right_x"), find("broken_bonds"));
-        let (residual, iterations) = (find("residual"), find("iterations"));
-        let mut rows = Vec::new();
-        let snapshot = Snapshot::new(&mut simulation);
-        rows.push(observer.row(&mut simulation, &snapshot).values);
+        let names = ["reaction_right_x", "broken_bonds", "residual", "iterations"];
+        let columns = names.map(|name| column(&observer, name));
+        let [force, broken, residual, iterations] = columns;
+        let mut rows = vec![row(&mut observer, &mut simulation).values];
         while !simulation.is_over() {
             load_step(&mut simulation);
-            let snapshot = Snapshot::new(&mut simulation);
-            rows.push(observer.row(&mut simulation, &snapshot).values);
+            rows.push(row(&mut observer, &mut simulation).values);
         }
         let first = rows.iter().position(|row| row[broken] > 0.0).unwrap();
         // Linear until then: 35 m between the outermost points that are held.

@@ -1,8 +1,9 @@
 //! Edge-on impact on ALON, Diehl & Schweitzer (2016): variants of the deck that are cheap enough here.
 //! What its fronts do at finer spacings stands in docs/eoi_alon.md.
 
+use crate::support::history::{column, row};
 use crate::support::simulate;
-use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::observers::HistoryObserver;
 
 const DENSITY: f64 = 3690.0;
 
@@ -13,7 +14,7 @@ fn classical() -> f64 {
 
 /// The deck with some of its lines changed.
 fn deck(changes: &[(&str, &str)]) -> String {
-    let mut text = include_str!("../inputs/eoi_alon.toml").to_owned();
+    let mut text = include_str!("../../inputs/eoi_alon.toml").to_owned();
     for (old, new) in changes {
         assert_eq!(text.matches(old).count(), 1, "{old}");
         text = text.replace(old, new);
@@ -28,16 +29,12 @@ type Row = [f64; 4];
 fn run(deck: &str) -> Vec<Row> {
     simulate::<3, _>(deck, |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let column = |name: &str| {
-            let mut names = observer.columns().iter().map(|column| &column.0);
-            names.position(|known| known == name).unwrap()
-        };
-        let columns = ["time", "front_wave", "front_damage", "tip_farthest_length"].map(column);
+        let names = ["time", "front_wave", "front_damage", "tip_farthest_length"];
+        let columns = names.map(|name| column(&observer, name));
         let mut rows = Vec::new();
         while simulation.clock.number() < simulation.clock.last() {
             simulation.advance();
-            let snapshot = Snapshot::new(&mut simulation);
-            let values = observer.row(&mut simulation, &snapshot).values;
+            let values = row(&mut observer, &mut simulation).values;
             rows.push(columns.map(|column| values[column]));
         }
         rows

@@ -7,6 +7,7 @@ use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 use nalgebra::{DMatrix, Matrix3, Matrix6, Rotation3, Vector3};
 
+use crate::support::history::{column, row};
 use crate::support::{displace, forces, simulate};
 
 const LAWS: [&str; 2] = ["correspondence", "bond_associated_correspondence"];
@@ -436,8 +437,7 @@ fn a_checkerboard_is_resisted_and_decays() {
     /// Kinetic and strain energy, J.
     fn energy(simulation: &mut Simulation<3>) -> f64 {
         let mut history = HistoryObserver::new(simulation).unwrap();
-        let snapshot = Snapshot::new(simulation);
-        let energies = history.row(simulation, &snapshot).energies;
+        let energies = row(&mut history, simulation).energies;
         energies.kinetic + energies.strain
     }
     let law = |more: &str| format!("youngs_modulus = 5, poisson_ratio = 0.3, damping = 0.5{more}");
@@ -517,11 +517,8 @@ fn check_singular_rows(name: &str, [below, above]: [f64; 2], size: usize, horizo
         }
         let mut history = HistoryObserver::new(&simulation).unwrap();
         let row = history.row(&mut simulation, &snapshot);
-        let columns = history.columns();
-        let column = columns
-            .iter()
-            .position(|column| column.0 == "singular_points");
-        assert_eq!(row.values[column.unwrap()], singular.iter().sum::<f64>());
+        let counted = row.values[column(&history, "singular_points")];
+        assert_eq!(counted, singular.iter().sum::<f64>());
     });
 }
 
@@ -553,10 +550,7 @@ fn a_plate_that_is_torn_keeps_its_energy_at_the_default_step() {
         );
         simulate::<2, _>(&text, |mut simulation| {
             let mut history = HistoryObserver::new(&simulation).unwrap();
-            let mut row = |simulation: &mut Simulation<2>| {
-                let snapshot = Snapshot::new(simulation);
-                history.row(simulation, &snapshot)
-            };
+            let mut row = |simulation: &mut Simulation<2>| row(&mut history, simulation);
             row(&mut simulation);
             while !simulation.is_over() {
                 simulation.advance();

@@ -17,7 +17,7 @@ const LARGE: usize = 1 << 20;
 fn a_panic_during_an_exchange_leaves_nothing_under_way() {
     if !is_rank(
         2,
-        "communicator::a_panic_during_an_exchange_leaves_nothing_under_way",
+        "parallel::communicator::a_panic_during_an_exchange_leaves_nothing_under_way",
     ) {
         return;
     }
@@ -40,7 +40,10 @@ fn a_panic_during_an_exchange_leaves_nothing_under_way() {
 
 #[test]
 fn large_messages_arrive_while_work_is_done() {
-    if !is_rank(2, "communicator::large_messages_arrive_while_work_is_done") {
+    if !is_rank(
+        2,
+        "parallel::communicator::large_messages_arrive_while_work_is_done",
+    ) {
         return;
     }
     let world = World::start().unwrap();

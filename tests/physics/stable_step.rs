@@ -1,9 +1,10 @@
 //! The stable step against the largest frequency that a body has.
 
+use crate::support::history::row;
 use crate::support::simulate;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
-use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::observers::HistoryObserver;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// A system of one body or two.
@@ -116,8 +117,7 @@ fn growth<const D: usize>(system: &System, step: f64, steps: u32) -> f64 {
     simulate::<D, _>(&system.rattled(step, steps), |mut simulation| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let mut energy = |simulation: &mut Simulation<D>| {
-            let snapshot = Snapshot::new(simulation);
-            let energies = observer.row(simulation, &snapshot).energies;
+            let energies = row(&mut observer, simulation).energies;
             energies.kinetic + energies.strain
         };
         let start = energy(&mut simulation);

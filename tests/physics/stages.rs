@@ -1,11 +1,12 @@
 //! Stages of a run: a body relaxed under a load stays at rest when its motion is followed, and springs
 //! back when the load is taken off; and bodies of another density move as they must.
 
+use crate::support::history::{column, row, rows_to_the_end};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
-use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
+use fissure::solver::observers::{Energies, HistoryObserver};
 
 /// A bar that is held at one end, pulled at the other, and then let go or not.
 fn bar(second: &str) -> String {
@@ -43,10 +44,7 @@ struct Seen {
 fn see(deck: &str) -> Seen {
     simulate(deck, |mut simulation: Simulation<1>| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let mut energies = |simulation: &mut Simulation<1>| {
-            let snapshot = Snapshot::new(simulation);
-            observer.row(simulation, &snapshot).energies
-        };
+        let mut energies = |simulation: &mut Simulation<1>| row(&mut observer, simulation).energies;
         let last = simulation.model.owned() - 1;
         energies(&mut simulation);
         while !(simulation.is_stage_over() && simulation.clock.number() > 0) {
@@ -142,13 +140,10 @@ fn a_body_of_nine_times_the_density_moves_a_third_as_fast() {
             while !simulation.is_over() {
                 simulation.advance();
             }
-            let snapshot = Snapshot::new(&mut simulation);
-            let row = observer.row(&mut simulation, &snapshot);
-            let columns = observer.columns().iter();
-            let ratio = columns
-                .zip(&row.values)
-                .find(|(column, _)| column.0 == "kinetic_ratio")
-                .map(|(_, value)| *value);
+            let row = row(&mut observer, &mut simulation);
+            let mut columns = observer.columns().iter();
+            let is_there = columns.any(|column| column.0 == "kinetic_ratio");
+            let ratio = is_there.then(|| row.values[column(&observer, "kinetic_ratio")]);
             let last = simulation.model.owned() - 1;
             let displacement = simulation.fields.displacement[0][last];
             (simulation.clock.step(), displacement, row.energies, ratio)
@@ -230,13 +225,6 @@ fn flying(damping: f64, support: &str) -> String {
     )
 }
 
-/// The values of a column of the history after each step.
-fn column(observer: &HistoryObserver, rows: &[Vec<f64>], name: &str) -> Vec<f64> {
-    let columns = observer.columns();
-    let index = columns.iter().position(|column| column.0 == name).unwrap();
-    rows.iter().map(|row| row[index]).collect()
-}
-
 #[test]
 fn a_change_of_density_keeps_momentum_and_books_energy() {
     for (damping, support, free) in [(0.0, "", true), (0.02, "", false), (0.02, GUIDE, false)] {
@@ -250,16 +238,11 @@ fn a_change_of_density_keeps_momentum_and_books_energy() {
         );
         simulate(&deck, |mut simulation: Simulation<2>| {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
-            let mut rows = Vec::new();
-            loop {
-                let snapshot = Snapshot::new(&mut simulation);
-                rows.push(observer.row(&mut simulation, &snapshot).values);
-                if simulation.is_over() {
-                    break;
-                }
-                simulation.advance();
-            }
-            let of = |name: &str| column(&observer, &rows, name);
+            let rows = rows_to_the_end(&mut observer, &mut simulation);
+            let of = |name: &str| -> Vec<f64> {
+                let column = column(&observer, name);
+                rows.iter().map(|row| row[column]).collect()
+            };
             let (kinetic, error) = (of("kinetic_energy"), of("energy_error"));
             let most = kinetic.iter().copied().fold(0.0, f64::max);
             let worst = error.iter().fold(0.0_f64, |worst, e| worst.max(e.abs()));

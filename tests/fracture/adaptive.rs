@@ -2,11 +2,12 @@
 //! less on the step, and it can be stopped at any step and goes on to the same bits on any ranks.
 
 use crate::support::command::{Folder, finish, fissure, text};
+use crate::support::history::{column, rows_to_the_end};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
 use fissure::solver::Simulation;
-use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::observers::HistoryObserver;
 
 /// A notched plate that is torn fast.
 fn torn(time: &str) -> String {
@@ -28,30 +29,16 @@ fn torn(time: &str) -> String {
 
 const RULE: &str = "adaptive = { most_broken = 3, stable_broken = 1, steps = 5 }";
 
-/// The rows of the history after each step, and the columns.
-fn rows(deck: &str) -> (Vec<String>, Vec<Vec<f64>>) {
-    simulate(deck, |mut simulation: Simulation<2>| {
-        let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let mut rows = Vec::new();
-        loop {
-            let snapshot = Snapshot::new(&mut simulation);
-            rows.push(observer.row(&mut simulation, &snapshot).values);
-            if simulation.is_over() {
-                break;
-            }
-            simulation.advance();
-        }
-        let columns = observer.columns().iter().map(|column| column.0.clone());
-        (columns.collect(), rows)
-    })
-}
-
 #[test]
 fn no_step_breaks_more_bonds_of_a_point_than_it_may() {
-    let (columns, rows) = rows(&torn(&format!("safety = 0.8, {RULE}")));
-    let find = |name: &str| columns.iter().position(|column| column == name).unwrap();
-    let (time, size) = (find("time"), find("time_step"));
-    let (undone, most) = (find("undone_steps"), find("most_broken_bonds"));
+    let deck = torn(&format!("safety = 0.8, {RULE}"));
+    let (rows, columns) = simulate(&deck, |mut simulation: Simulation<2>| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let rows = rows_to_the_end(&mut observer, &mut simulation);
+        let names = ["time", "time_step", "undone_steps", "most_broken_bonds"];
+        (rows, names.map(|name| column(&observer, name)))
+    });
+    let [time, size, undone, most] = columns;
     let last = rows.last().unwrap();
     assert!(last[undone] > 3.0, "{} steps undone", last[undone]);
     assert!((last[time] - 25.0).abs() < 1e-9, "ends at {}", last[time]);

@@ -4,6 +4,7 @@ use fissure::solver::Simulation;
 use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};
 
 use crate::support::command::{Folder, finish, fissure, succeed, text};
+use crate::support::history::column;
 use crate::support::{simulate, simulate_on};
 
 /// The branches of the only crack, and its columns of the history.
@@ -12,13 +13,8 @@ fn crack(simulation: &mut Simulation<2>) -> (Vec<Branch>, [f64; 2]) {
     let snapshot = Snapshot::new(simulation);
     let branches = observer.crack_paths(simulation, &snapshot).remove(0).1;
     let row = observer.row(simulation, &snapshot).values;
-    let names: Vec<&str> = observer
-        .columns()
-        .iter()
-        .map(|column| &column.0[..])
-        .collect();
-    let column = |name| row[names.iter().position(|known| *known == name).unwrap()];
-    let columns = ["crack_main_length", "crack_main_branches"].map(column);
+    let names = ["crack_main_length", "crack_main_branches"];
+    let columns = names.map(|name| row[column(&observer, name)]);
     (branches, columns)
 }
 
@@ -132,7 +128,7 @@ fn there_is_no_crack_before_there_is_damage() {
 #[test]
 fn the_branches_of_the_benchmark_are_found_written_and_drawn() {
     let folder = Folder::new("crack_paths");
-    let deck = include_str!("../inputs/crack_branching.toml").to_owned()
+    let deck = include_str!("../../inputs/crack_branching.toml").to_owned()
         + "\n[history.crack.main]\nfrom = [0, 0]\n";
     let deck = folder.write("branching.toml", &deck);
     let run = |ranks, out: &str| {

@@ -5,6 +5,7 @@ use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
+use crate::support::history::row;
 use crate::support::{forces, simulate};
 
 const YOUNG: f64 = 5.0;
@@ -300,10 +301,8 @@ fn the_energy_of_a_body_that_flows_is_balanced() {
         let of = |dimension: &str| {
             simulate::<2, _>(&deck(dimension, &more), |mut simulation| {
                 let mut observer = HistoryObserver::new(&simulation).unwrap();
-                let mut row = |simulation: &mut Simulation<2>| {
-                    let snapshot = Snapshot::new(simulation);
-                    observer.row(simulation, &snapshot).energies
-                };
+                let mut row =
+                    |simulation: &mut Simulation<2>| row(&mut observer, simulation).energies;
                 row(&mut simulation);
                 while simulation.clock.number() < simulation.clock.last() {
                     simulation.advance();

@@ -1,5 +1,5 @@
 //! Waves that travel: pulses through cubic lattices and standing waves in a bar, simulated and timed.
-//! `tests/elasticity.rs` holds the forces in such waves against closed forms.
+//! `tests/laws/elasticity.rs` holds the forces in such waves against closed forms.
 
 use std::collections::HashMap;
 

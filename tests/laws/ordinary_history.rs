@@ -5,6 +5,7 @@ use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
 
+use crate::support::history::{column, row};
 use crate::support::simulate;
 
 /// A block whose central point has a whole family of whole families.
@@ -250,15 +251,13 @@ fn torn(law: &str, safety: f64) -> [f64; 2] {
     );
     simulate(&deck, |mut simulation: Simulation<2>| {
         let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let columns: Vec<String> = observer.columns().iter().map(|c| c.0.clone()).collect();
-        let find = |name: &str| columns.iter().position(|column| column == name).unwrap();
         let wanted = [
             "energy_error",
             "external_work",
             "fracture_energy",
             "broken_bonds",
         ];
-        let wanted = wanted.map(find);
+        let wanted = wanted.map(|name| column(&observer, name));
         let [mut error, mut decrease, mut freed_before] = [0.0_f64; 3];
         let mut last = [0.0; 4];
         while !simulation.is_over() {
@@ -267,8 +266,7 @@ fn torn(law: &str, safety: f64) -> [f64; 2] {
                     simulation.advance();
                 }
             }
-            let snapshot = Snapshot::new(&mut simulation);
-            let row = observer.row(&mut simulation, &snapshot).values;
+            let row = row(&mut observer, &mut simulation).values;
             last = wanted.map(|column| row[column]);
             error = error.max(last[0].abs());
             decrease = decrease.max(freed_before - last[2]);

@@ -1,9 +1,10 @@
 //! The elastic–plastic law: one bond against its closed curve, work against energy and dissipation.
 
+use crate::support::history::row;
 use crate::support::{displace, force, forces, largest_force, simulate};
 use fissure::solver::Simulation;
 use fissure::solver::motion::Kept;
-use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::observers::HistoryObserver;
 
 /// Young's modulus (Pa) and the yield stretch of all bodies here.
 const MODULUS: f64 = 5.0;
@@ -261,12 +262,10 @@ fn energy_is_balanced_over_cycles_to_second_order() {
             let mut observer = HistoryObserver::new(&simulation).unwrap();
             let (mut largest, mut dissipated) = (0.0_f64, 0.0);
             // Errors count from the first row, in which the support moves already.
-            let snapshot = Snapshot::new(&mut simulation);
-            let start = observer.row(&mut simulation, &snapshot).energies.kinetic;
+            let start = row(&mut observer, &mut simulation).energies.kinetic;
             while !simulation.clock.is_over() {
                 simulation.advance();
-                let snapshot = Snapshot::new(&mut simulation);
-                let energies = observer.row(&mut simulation, &snapshot).energies;
+                let energies = row(&mut observer, &mut simulation).energies;
                 largest = largest.max(energies.error.abs());
                 assert!(energies.dissipated >= dissipated, "it never falls");
                 dissipated = energies.dissipated;

@@ -2,13 +2,13 @@
 
 use std::process::Command;
 
-use crate::support::command::{Folder, finish, fissure, succeed, text};
+use crate::support::command::{Folder, finish, fissure, skip, succeed, text};
 use fissure::output::ResultReader;
 
 #[test]
 fn vtk_and_h5py_agree() {
     let Ok(python) = std::env::var("FISSURE_PYTHON") else {
-        eprintln!("skipped: FISSURE_PYTHON does not name a Python with vtk, h5py and numpy");
+        skip("FISSURE_PYTHON does not name a Python with vtk, h5py and numpy");
         return;
     };
     let folder = Folder::new("readers");

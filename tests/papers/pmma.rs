@@ -4,6 +4,7 @@
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Branch, HistoryObserver, Snapshot};
 
+use crate::support::history::column;
 use crate::support::simulate_input;
 
 const SPACING: f64 = 2e-3;
@@ -29,18 +30,17 @@ struct Seen {
 fn look(observer: &mut HistoryObserver, simulation: &mut Simulation<2>, notch: &[usize]) -> Seen {
     let snapshot = Snapshot::new(simulation);
     let row = observer.row(simulation, &snapshot).values;
-    let names = observer.columns();
-    let column = |wanted: &str| row[names.iter().position(|(name, _)| name == wanted).unwrap()];
+    let of = |name: &str| row[column(observer, name)];
     let damage = |point: usize| snapshot.damage(&simulation.family_volume, point);
     let damaged = (0..simulation.model.owned())
         .filter(|point| damage(*point) > 0.35 && !notch.contains(point))
         .map(|point| simulation.model.position(point))
         .collect();
     Seen {
-        displacement: -column("probe_right_displacement_x"),
-        force: column("force_push"),
-        held: column("force_hold"),
-        length: column("crack_main_length"),
+        displacement: -of("probe_right_displacement_x"),
+        force: of("force_push"),
+        held: of("force_hold"),
+        length: of("crack_main_length"),
         damaged,
         branches: observer.crack_paths(simulation, &snapshot).remove(0).1,
     }

@@ -1,0 +1,128 @@
+//! What a run records, on ranks that are threads: no MPI is started and no file is written.
+
+use std::collections::BTreeMap;
+
+use fissure::comm::{Communicator, all_gather_many, threads};
+use fissure::problem::Problem;
+use fissure::solver::Simulation;
+use fissure::solver::observers::{HistoryObserver, Schedule, Snapshot};
+use fissure::solver::repartition::BalanceWatch;
+use rayon::ThreadPoolBuilder;
+
+use super::datasets::sorted;
+
+/// The outputs and rows of a run.
+#[derive(Default)]
+pub struct Recorded {
+    /// Names and bits as [`datasets`](super::datasets::datasets) reads them from the result of the command.
+    pub datasets: BTreeMap<String, Vec<u64>>,
+    /// Number of times that points changed their rank to balance the ranks.
+    pub repartitions: usize,
+}
+
+/// Runs a problem on `ranks` ranks with `threads` threads each.
+pub fn record(problem: &Problem, ranks: usize, threads: usize) -> Recorded {
+    let mut of_rank = threads::run(ranks, |comm| {
+        let pool = ThreadPoolBuilder::new().num_threads(threads);
+        let _pool = pool.use_current_thread().build().unwrap();
+        match problem.dimension.count() {
+            1 => run::<1>(problem, comm),
+            2 => run::<2>(problem, comm),
+            _ => run::<3>(problem, comm),
+        }
+    });
+    of_rank.swap_remove(0)
+}
+
+fn run<const D: usize>(problem: &Problem, comm: &dyn Communicator) -> Recorded {
+    let mut simulation = Simulation::<D>::new(problem, comm).unwrap();
+    let mut history = HistoryObserver::new(&simulation).unwrap();
+    let mut balance = BalanceWatch::new(&simulation);
+    let mut recorded = Recorded::default();
+    recorded.add(&mut simulation, &mut history);
+    while !simulation.is_over() {
+        if simulation.is_refinement_due() && simulation.refine().unwrap().is_some() {
+            history.follow(&simulation).unwrap();
+        }
+        simulation.advance_halfway();
+        if simulation.load_step.is_settled {
+            recorded.add(&mut simulation, &mut history);
+        }
+        if !simulation.is_over()
+            && let Some(done) = balance.look(&mut simulation).unwrap()
+        {
+            history.follow(&simulation).unwrap();
+            recorded.repartitions += usize::from(done.moved > 0);
+        }
+    }
+    simulation.check().unwrap();
+    recorded
+}
+
+impl Recorded {
+    /// Adds what is due after the present step. Collective.
+    fn add<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        history: &mut HistoryObserver,
+    ) {
+        let (problem, clock) = (simulation.problem, simulation.clock);
+        let output = Schedule(problem.output.every).is_due(&clock);
+        let row = Schedule(problem.row_interval()).is_due(&clock);
+        if !output && !row {
+            return;
+        }
+        let snapshot = Snapshot::new(simulation);
+        if row {
+            let values = history.row(simulation, &snapshot).values;
+            for ((name, _), value) in history.columns().iter().zip(values) {
+                self.push(format!("history {name}"), value.to_bits());
+            }
+        }
+        if output {
+            self.add_output(simulation, &snapshot);
+            self.push("times".to_owned(), clock.time().to_bits());
+            self.push("steps".to_owned(), clock.number());
+            simulation.fields.forget_newly_broken();
+        }
+    }
+
+    fn push(&mut self, name: String, bits: u64) {
+        self.datasets.entry(name).or_default().push(bits);
+    }
+
+    fn add_output<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        snapshot: &Snapshot,
+    ) {
+        let (problem, comm, model) = (simulation.problem, simulation.comm, &simulation.model);
+        let owned = model.owned();
+        let ids = all_gather_many(comm, &model.ids[..owned]);
+        let number = self.datasets.get("times").map_or(0, Vec::len);
+        let mut add = |name: &str, values: &[f64]| {
+            let values = sorted(&ids, &all_gather_many(comm, values));
+            self.datasets.insert(format!("{name} {number}"), values);
+        };
+        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
+        add("positions", &places);
+        let own_ids: Vec<f64> = model.ids[..owned].iter().map(|id| *id as f64).collect();
+        add("id", &own_ids);
+        add(
+            "volume",
+            &model.volume.iter().take(owned).collect::<Vec<_>>(),
+        );
+        let blocks = || model.block.iter().map(|block| usize::from(*block));
+        let bodies: Vec<f64> = blocks()
+            .map(|block| problem.body_of(block) as f64)
+            .collect();
+        add("block", &bodies);
+        if problem.refinement.is_some() {
+            let levels = blocks().map(|block| f64::from(problem.block(block).level));
+            add("level", &levels.collect::<Vec<_>>());
+        }
+        for field in problem.output.fields.clone() {
+            add(field.name(), &snapshot.field(simulation, field));
+        }
+    }
+}
