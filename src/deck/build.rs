@@ -1,9 +1,8 @@
-//! Plans made in Rust, without a deck.
+//! Problems made in Rust, without a deck.
 
 use super::history::DEFAULT_DAMAGE_THRESHOLD;
 use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS, STEPS_A_ROW};
 use super::resolve::ALL_VARIABLES;
-use super::source::Source;
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
@@ -23,7 +22,6 @@ impl Problem {
     /// does not say more.
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
-            source: Source::default(),
             warnings: Vec::new(),
             places: Places::default(),
             title: String::new(),

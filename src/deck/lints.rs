@@ -8,8 +8,7 @@ use toml::Value;
 use super::build::changes_density_scale;
 use super::grammar::{Deck, Tables};
 use super::resolve::Scope;
-use super::source::Source;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 use crate::expression::Expression;
 use crate::message::format_number;
 use crate::problem::{Problem, Selector};
@@ -18,9 +17,8 @@ use crate::problem::{Problem, Selector};
 ///
 /// # Errors
 /// When the deck cannot be written out to look for names.
-pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String>> {
-    let source = scope.source;
-    let mut warnings = unused_parameters(source, deck)?;
+pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warning>> {
+    let mut warnings = unused_parameters(deck)?;
     warnings.extend(unused(scope, "material", &deck.material));
     warnings.extend(unused(scope, "damage", &deck.damage));
     warnings.extend(unused(scope, "set", &deck.set));
@@ -33,7 +31,7 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String
                  a comparison is missing",
                 set.name
             );
-            warnings.push(source.warning(set.span.clone(), message));
+            warnings.push(Warning::new(message).at(&set.span));
         }
     }
     let pairs = problem.stages.windows(2).zip(deck.stage.iter().skip(1));
@@ -47,24 +45,24 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String
             format_number(pair[0].time.end),
             format_number(before / after),
         );
-        warnings.push(source.warning(table.span(), message));
+        warnings.push(Warning::new(message).at(&table.span()));
     }
     Ok(warnings)
 }
 
 /// A warning for each table of a section that no other part of the deck refers to.
-fn unused<T>(scope: &Scope, section: &'static str, tables: &Tables<T>) -> Vec<String> {
+fn unused<T>(scope: &Scope, section: &'static str, tables: &Tables<T>) -> Vec<Warning> {
     let used = scope.used.borrow();
     let is_unused = |name: &String| !used.contains(&(section, name.clone()));
     let unused = tables.iter().filter(|(name, _)| is_unused(name));
     let warning = |(name, table): (&String, &Spanned<T>)| {
         let message = format!("[{section}.{name}]: nothing in the deck uses it");
-        scope.source.warning(table.span(), message)
+        Warning::new(message).at(&table.span())
     };
     unused.map(warning).collect()
 }
 
-fn unused_parameters(source: &Source, deck: &Deck) -> Result<Vec<String>> {
+fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
     let mut used = IndexSet::new();
     let mut rest = deck.clone();
     // The title is no expression.
@@ -78,7 +76,7 @@ fn unused_parameters(source: &Source, deck: &Deck) -> Result<Vec<String>> {
         .filter(|name| !used.contains(name.get_ref()));
     let warning = |name: &super::grammar::Text| {
         let message = format!("[parameters] {}: no expression uses it", name.get_ref());
-        source.warning(name.span(), message)
+        Warning::new(message).at(&name.span())
     };
     Ok(unused.map(warning).collect())
 }
@@ -115,7 +113,9 @@ time.end = 1
         });
         let deck = deck.unwrap_or_else(|error| panic!("{error}"));
         let problem = deck.problem().unwrap_or_else(|error| panic!("{error}"));
-        problem.warnings
+        let warnings = problem.warnings.into_iter();
+        let located = warnings.map(|warning| deck.locate_warning(warning).message);
+        located.collect()
     }
 
     #[test]

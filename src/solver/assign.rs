@@ -85,7 +85,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let by_work = breaks_by_work(body, damage);
     let error = |message: String| {
         let message = format!("[body.{}] damage: {message}", body.name);
-        Err(problem.source.error(body.span.clone(), message))
+        Err(Error::input(message).at(&body.span))
     };
     let meets = |other: &Body| problem.interface.between(body, other) != InterfaceRule::None;
     let of_other_kind = problem.bodies.iter().find(|other| {

@@ -14,7 +14,6 @@ pub fn alone(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
     // It is never moved by steps.
     body.material.damping = 0.0;
     let mut alone = Problem {
-        source: problem.source.clone(),
         volume_correction: problem.volume_correction,
         quadrature: problem.quadrature,
         family: problem.family,
