@@ -5,10 +5,10 @@ use toml::{Table, Value};
 
 use super::Deck;
 use super::number::Written;
-use super::resolve::{ALL_VARIABLES, Scope};
+use super::resolve::Scope;
 use super::source::Source;
 use crate::error::{Error, Result};
-use crate::expression::Expression;
+use crate::expression::{Expression, POSITION_AND_TIME};
 
 /// Sections that a restart may change. Parameters count where they are used.
 const FREE: [&str; 6] = [
@@ -144,7 +144,7 @@ impl Comparison<'_> {
         };
         let number = Spanned::new(0..0, written);
         self.scopes[deck]
-            .expression(&number, "", &ALL_VARIABLES)
+            .expression(&number, "", &POSITION_AND_TIME)
             .ok()
     }
 }

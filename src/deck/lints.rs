@@ -5,13 +5,12 @@ use indexmap::IndexSet;
 use serde_spanned::Spanned;
 use toml::Value;
 
-use super::build::changes_density_scale;
 use super::grammar::{Deck, Tables};
 use super::resolve::Scope;
 use crate::error::{Error, Result, Warning};
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::problem::{Problem, Selector};
+use crate::problem::{Problem, Selector, changes_density_scale};
 
 /// A warning for each of them. `scope` is that of the validated deck.
 ///

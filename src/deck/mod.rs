@@ -1,7 +1,6 @@
 //! Decks: the TOML file that describes a run, from its text to a validated [`Problem`].
 
 mod bodies;
-mod build;
 mod conditions;
 mod damage;
 mod difference;

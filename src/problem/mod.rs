@@ -7,6 +7,7 @@
 
 mod blocks;
 mod bodies;
+mod build;
 mod conditions;
 pub mod law;
 mod outputs;
