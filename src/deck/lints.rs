@@ -2,10 +2,9 @@
 //! change the mass of moving points.
 
 use indexmap::IndexSet;
-use serde_spanned::Spanned;
 use toml::Value;
 
-use super::grammar::{Deck, Tables};
+use super::grammar::{Deck, NamedTable, Section};
 use super::resolve::Scope;
 use crate::error::{Error, Result, Warning};
 use crate::expression::Expression;
@@ -18,9 +17,7 @@ use crate::problem::{Problem, Selector, changes_density_scale};
 /// When the deck cannot be written out to look for names.
 pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warning>> {
     let mut warnings = unused_parameters(deck)?;
-    warnings.extend(unused(scope, "material", &deck.material));
-    warnings.extend(unused(scope, "damage", &deck.damage));
-    warnings.extend(unused(scope, "set", &deck.set));
+    warnings.extend(unused(scope, deck));
     for set in &problem.sets {
         if let Selector::Where(condition) = &set.selector
             && !condition.is_condition()
@@ -49,16 +46,21 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
     Ok(warnings)
 }
 
-/// A warning for each table of a section that no other part of the deck refers to.
-fn unused<T>(scope: &Scope, section: &'static str, tables: &Tables<T>) -> Vec<Warning> {
+/// A warning for each table that is there to be referred to, and that no other part of the deck refers to.
+fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let used = scope.used.borrow();
-    let is_unused = |name: &String| !used.contains(&(section, name.clone()));
-    let unused = tables.iter().filter(|(name, _)| is_unused(name));
-    let warning = |(name, table): (&String, &Spanned<T>)| {
+    let mut tables = deck.named_tables();
+    tables.retain(|table| {
+        let section = Section::find(table.section);
+        section.is_some_and(|section| section.is_referred_to)
+            && !used.contains(&(table.section, table.name.to_owned()))
+    });
+    let warning = |table: &NamedTable| {
+        let (section, name) = (table.section, table.name);
         let message = format!("[{section}.{name}]: nothing in the deck uses it");
-        Warning::new(message).at(&table.span())
+        Warning::new(message).at(&table.span)
     };
-    unused.map(warning).collect()
+    tables.iter().map(warning).collect()
 }
 
 fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
