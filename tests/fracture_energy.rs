@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use fissure::comm::threads::alone;
 use fissure::solver::Simulation;
-use fissure::survey::{calibrated, separation_energy_ratio};
+use fissure::solver::calibration::{calibrated, separation_energy_ratio};
 
 use crate::support::{displace, problem, simulate};
 

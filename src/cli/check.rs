@@ -6,9 +6,10 @@ use fissure::deck::{self, Deck};
 use fissure::error::Result;
 use fissure::problem::Problem;
 use fissure::solver::assign::cutoffs;
+use fissure::solver::calibration::calibrated;
 use fissure::solver::size::is_feasible;
 use fissure::solver::steps::{choose_steps, even_clock};
-use fissure::survey::{Cost, Interior, Size, calibrated, interior, look, size};
+use fissure::survey::{Cost, Interior, Size, interior, look, size};
 
 use super::check_report as say;
 use super::report::Report;

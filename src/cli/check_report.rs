@@ -10,7 +10,8 @@ use fissure::error::Warning;
 use fissure::problem::Problem;
 use fissure::problem::{Block, Body, DamageRule, PointSource, Sense, Time};
 use fissure::solver::assign::block_laws;
-use fissure::survey::{BodyFigures, Cost, Interior, Survey, separation_energy_ratio};
+use fissure::solver::calibration::separation_energy_ratio;
+use fissure::survey::{BodyFigures, Cost, Interior, Survey};
 
 use super::format::{bytes, count, duration, si};
 use super::report::Report;

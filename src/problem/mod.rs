@@ -12,6 +12,7 @@ mod conditions;
 pub mod law;
 mod outputs;
 mod refinement;
+pub mod single_body;
 mod time;
 
 use std::ops::Range;

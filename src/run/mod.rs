@@ -52,9 +52,10 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::problem::Problem;
 use crate::solver::Simulation;
+use crate::solver::calibration::calibrated;
 use crate::solver::observers::{ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
-use crate::survey::{Survey, calibrated};
+use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;

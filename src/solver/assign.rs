@@ -101,7 +101,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         ));
     }
     if damage.rule.is_unmeasured() {
-        let message = "what opening the body costs has not been measured: take the problem that `survey::calibrated` returns";
+        let message = "what opening the body costs has not been measured: take the problem that `solver::calibration::calibrated` returns";
         return error(message.to_owned());
     }
     let by_energy = damage.rule != DamageRule::CriticalStretch;

@@ -3,23 +3,18 @@
 //! the same.
 
 mod bodies;
-mod calibrated;
 mod cost;
 mod interior;
 mod loads;
 mod look;
 pub mod memory;
-mod parting;
-mod single_body;
 mod size;
 mod speed;
 
 pub use bodies::BodyFigures;
-pub use calibrated::calibrated;
 pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
 pub use look::{Look, look};
-pub use parting::separation_energy_ratio;
 pub use size::{Size, size};
 pub use speed::{Speed, speed};
 

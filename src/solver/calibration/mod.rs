@@ -1,11 +1,13 @@
 //! Damage whose critical work is to follow from what opening a body costs.
 
+mod separation;
+
 use std::borrow::Cow;
 
 use crate::error::{Error, Result};
 use crate::problem::{Calibration, DamageRule, Problem};
 
-use super::parting::separation_energy_ratio;
+pub use separation::separation_energy_ratio;
 
 /// The problem with what opening its bodies costs, where their damage is calibrated by it.
 ///
