@@ -122,6 +122,8 @@ fn run_unlocated(
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
     let calibrated = calibrated(problem)?;
+    let explained = options.deck.as_ref().map(Deck::explain).transpose();
+    let explained = agree(comm, explained)?;
     let files = Files::new(options.folder.clone());
     // Taken before anything is looked at, and kept until the end.
     let prepared = match comm.rank() {
@@ -134,8 +136,6 @@ fn run_unlocated(
         _ => Ok(None),
     };
     let _lock = agree(comm, prepared)?;
-    let explained = options.deck.as_ref().map(Deck::explain).transpose();
-    let explained = agree(comm, explained)?;
     let mut job = Job {
         problem: &calibrated,
         comm,
