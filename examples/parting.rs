@@ -14,7 +14,7 @@ use fissure::problem::{
     Calibration, Damage, DamageRule, Law, Material, Problem, Sense, Shape, Toughness, WorkMeasure,
     WorkRule,
 };
-use fissure::survey::separation_energy_ratio;
+use fissure::solver::calibration::separation_energy_ratio;
 
 /// Horizon over spacing.
 const RATIO: f64 = 4.0;
@@ -80,7 +80,7 @@ pub fn body(law: &str, poisson_ratio: f64, rule: DamageRule) -> Result<Problem> 
     };
     let material = Material::new(Law::named(law)?, 1.0, elastic);
     let damage = Damage::new(rule, Toughness::FractureEnergy(2.0));
-    // The survey makes a block of its own size of it.
+    // What is parted is a block of its lattice, of a size of its own.
     let cell = Shape::Box {
         lower: [0.0; 3],
         upper: [1.0, 1.0, 0.0],

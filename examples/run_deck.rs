@@ -37,7 +37,7 @@ pub fn run_deck(deck: &Path, folder: &Path, comm: &dyn Communicator) -> Result<O
     let problem = agree(comm, deck.problem())?;
     let mut options = Options::new(folder);
     options.existing = Existing::Replace;
-    options.deck = Some(agree(comm, deck.explain())?);
+    options.deck = Some(deck);
     fissure::run(&problem, comm, options, &mut Unobserved)
 }
 

@@ -1,6 +1,10 @@
-//! The one error type: what went wrong, in words a user can act on, and whose fault it is.
+//! The one error type: what went wrong, in words a user can act on, and whose fault it is; and warnings.
+//!
+//! Both may name bytes of the deck by a span. [`Deck::locate`](crate::deck::Deck::locate) turns it into file,
+//! line and column.
 
 use std::fmt;
+use std::ops::Range;
 
 /// Whose fault an error is; it decides the process's exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,13 +18,24 @@ pub enum ErrorKind {
     Stopped,
 }
 
-/// An error with a message that names the file, the place and what would be right.
+/// An error with a message that names the key or the file, and what would be right.
 #[derive(Debug, Clone)]
 pub struct Error {
     /// Whose fault it is.
     pub kind: ErrorKind,
     /// The message, without a leading `error:`; may span several lines.
     pub message: String,
+    /// Bytes of the deck that are wrong, unless the message names them.
+    pub span: Option<Range<usize>>,
+}
+
+/// Something that is allowed but most likely not meant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// The message, without a leading `warning:`; one line.
+    pub message: String,
+    /// Bytes of the deck that it is about, unless the message names them.
+    pub span: Option<Range<usize>>,
 }
 
 /// The result of anything that can fail.
@@ -46,27 +61,34 @@ pub fn excerpt(text: &str) -> String {
 }
 
 impl Error {
+    fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
+        Self {
+            kind,
+            message: message.into(),
+            span: None,
+        }
+    }
+
     /// A wrong deck or wrong arguments.
     pub fn input(message: impl Into<String>) -> Self {
-        Self {
-            kind: ErrorKind::Input,
-            message: message.into(),
-        }
+        Self::new(ErrorKind::Input, message)
     }
 
     /// A run that failed.
     pub fn run(message: impl Into<String>) -> Self {
-        Self {
-            kind: ErrorKind::Run,
-            message: message.into(),
-        }
+        Self::new(ErrorKind::Run, message)
     }
 
     /// A run that a signal has ended before its first step.
     pub fn stopped(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Stopped, message)
+    }
+
+    /// The error, about these bytes of the deck.
+    pub fn at(self, span: &Range<usize>) -> Self {
         Self {
-            kind: ErrorKind::Stopped,
-            message: message.into(),
+            span: Some(span.clone()),
+            ..self
         }
     }
 
@@ -93,6 +115,30 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+impl Warning {
+    /// A warning that names no place in the deck.
+    pub fn new(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            span: None,
+        }
+    }
+
+    /// The warning, about these bytes of the deck.
+    pub fn at(self, span: &Range<usize>) -> Self {
+        Self {
+            span: Some(span.clone()),
+            ..self
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.message)
+    }
+}
 
 #[cfg(test)]
 mod tests {

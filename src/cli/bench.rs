@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::ValueEnum;
 use fissure::comm::mpi::World;
 use fissure::comm::{self, Communicator, agree};
-use fissure::deck::{self, Source};
+use fissure::deck::{Deck, Source};
 use fissure::error::Result;
 use fissure::survey::memory::{Resident, resident};
 use fissure::survey::speed;
@@ -164,12 +164,12 @@ pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
 
 fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<Figures> {
     let before = resident();
-    let source = Source {
+    let deck = Deck::new(Source {
         path: "benchmark.toml".into(),
         text: deck(arguments),
-    };
-    let problem = deck::parse(&source)?;
-    let speed = speed(&problem, world, warm_up(arguments), arguments.steps)?;
+    })?;
+    let speed = speed(&deck.problem()?, world, warm_up(arguments), arguments.steps);
+    let speed = speed.map_err(|error| deck.locate(error))?;
 
     let total = |value: u64| comm::total(world, value) as f64;
     let largest = |value: f64| {

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use fissure::deck;
+use fissure::deck::{self, Deck};
 use fissure::error::Result;
 use fissure::problem::Problem;
 use fissure::solver::assign::cutoffs;
+use fissure::solver::calibration::calibrated;
 use fissure::solver::size::is_feasible;
 use fissure::solver::steps::{choose_steps, even_clock};
-use fissure::survey::{Cost, Interior, Size, calibrated, interior, look, size};
+use fissure::survey::{Cost, Interior, Size, interior, look, size};
 
 use super::check_report as say;
 use super::report::Report;
@@ -31,25 +32,16 @@ pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     })
 }
 
-fn check_one(deck: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
-    let problem = deck::read(deck, &arguments.set)?.problem()?;
+fn check_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
+    let deck = deck::read(path, &arguments.set)?;
     let asked = Asked {
-        deck,
+        path,
+        deck: &deck,
         ranks: arguments.ranks,
         // Nobody reads the speed of a deck that is only to be right.
         trial: verbosity != Verbosity::Quiet,
     };
-    is_feasible(&problem, &cutoffs(&problem), arguments.ranks as usize)?;
-    let problem = calibrated(&problem)?;
-    let size = size(&problem)?;
-    let few = size.cells <= MOST_CELLS
-        && size.all_points() <= MOST_POINTS
-        && size.directed_bonds() <= MOST_BONDS;
-    let report = if few {
-        look_at(&problem, &asked)?
-    } else {
-        estimate(&problem, &asked, &size)?
-    };
+    let report = report(&asked).map_err(|error| deck.locate(error))?;
     if verbosity == Verbosity::Quiet {
         return Ok(());
     }
@@ -58,10 +50,28 @@ fn check_one(deck: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> R
 
 /// What is asked about a deck.
 struct Asked<'a> {
-    deck: &'a Path,
+    path: &'a Path,
+    deck: &'a Deck,
     ranks: u32,
     /// Whether some steps are made to know their speed.
     trial: bool,
+}
+
+/// The figures of a deck; errors name places in it by spans.
+fn report(asked: &Asked) -> Result<Report> {
+    let problem = asked.deck.problem()?;
+    let ranks = asked.ranks as usize;
+    is_feasible(&problem, &cutoffs(&problem), ranks)?;
+    let problem = calibrated(&problem)?;
+    let size = size(&problem)?;
+    let few = size.cells <= MOST_CELLS
+        && size.all_points() <= MOST_POINTS
+        && size.directed_bonds() <= MOST_BONDS;
+    if few {
+        look_at(&problem, asked)
+    } else {
+        estimate(&problem, asked, &size)
+    }
 }
 
 /// What a point inside each body is like, where that can be found.
@@ -77,7 +87,7 @@ fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
     let (survey, dimension) = (&look.survey, problem.dimension.count());
     let interiors = interiors(problem);
     let mut report = Report::default();
-    say::heading(&mut report, problem, asked.deck);
+    say::heading(&mut report, problem, asked.path);
     for (index, body) in problem.bodies.iter().enumerate() {
         say::body(&mut report, problem, body);
         say::figures(&mut report, body, &survey.bodies[index], dimension);
@@ -101,9 +111,7 @@ fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
     if let Some(seconds) = look.seconds {
         say::run_time(&mut report, problem, &look.steps, seconds, asked.ranks);
     }
-    for warning in &survey.warnings {
-        report.say(format_args!("warning: {warning}"));
-    }
+    say::warnings(&mut report, asked.deck, &survey.warnings);
     Ok(report)
 }
 
@@ -111,7 +119,7 @@ fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
 fn estimate(problem: &Problem, asked: &Asked, size: &Size) -> Result<Report> {
     let interiors = interiors(problem);
     let mut report = Report::default();
-    say::heading(&mut report, problem, asked.deck);
+    say::heading(&mut report, problem, asked.path);
     for (index, body) in problem.bodies.iter().enumerate() {
         say::body(&mut report, problem, body);
         report.line("points", format_args!("about {:.3e}", size.points[index]));
@@ -135,8 +143,6 @@ fn estimate(problem: &Problem, asked: &Asked, size: &Size) -> Result<Report> {
         say::steps(&mut report, problem, &steps);
     }
     report.say("sets, cracks and probes are not looked at");
-    for warning in &problem.warnings {
-        report.say(format_args!("warning: {warning}"));
-    }
+    say::warnings(&mut report, asked.deck, &problem.warnings);
     Ok(report)
 }

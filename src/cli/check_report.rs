@@ -4,11 +4,14 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use fissure::damage::DamageLaw;
+use fissure::deck::Deck;
 use fissure::dimension::Dimension;
+use fissure::error::Warning;
 use fissure::problem::Problem;
 use fissure::problem::{Block, Body, DamageRule, PointSource, Sense, Time};
 use fissure::solver::assign::block_laws;
-use fissure::survey::{BodyFigures, Cost, Interior, Survey, separation_energy_ratio};
+use fissure::solver::calibration::separation_energy_ratio;
+use fissure::survey::{BodyFigures, Cost, Interior, Survey};
 
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
@@ -25,6 +28,14 @@ pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
         report.line("constraint", constraint);
     }
     report.line("horizon", si(problem.horizon, "m"));
+}
+
+/// What is allowed but most likely not meant.
+pub fn warnings(report: &mut Report, deck: &Deck, warnings: &[Warning]) {
+    for warning in warnings {
+        let warning = deck.locate_warning(warning.clone());
+        report.say(format_args!("warning: {warning}"));
+    }
 }
 
 /// What the deck says of a body.

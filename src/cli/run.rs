@@ -44,7 +44,6 @@ fn run_deck(
 ) -> Result<Outcome> {
     let deck = agree(world, deck::read(&arguments.deck, &arguments.set))?;
     let problem = agree(world, deck.problem())?;
-    let explained = agree(world, deck.explain())?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;
     let speaks = world.rank() == 0 && verbosity > Verbosity::Quiet;
@@ -66,7 +65,7 @@ fn run_deck(
         wall_time: arguments.wall_time,
         started,
         signals: Some(signals),
-        deck: Some(explained),
+        deck: Some(deck),
         attributes: vec![
             ("command_line", command_line.join(" ")),
             ("hosts", hosts.to_string()),

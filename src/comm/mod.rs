@@ -118,24 +118,37 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     if first[0] == none {
         return result;
     }
-    let mut packed = match &result {
-        Err(error) => {
-            let mut bytes = vec![error.exit_code()];
-            bytes.extend_from_slice(error.message.as_bytes());
-            bytes
-        }
-        Ok(_) => Vec::new(),
-    };
+    let mut packed = result.err().map_or(Vec::new(), |error| pack(&error));
     comm.broadcast(first[0] as usize, &mut packed);
-    let kind = match packed[0] {
-        2 => ErrorKind::Input,
-        75 => ErrorKind::Stopped,
-        _ => ErrorKind::Run,
-    };
-    Err(Error {
-        kind,
-        message: String::from_utf8_lossy(&packed[1..]).into_owned(),
-    })
+    Err(unpack(&packed))
+}
+
+/// The span of a packed error that has none.
+const NO_SPAN: [u64; 2] = [u64::MAX; 2];
+
+/// Bytes of a packed error before its message: the exit code, and start and end of the span.
+const HEADER: usize = 1 + size_of::<[u64; 2]>();
+
+/// An error as bytes, to be sent.
+fn pack(error: &Error) -> Vec<u8> {
+    let span = error.span.as_ref();
+    let span = span.map_or(NO_SPAN, |span| [span.start as u64, span.end as u64]);
+    let code = [error.exit_code()];
+    [&code, bytemuck::bytes_of(&span), error.message.as_bytes()].concat()
+}
+
+fn unpack(packed: &[u8]) -> Error {
+    let (header, message) = packed.split_at(HEADER);
+    let span: [u64; 2] = bytemuck::pod_read_unaligned(&header[1..]);
+    Error {
+        kind: match header[0] {
+            2 => ErrorKind::Input,
+            75 => ErrorKind::Stopped,
+            _ => ErrorKind::Run,
+        },
+        message: String::from_utf8_lossy(message).into_owned(),
+        span: (span != NO_SPAN).then(|| span[0] as usize..span[1] as usize),
+    }
 }
 
 #[cfg(test)]
@@ -143,18 +156,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_ranks_leave_with_the_lowest_failing_ranks_message() {
-        let messages = threads::run(4, |comm| {
-            let result = if comm.rank() >= 2 {
-                Err(Error::input(format!("rank {} failed", comm.rank())))
-            } else {
-                Ok(())
-            };
-            agree(comm, result).unwrap_err()
-        });
-        for error in messages {
-            assert_eq!(error.message, "rank 2 failed");
-            assert_eq!(error.kind, ErrorKind::Input);
+    fn all_ranks_leave_with_the_lowest_failing_ranks_error() {
+        for span in [None, Some(3..5), Some(0..0)] {
+            let errors = threads::run(4, |comm| {
+                let rank = comm.rank();
+                let error = Error {
+                    span: span.clone(),
+                    ..Error::input(format!("rank {rank} failed"))
+                };
+                agree(comm, if rank >= 2 { Err(error) } else { Ok(()) }).unwrap_err()
+            });
+            for error in errors {
+                assert_eq!(error.message, "rank 2 failed");
+                assert_eq!(error.kind, ErrorKind::Input);
+                assert_eq!(error.span, span);
+            }
         }
     }
 

@@ -15,7 +15,7 @@ pub enum Calibration {
     /// So that all bonds across a unit area take it.
     Energy,
     /// So that opening a crack costs it: as [`Self::Energy`], over the share of the fracture energy that opening costs
-    /// then. It is measured before a run, by [`crate::survey::calibrated`].
+    /// then. It is measured before a run, by [`crate::solver::calibration::calibrated`].
     Opening(Option<f64>),
     /// As Willberg et al. 2022 print it in eq. 16 and 18: their w has no ½, and in the plane their w_c
     /// is 3G0/(πδ³h). Their w is the work on η, so that it holds for small rotations only.

@@ -4,10 +4,10 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck};
 use super::number::Vector;
-use super::resolve::{ALL_VARIABLES, POSITION, Scope};
+use super::resolve::Scope;
 use super::sets::find_set;
 use crate::error::Result;
-use crate::expression::Expression;
+use crate::expression::{Expression, POSITION, POSITION_AND_TIME};
 use crate::problem::{self, Action};
 
 /// Validates the initial values.
@@ -115,7 +115,7 @@ fn action(
         }
     };
     let expressions = |vector, name: &str| -> Result<Vec<Expression>> {
-        scope.expressions(vector, &format!("{key} {name}"), &ALL_VARIABLES)
+        scope.expressions(vector, &format!("{key} {name}"), &POSITION_AND_TIME)
     };
     if let Some(vector) = &condition.displacement {
         return scope
@@ -150,7 +150,7 @@ fn action(
     };
     let direction = scope.direction(normal, &format!("{key} normal"))?;
     let depth = depth(pressure.span())?;
-    let value = scope.expression(pressure, &format!("{key} pressure"), &ALL_VARIABLES)?;
+    let value = scope.expression(pressure, &format!("{key} pressure"), &POSITION_AND_TIME)?;
     let factors = direction[..scope.dimension].iter().map(|n| -n / depth);
     Ok(Action::BodyForce(
         vec![value; scope.dimension],

@@ -4,30 +4,18 @@ use serde_spanned::Spanned;
 use toml::{Table, Value};
 
 use super::Deck;
+use super::grammar::{Restart, Section};
 use super::number::Written;
-use super::resolve::{ALL_VARIABLES, Scope};
+use super::resolve::Scope;
 use super::source::Source;
 use crate::error::{Error, Result};
-use crate::expression::Expression;
-
-/// Sections that a restart may change. Parameters count where they are used.
-const FREE: [&str; 6] = [
-    "title",
-    "parameters",
-    "output",
-    "history",
-    "checkpoint",
-    "balance",
-];
+use crate::expression::{Expression, POSITION_AND_TIME};
 
 /// Keys within sections that a restart may change.
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
 /// Keys of the history that say how often there is a row.
 const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
-
-/// Sections in which the order counts: later entries take precedence over earlier ones.
-const ORDERED: [&str; 3] = ["body", "initial", "condition"];
 
 /// What differs in the physics of two decks, both with every default filled in: a line for each key
 /// with its old and its new value.
@@ -90,18 +78,19 @@ struct Comparison<'a> {
 
 impl Comparison<'_> {
     fn compare(&mut self, key: &str, old: Option<&Value>, new: Option<&Value>) {
-        if FREE.contains(&key) || FREE_KEYS.contains(&key) {
+        let restart = Section::find(key).map(|section| section.restart);
+        if restart == Some(Restart::Free) || FREE_KEYS.contains(&key) {
             return;
         }
         match (old, new) {
-            // A set counts where it is used: what it is is compared if both decks have it.
-            (None, _) | (_, None) if key == "set" || key.starts_with("set.") => {}
+            // What is compared where it is used is compared here only if both decks have it.
+            (None, _) | (_, None) if counts_where_used(key) => {}
             (Some(Value::Table(old)), Some(Value::Table(new))) => {
                 let order = |table: &Table| table.keys().cloned().collect::<Vec<_>>();
                 let mut sorted = [order(old), order(new)];
                 let reordered = sorted[0] != sorted[1];
                 sorted.iter_mut().for_each(|keys| keys.sort());
-                if ORDERED.contains(&key) && reordered && sorted[0] == sorted[1] {
+                if restart == Some(Restart::FixedOrder) && reordered && sorted[0] == sorted[1] {
                     self.lines.push(format!("{key}: stands in another order"));
                 }
                 let added = new.keys().filter(|name| !old.contains_key(*name));
@@ -144,9 +133,15 @@ impl Comparison<'_> {
         };
         let number = Spanned::new(0..0, written);
         self.scopes[deck]
-            .expression(&number, "", &ALL_VARIABLES)
+            .expression(&number, "", &POSITION_AND_TIME)
             .ok()
     }
+}
+
+/// Whether the section of a key counts where it is used.
+fn counts_where_used(key: &str) -> bool {
+    let section = key.split('.').next().and_then(Section::find);
+    section.is_some_and(|section| section.restart == Restart::WhereUsed)
 }
 
 /// A value for people: as written, and what it comes to.

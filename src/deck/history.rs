@@ -10,9 +10,6 @@ use super::sets::find_set;
 use crate::error::Result;
 use crate::problem::{self, Field, Interval};
 
-/// Damage above which a point counts as cracked if the deck does not say.
-pub const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
-
 /// Validates what is written to the history; `horizon` (m) is that of the grid.
 ///
 /// # Errors
@@ -25,7 +22,7 @@ pub fn history(
 ) -> Result<problem::History> {
     let history = deck.history.get_ref();
     let damage_threshold = match &history.damage_threshold {
-        None => DEFAULT_DAMAGE_THRESHOLD,
+        None => problem::DEFAULT_DAMAGE_THRESHOLD,
         Some(number) => damage(scope, number, "[history] damage_threshold")?,
     };
     for (k, set) in history.reactions.iter().enumerate() {

@@ -2,28 +2,22 @@
 //! change the mass of moving points.
 
 use indexmap::IndexSet;
-use serde_spanned::Spanned;
 use toml::Value;
 
-use super::build::changes_density_scale;
-use super::grammar::{Deck, Tables};
+use super::grammar::{Deck, NamedTable, Section};
 use super::resolve::Scope;
-use super::source::Source;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::problem::{Problem, Selector};
+use crate::problem::{Problem, Selector, changes_density_scale};
 
 /// A warning for each of them. `scope` is that of the validated deck.
 ///
 /// # Errors
 /// When the deck cannot be written out to look for names.
-pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String>> {
-    let source = scope.source;
-    let mut warnings = unused_parameters(source, deck)?;
-    warnings.extend(unused(scope, "material", &deck.material));
-    warnings.extend(unused(scope, "damage", &deck.damage));
-    warnings.extend(unused(scope, "set", &deck.set));
+pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warning>> {
+    let mut warnings = unused_parameters(deck)?;
+    warnings.extend(unused(scope, deck));
     for set in &problem.sets {
         if let Selector::Where(condition) = &set.selector
             && !condition.is_condition()
@@ -33,7 +27,7 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String
                  a comparison is missing",
                 set.name
             );
-            warnings.push(source.warning(set.span.clone(), message));
+            warnings.push(Warning::new(message).at(&set.span));
         }
     }
     let pairs = problem.stages.windows(2).zip(deck.stage.iter().skip(1));
@@ -47,24 +41,29 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<String
             format_number(pair[0].time.end),
             format_number(before / after),
         );
-        warnings.push(source.warning(table.span(), message));
+        warnings.push(Warning::new(message).at(&table.span()));
     }
     Ok(warnings)
 }
 
-/// A warning for each table of a section that no other part of the deck refers to.
-fn unused<T>(scope: &Scope, section: &'static str, tables: &Tables<T>) -> Vec<String> {
+/// A warning for each table that is there to be referred to, and that no other part of the deck refers to.
+fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let used = scope.used.borrow();
-    let is_unused = |name: &String| !used.contains(&(section, name.clone()));
-    let unused = tables.iter().filter(|(name, _)| is_unused(name));
-    let warning = |(name, table): (&String, &Spanned<T>)| {
+    let mut tables = deck.named_tables();
+    tables.retain(|table| {
+        let section = Section::find(table.section);
+        section.is_some_and(|section| section.is_referred_to)
+            && !used.contains(&(table.section, table.name.to_owned()))
+    });
+    let warning = |table: &NamedTable| {
+        let (section, name) = (table.section, table.name);
         let message = format!("[{section}.{name}]: nothing in the deck uses it");
-        scope.source.warning(table.span(), message)
+        Warning::new(message).at(&table.span)
     };
-    unused.map(warning).collect()
+    tables.iter().map(warning).collect()
 }
 
-fn unused_parameters(source: &Source, deck: &Deck) -> Result<Vec<String>> {
+fn unused_parameters(deck: &Deck) -> Result<Vec<Warning>> {
     let mut used = IndexSet::new();
     let mut rest = deck.clone();
     // The title is no expression.
@@ -78,7 +77,7 @@ fn unused_parameters(source: &Source, deck: &Deck) -> Result<Vec<String>> {
         .filter(|name| !used.contains(name.get_ref()));
     let warning = |name: &super::grammar::Text| {
         let message = format!("[parameters] {}: no expression uses it", name.get_ref());
-        source.warning(name.span(), message)
+        Warning::new(message).at(&name.span())
     };
     Ok(unused.map(warning).collect())
 }
@@ -115,7 +114,9 @@ time.end = 1
         });
         let deck = deck.unwrap_or_else(|error| panic!("{error}"));
         let problem = deck.problem().unwrap_or_else(|error| panic!("{error}"));
-        problem.warnings
+        let warnings = problem.warnings.into_iter();
+        let located = warnings.map(|warning| deck.locate_warning(warning).message);
+        located.collect()
     }
 
     #[test]

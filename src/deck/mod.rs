@@ -1,7 +1,6 @@
 //! Decks: the TOML file that describes a run, from its text to a validated [`Problem`].
 
 mod bodies;
-mod build;
 mod conditions;
 mod damage;
 mod difference;
@@ -29,7 +28,7 @@ use std::path::Path;
 pub use difference::{differences, history_differences};
 pub use source::Source;
 
-use crate::error::Result;
+use crate::error::{Error, Result, Warning};
 use crate::problem::Problem;
 use resolve::Scope;
 
@@ -63,6 +62,21 @@ impl Deck {
         let grammar = toml::from_str(&source.text)
             .map_err(|error| toml_error::toml_error(&source, &error))?;
         Ok(Self { source, grammar })
+    }
+
+    /// File name and text.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The error of a problem made from this deck, with file, line, column and the line itself if it has a span.
+    pub fn locate(&self, error: Error) -> Error {
+        self.source.locate(error)
+    }
+
+    /// The warning of a problem made from this deck, with file and line if it has a span.
+    pub fn locate_warning(&self, warning: Warning) -> Warning {
+        self.source.locate_warning(warning)
     }
 
     /// The validated deck.

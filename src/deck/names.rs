@@ -2,7 +2,7 @@
 
 use serde_spanned::Spanned;
 
-use super::grammar::{Deck, Tables};
+use super::grammar::{Deck, NamedTable};
 use super::resolve::Scope;
 use crate::error::{Result, excerpt};
 
@@ -18,27 +18,12 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
         let message = "title: must be one line of text, without control characters";
         return Err(scope.error(deck.title.span(), message));
     }
-    let history = deck.history.get_ref();
-    all(scope, "material", &deck.material)?;
-    all(scope, "damage", &deck.damage)?;
-    all(scope, "body", &deck.body)?;
-    all(scope, "set", &deck.set)?;
-    all(scope, "crack", &deck.crack)?;
-    all(scope, "initial", &deck.initial)?;
-    all(scope, "condition", &deck.condition)?;
-    all(scope, "interface.pair", &deck.interface.pair)?;
-    if let Some(refinement) = &deck.refinement {
-        all(scope, "refinement.region", &refinement.get_ref().region)?;
-    }
-    all(scope, "history.force", &history.force)?;
-    all(scope, "history.probe", &history.probe)?;
-    all(scope, "history.front", &history.front)?;
-    all(scope, "history.crack", &history.crack)?;
-    all(scope, "history.tip", &history.tip)
-}
-
-fn all<T>(scope: &Scope, section: &str, tables: &Tables<T>) -> Result<()> {
-    for (name, table) in tables {
+    for NamedTable {
+        section,
+        name,
+        span,
+    } in deck.named_tables()
+    {
         let wrong = |c: char| c.is_control() || matches!(c, '"' | '\'' | '\\');
         if name.is_empty() || name.contains(wrong) || name.chars().nth(LONGEST).is_some() {
             let message = format!(
@@ -46,7 +31,7 @@ fn all<T>(scope: &Scope, section: &str, tables: &Tables<T>) -> Result<()> {
                  backslashes or control characters",
                 excerpt(name)
             );
-            return Err(scope.error(table.span(), message));
+            return Err(scope.error(span, message));
         }
     }
     Ok(())

@@ -21,7 +21,7 @@ pub fn output(
     let output = deck.output.get_ref();
     let names = problem::Field::ALL.map(problem::Field::name);
     let fields = match &output.fields {
-        None => DEFAULT_FIELDS.to_vec(),
+        None => problem::DEFAULT_FIELDS.to_vec(),
         Some(fields) => fields
             .iter()
             .map(|field| {
@@ -49,18 +49,10 @@ pub fn output(
     })
 }
 
-/// The fields of a result whose deck names none.
-pub const DEFAULT_FIELDS: [problem::Field; 4] = [
-    problem::Field::Displacement,
-    problem::Field::Velocity,
-    problem::Field::Damage,
-    problem::Field::StrainEnergyDensity,
-];
-
 /// When outputs are written.
 fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<problem::Interval> {
     match (&output.every, &output.every_steps) {
-        (None, None) => Ok(problem::Interval::Seconds(end / OUTPUTS)),
+        (None, None) => Ok(problem::Interval::Seconds(end / problem::OUTPUTS)),
         (Some(every), None) => {
             let seconds = scope.positive(every, "[output] every")?;
             Ok(problem::Interval::Seconds(seconds))
@@ -72,14 +64,6 @@ fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<problem::I
         }
     }
 }
-
-/// Outputs of a run whose deck does not say how many.
-pub const OUTPUTS: f64 = 50.0;
-
-/// Rows of the history of a run whose deck does not say how many, and the fewest steps between them: a row
-/// takes as long as one or two steps.
-pub const ROWS: f64 = 500.0;
-pub const STEPS_A_ROW: u64 = 20;
 
 /// Validates when points are dealt out anew.
 ///
@@ -97,9 +81,6 @@ pub fn balance(scope: &Scope, deck: &Deck) -> Result<Option<problem::Balance>> {
     deck.balance.as_ref().map(rule).transpose()
 }
 
-/// Wall-clock time between checkpoints if the deck does not say, s.
-pub const DEFAULT_CHECKPOINT: f64 = 600.0;
-
 /// Validates when checkpoints are written.
 ///
 /// # Errors
@@ -108,7 +89,7 @@ pub fn checkpoint(scope: &Scope, deck: &Deck) -> Result<problem::CheckpointRule>
     use problem::{CheckpointRule, Interval};
     let table = deck.checkpoint.get_ref();
     match (&table.every, &table.every_steps, &table.every_time) {
-        (None, None, None) => Ok(CheckpointRule::WallClock(DEFAULT_CHECKPOINT)),
+        (None, None, None) => Ok(CheckpointRule::default()),
         (Some(every), None, None) => match duration(every.get_ref()) {
             Some(seconds) => Ok(CheckpointRule::WallClock(seconds)),
             None => {

@@ -4,8 +4,9 @@ use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, HorizonRule, LevelBonds};
 use super::number::Number;
-use super::resolve::{ALL_VARIABLES, POSITION, Scope};
+use super::resolve::Scope;
 use crate::error::Result;
+use crate::expression::{POSITION, POSITION_AND_TIME};
 use crate::message::format_number;
 use crate::problem::{self, InterfaceRule, PointSource};
 
@@ -127,7 +128,7 @@ fn trigger(
         number.as_ref().map(within).transpose()
     };
     let parse = |number: &Option<Number>, name: &str| {
-        let parse = |number| scope.expression(number, &format!("{key} {name}"), &ALL_VARIABLES);
+        let parse = |number| scope.expression(number, &format!("{key} {name}"), &POSITION_AND_TIME);
         number.as_ref().map(parse).transpose()
     };
     let coarsen_after = trigger

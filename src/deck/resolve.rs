@@ -12,7 +12,7 @@ use super::number::{Number, Vector, Written};
 use super::parameters;
 use super::source::Source;
 use crate::error::{Error, Result};
-use crate::expression::{Expression, Variable};
+use crate::expression::{Expression, POSITION_AND_TIME, Variable};
 use crate::message::format_number;
 use crate::message::suggestion;
 
@@ -268,7 +268,7 @@ impl<'a> Scope<'a> {
             .entries(vector, key)?
             .iter()
             .map(|entry| {
-                let parse = || self.expression(entry, key, &ALL_VARIABLES);
+                let parse = || self.expression(entry, key, &POSITION_AND_TIME);
                 (!is_free(entry)).then(parse).transpose()
             })
             .collect::<Result<Vec<_>>>()?;
@@ -284,12 +284,6 @@ impl<'a> Scope<'a> {
 fn is_free(entry: &Number) -> bool {
     matches!(entry.get_ref(), Written::Text(text) if text == "free")
 }
-
-/// Position and time.
-pub const ALL_VARIABLES: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
-
-/// Position only.
-pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 /// The index of `name` in `names`, or an error that names the nearest.
 pub fn find<'n>(

@@ -3,9 +3,10 @@
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck, Text};
-use super::resolve::{POSITION, Scope};
+use super::resolve::Scope;
 use super::shapes;
 use crate::error::Result;
+use crate::expression::POSITION;
 use crate::problem;
 
 /// The sets of a problem: `all`, the bodies, those of the deck.

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 
 /// The most bytes of a deck.
 const LONGEST: u64 = 1 << 28;
@@ -19,8 +19,8 @@ const MOST_SAID: usize = 230;
 /// Characters of a line that are shown in any case.
 const NARROWEST: usize = 24;
 
-/// A deck's file name and text; both are empty for a problem that was made without a deck.
-#[derive(Debug, Clone, Default)]
+/// A deck's file name and text.
+#[derive(Debug, Clone)]
 pub struct Source {
     /// Where it was read from.
     pub path: PathBuf,
@@ -60,25 +60,38 @@ impl Source {
         }
     }
 
-    /// A warning that names file and line; without a deck, the message alone.
-    pub fn warning(&self, span: Range<usize>, message: impl AsRef<str>) -> String {
-        let message = shortened(message.as_ref(), MOST_SAID);
-        if self.path.as_os_str().is_empty() {
-            return message;
-        }
-        let start = self.text.floor_char_boundary(span.start);
-        let line = self.text[..start].matches('\n').count() + 1;
-        format!("{}:{line}: {message}", self.path.display())
+    /// An input error that names file, line and column and shows what stands there.
+    pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
+        Error::input(self.marked(span, message.as_ref()))
     }
 
-    /// An error that names file, line and column and shows what stands there, with a caret below the
-    /// bytes of `span`; without a deck, the message alone. All of it has about 400 characters
-    /// at most.
-    pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
-        let message = shortened(message.as_ref(), MOST_SAID);
-        if self.path.as_os_str().is_empty() {
-            return Error::input(message);
+    /// The warning, with file and line if it has a span.
+    pub fn locate_warning(&self, warning: Warning) -> Warning {
+        let Some(span) = warning.span else {
+            return warning;
+        };
+        let message = shortened(&warning.message, MOST_SAID);
+        let start = self.text.floor_char_boundary(span.start);
+        let line = self.text[..start].matches('\n').count() + 1;
+        Warning::new(format!("{}:{line}: {message}", self.path.display()))
+    }
+
+    /// The error, with file, line, column and the line itself if it has a span.
+    pub fn locate(&self, error: Error) -> Error {
+        let Some(span) = error.span else {
+            return error;
+        };
+        Error {
+            message: self.marked(span, &error.message),
+            span: None,
+            ..error
         }
+    }
+
+    /// File, line, column and message; then the line, with carets below the bytes of `span`. About 400 characters at
+    /// most.
+    fn marked(&self, span: Range<usize>, message: &str) -> String {
+        let message = shortened(message, MOST_SAID);
         let start = self.text.floor_char_boundary(span.start);
         let before = &self.text[..start];
         let line_number = before.matches('\n').count() + 1;
@@ -98,10 +111,10 @@ impl Source {
         let window = Window::new(line, column, room.saturating_sub(12).max(NARROWEST));
         let carets = "^".repeat(marked.clamp(1, window.rest().max(1)));
         let gutter = " ".repeat(line_number.to_string().len());
-        Error::input(format!(
+        format!(
             "{heading}\n{gutter} |\n{line_number} | {}\n{gutter} | {}{carets}",
             window.text, window.indent,
-        ))
+        )
     }
 }
 

@@ -44,7 +44,6 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let time = time::time(scope, deck)?;
     let stages = time::stages(scope, deck, &time)?;
     Ok(Problem {
-        source: scope.source.clone(),
         warnings: Vec::new(),
         title: deck.title.get_ref().clone(),
         places: places(deck),

@@ -46,8 +46,10 @@ mod names;
 mod parse;
 mod token;
 
-use evaluate::Instruction;
 use std::fmt;
+
+use crate::error::{self, Error};
+use evaluate::Instruction;
 
 /// A variable that an expression may use at evaluation time, beside named parameters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -63,6 +65,12 @@ pub enum Variable {
     /// `r`, a length; the value of the first coordinate.
     R,
 }
+
+/// Position and time.
+pub const POSITION_AND_TIME: [Variable; 4] = [Variable::X, Variable::Y, Variable::Z, Variable::T];
+
+/// Position only.
+pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 impl Variable {
     /// The variable of that name.
@@ -135,6 +143,27 @@ pub struct Expression {
 }
 
 impl Expression {
+    /// An expression of position and time, without parameters.
+    ///
+    /// # Errors
+    /// When the text is none.
+    pub fn of(text: &str) -> error::Result<Self> {
+        Self::with(text, &POSITION_AND_TIME)
+    }
+
+    /// An expression of a length `r` (m), without parameters.
+    ///
+    /// # Errors
+    /// When the text is none.
+    pub fn of_length(text: &str) -> error::Result<Self> {
+        Self::with(text, &[Variable::R])
+    }
+
+    fn with(text: &str, variables: &[Variable]) -> error::Result<Self> {
+        let parsed = Self::parse(text, &|_| None, &[], variables);
+        parsed.map_err(|error| Error::input(format!("`{text}`: {error}")))
+    }
+
     /// Parses the text, where `parameters` gives the value of a named parameter, `known_names` are
     /// the names that an error about an unknown one may offer, and `variables` are the variables
     /// that may be used.

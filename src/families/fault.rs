@@ -73,7 +73,7 @@ fn same_place(problem: &Problem, points: &[Point; 2]) -> Error {
             body.name, second.id, first.id, other.name
         )
     };
-    problem.source.error(body.span.clone(), message)
+    Error::input(message).at(&body.span)
 }
 
 /// A large number for a message, to two digits.
@@ -112,7 +112,7 @@ fn too_little_memory(problem: &Problem, blocks: [usize; 2], shortage: Shortage) 
         horizon_key(problem, body),
         format_number(near.horizon),
     );
-    problem.source.error(body.horizon_place.clone(), message)
+    Error::input(message).at(&body.horizon_place)
 }
 
 fn too_many_neighbours(
@@ -143,5 +143,5 @@ fn too_many_neighbours(
         format_number(near.horizon),
         body.name
     );
-    problem.source.error(body.horizon_place.clone(), message)
+    Error::input(message).at(&body.horizon_place)
 }

@@ -67,7 +67,7 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
             unreachable!("users are bodies with a file");
         };
         let message = format!("cannot read the point file {}: {error}", path.display());
-        problem.source.error(span.clone(), message)
+        Error::input(message).at(span)
     });
     let share = agree(comm, share)?;
     let (lines_before, _) = scan(comm, share.lines);
@@ -269,7 +269,9 @@ fn point(
 mod tests {
     use super::*;
     use crate::comm::threads;
-    use crate::deck::{self, Source};
+    use crate::dimension::Dimension;
+    use crate::elastic::Isotropic;
+    use crate::problem::{Law, Material, Shape};
 
     /// The x of all points of a file in the plane, in the order of their ids, or the error, which must
     /// be the same on any number of ranks.
@@ -283,19 +285,21 @@ mod tests {
     }
 
     fn read_in(folder: &Path) -> std::result::Result<Vec<f64>, String> {
-        let problem = deck::parse(&Source {
-            path: folder.join("deck.toml"),
-            text: "dimension = 'plane-stress'
-                grid.horizon = 3
-                material.glass.pmb = { density = 2, youngs_modulus = 5 }
-                body.plate = { material = 'glass', points.file = 'points.csv' }
-                time.end = 1
-                "
-            .to_owned(),
-        });
-        let problem = problem.unwrap_or_else(|error| panic!("{error}"));
+        let path = folder.join("points.csv");
+        let dimension = Dimension::PlaneStress { thickness: 1.0 };
+        let mut problem = Problem::new(dimension, 3.0, 1.0);
+        let elastic = Isotropic {
+            youngs_modulus: 5.0,
+            poisson_ratio: 1.0 / 3.0,
+        };
+        let glass = Material::new(Law::named("pmb").unwrap(), 2.0, elastic);
+        problem.add_body("plate", glass, None, Shape::Union(Vec::new()), 1.0);
+        problem.bodies[0].points = PointSource::File {
+            path: path.clone(),
+            block: None,
+            span: 0..0,
+        };
         let on = |ranks: usize| {
-            let path = folder.join("points.csv");
             let pieces = threads::run(ranks, |comm| piece(&problem, &path, comm));
             let pieces: Result<Vec<Vec<Point>>> = pieces.into_iter().collect();
             let shorten = |error: Error| {

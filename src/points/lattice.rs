@@ -281,9 +281,7 @@ pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
             problem.bodies[body].name,
             lattice.points()
         );
-        return Err(problem
-            .source
-            .error(problem.bodies[body].span.clone(), message));
+        return Err(Error::input(message).at(&problem.bodies[body].span));
     }
     Ok(())
 }
@@ -294,41 +292,45 @@ fn too_many(problem: &Problem, body: usize) -> Error {
         "[body.{}]: its lattice has too many cells; is the spacing in m?",
         body.name
     );
-    problem.source.error(body.span.clone(), message)
+    Error::input(message).at(&body.span)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deck::{self, Source};
+    use crate::dimension::Dimension;
+    use crate::elastic::Isotropic;
+    use crate::problem::{Law, Material};
 
-    fn problem(spacing: f64, shape: &str) -> Problem {
-        let text = format!(
-            "dimension = '3d'
-            grid = {{ spacing = {spacing}, horizon = 3 }}
-            material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
-            body.block = {{ material = 'glass', shape.{shape} }}
-            time.end = 1
-            "
-        );
-        let source = Source {
-            path: "test.toml".into(),
-            text,
+    fn problem(spacing: f64, shape: Shape) -> Problem {
+        let mut problem = Problem::new(Dimension::Space, 3.0, 1.0);
+        let elastic = Isotropic {
+            youngs_modulus: 5.0,
+            poisson_ratio: 0.25,
         };
-        deck::parse(&source).unwrap_or_else(|error| panic!("{error}"))
+        let glass = Material::new(Law::named("pmb").unwrap(), 2.0, elastic);
+        problem.add_body("block", glass, None, shape, spacing);
+        problem
     }
 
     #[test]
     fn points_are_counted_without_being_made() {
-        let ball = "sphere = { centre = [0, 0, 0], radius = 1 }";
+        let ball = Shape::Ball {
+            centre: [0.0; 3],
+            radius: 1.0,
+        };
         let volume = 4.0 / 3.0 * std::f64::consts::PI;
         for spacing in [0.1_f64, 1e-2, 1e-4] {
-            let problem = problem(spacing, ball);
+            let problem = problem(spacing, ball.clone());
             let found = LatticeBody::new(&problem, 0).unwrap().unwrap().points();
             let expected = volume / spacing.powi(3);
             assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
         }
-        let cube = problem(5e-4, "box = { lower = [0, 0, 0], upper = [1, 1, 1] }");
+        let cube = Shape::Box {
+            lower: [0.0; 3],
+            upper: [1.0; 3],
+        };
+        let cube = problem(5e-4, cube);
         let cube = LatticeBody::new(&cube, 0).unwrap().unwrap();
         assert_eq!(cube.points(), 8e9);
     }

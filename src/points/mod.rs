@@ -112,7 +112,7 @@ fn ids_are_those_of_points(problem: &Problem, total: u64) -> Result<()> {
                 set.name,
                 total - 1
             );
-            return Err(problem.source.error(largest.clone(), message));
+            return Err(Error::input(message).at(largest));
         }
     }
     Ok(())
@@ -135,7 +135,7 @@ fn no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Point]) -
                 PointSource::File { .. } => "no row of its file is its own",
             };
             let message = format!("[body.{}]: has no points; {why}", body.name);
-            Err(problem.source.error(body.span.clone(), message))
+            Err(Error::input(message).at(&body.span))
         }
     }
 }

@@ -300,3 +300,16 @@ pub enum Crack {
         width: f64,
     },
 }
+
+impl DamageRule {
+    /// Whether it is calibrated by what opening the body costs, and that has not been measured yet.
+    pub fn is_unmeasured(self) -> bool {
+        matches!(
+            self,
+            Self::Energy {
+                calibration: Calibration::Opening(None),
+                ..
+            }
+        )
+    }
+}

@@ -1,19 +1,24 @@
-//! The validated deck: every number known, every name resolved.
+//! The validated description of a run: every number known, every name resolved.
+//!
+//! Spans are bytes of the deck that a problem was made from; they stand in errors and warnings, and mean nothing
+//! else.
 //!
 //! Positions and vectors have three components; those beyond the dimension are 0.
 
 mod blocks;
 mod bodies;
+mod build;
 mod conditions;
 pub mod law;
 mod outputs;
 mod refinement;
+pub mod single_body;
 mod time;
 
 use std::ops::Range;
 
-use crate::deck::source::Source;
 use crate::dimension::Dimension;
+use crate::error::Warning;
 
 pub use crate::damage::{Calibration, Sense, WorkMeasure, WorkRule};
 pub use blocks::{Block, Kind};
@@ -27,10 +32,8 @@ pub use time::*;
 /// Everything that a run needs to know.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// The deck's text, for errors found later and for the result's metadata.
-    pub source: Source,
-    /// What the deck may say but most likely does not mean, each with file and line.
-    pub warnings: Vec<String>,
+    /// What the deck may say but most likely does not mean.
+    pub warnings: Vec<Warning>,
     /// One line.
     pub title: String,
     /// Where some of the values stand in the deck.

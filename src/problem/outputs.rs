@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::Problem;
+
 /// How often something is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Interval {
@@ -284,5 +286,46 @@ impl Field {
             Self::DeformationGradient => 9,
             _ => 1,
         }
+    }
+}
+
+/// The fields of a result of which nothing else is said.
+pub(crate) const DEFAULT_FIELDS: [Field; 4] = [
+    Field::Displacement,
+    Field::Velocity,
+    Field::Damage,
+    Field::StrainEnergyDensity,
+];
+
+/// Outputs of a run of which nothing else is said.
+pub(crate) const OUTPUTS: f64 = 50.0;
+
+/// Rows of the history of such a run, and the fewest steps between them: a row takes as long as one or two steps.
+const ROWS: f64 = 500.0;
+const STEPS_A_ROW: u64 = 20;
+
+/// Wall-clock time between checkpoints of such a run, s.
+pub(crate) const DEFAULT_CHECKPOINT: f64 = 600.0;
+
+/// Damage above which a point of such a run counts as cracked.
+pub(crate) const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
+
+impl Problem {
+    /// When rows of the history are written.
+    pub fn row_interval(&self) -> Interval {
+        let seconds = self.time.end / ROWS;
+        let default = if self.relaxes() {
+            Interval::Seconds(seconds)
+        } else {
+            let steps = STEPS_A_ROW;
+            Interval::SecondsAtSteps { seconds, steps }
+        };
+        self.history.every.unwrap_or(default)
+    }
+}
+
+impl Default for CheckpointRule {
+    fn default() -> Self {
+        Self::WallClock(DEFAULT_CHECKPOINT)
     }
 }

@@ -1,5 +1,7 @@
 //! The time axis, stages, and how points come to move.
 
+use super::Problem;
+
 /// The time axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Time {
@@ -82,4 +84,59 @@ pub enum StepRule {
     Automatic(f64),
     /// Fixed, s.
     Fixed(f64),
+}
+
+impl Problem {
+    /// The stages of the run, of which there is at least one.
+    pub fn all_stages(&self) -> Vec<Stage> {
+        if self.stages.is_empty() {
+            return vec![Stage {
+                time: self.time,
+                acting: vec![true; self.conditions.len()],
+            }];
+        }
+        let mut stages = self.stages.clone();
+        if let Some(last) = stages.last_mut() {
+            last.time.end = self.time.end;
+        }
+        stages
+    }
+
+    /// Whether any stage of the run is a relaxation.
+    pub fn relaxes(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.is_relaxation())
+    }
+
+    /// Whether the step of any stage follows the number of bonds that break in it.
+    pub fn adapts(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.adaptive.is_some())
+    }
+
+    /// Whether bodies have another density in the equation of motion of any stage.
+    pub fn scales_density(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| stage.time.density_scale != 1.0)
+    }
+
+    /// Whether a stage that follows the equation of motion has another density scale than the one before it, which does so
+    /// too.
+    pub fn changes_density_scale(&self) -> bool {
+        self.stages.windows(2).any(changes_density_scale)
+    }
+}
+
+impl Time {
+    /// Whether the method is relaxation.
+    pub fn is_relaxation(&self) -> bool {
+        matches!(self.method, Method::Relaxation(_))
+    }
+}
+
+/// Whether two stages in a row follow the equation of motion with different density scales.
+pub(crate) fn changes_density_scale(pair: &[Stage]) -> bool {
+    let [before, after] = [&pair[0].time, &pair[1].time];
+    let moves = !before.is_relaxation() && !after.is_relaxation();
+    moves && before.density_scale != after.density_scale
 }

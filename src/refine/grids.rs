@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::comm::{Communicator, agree, all_gather_many};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
 use crate::problem::{Kind, PreCrack, Problem, Refinement};
@@ -106,7 +106,7 @@ impl<'a> Grids<'a> {
                         "[refinement.region.{}] where: there is no point of a body given as a shape",
                         region.name
                     );
-                    let error = problem.source.error(region.span.clone(), message);
+                    let error = Error::input(message).at(&region.span);
                     return agree(comm, Err(error));
                 }
                 self.refine(&all);

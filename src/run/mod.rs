@@ -10,8 +10,9 @@
 //! # fn main() -> fissure::error::Result<()> {
 //! let deck = fissure::deck::read(Path::new("plate.toml"), &[])?;
 //! let mut options = Options::new("out/plate");
-//! options.deck = Some(deck.explain()?);
-//! fissure::run(&deck.problem()?, &threads::alone(), options, &mut Unobserved)?;
+//! let problem = deck.problem()?;
+//! options.deck = Some(deck);
+//! fissure::run(&problem, &threads::alone(), options, &mut Unobserved)?;
 //! # Ok(())
 //! # }
 //! ```
@@ -46,13 +47,15 @@ use std::path::PathBuf;
 
 use crate::comm::mpi::{self, World};
 use crate::comm::{self, Communicator, agree};
+use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::problem::Problem;
 use crate::solver::Simulation;
+use crate::solver::calibration::calibrated;
 use crate::solver::observers::{ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
-use crate::survey::{Survey, calibrated};
+use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
@@ -104,7 +107,23 @@ pub fn run(
     options: Options,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
+    let outcome = run_unlocated(problem, comm, &options, observer);
+    outcome.map_err(|error| match &options.deck {
+        Some(deck) => deck.locate(error),
+        None => error,
+    })
+}
+
+/// As [`run`]; errors name places in the deck by spans.
+fn run_unlocated(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Outcome> {
     let calibrated = calibrated(problem)?;
+    let explained = options.deck.as_ref().map(Deck::explain).transpose();
+    let explained = agree(comm, explained)?;
     let files = Files::new(options.folder.clone());
     // Taken before anything is looked at, and kept until the end.
     let prepared = match comm.rank() {
@@ -121,7 +140,7 @@ pub fn run(
         problem: &calibrated,
         comm,
         files,
-        physics: restart_compatibility::describe(problem, options.deck.as_deref()),
+        physics: restart_compatibility::describe(problem, explained.as_deref()),
         options,
         observer,
     };
@@ -146,7 +165,7 @@ struct Job<'a> {
     comm: &'a dyn Communicator,
     files: Files,
     physics: String,
-    options: Options,
+    options: &'a Options,
     observer: &'a mut dyn Observer,
 }
 
@@ -157,10 +176,17 @@ impl<'a> Job<'a> {
         let mut look = || self.look_before_the_first_step();
         let mut simulation = Simulation::<D>::set_up(self.problem, self.comm, &mut look)?;
         simulation.check()?;
+        let mut survey = Survey::new(&mut simulation);
+        if let Some(deck) = &self.options.deck {
+            let warnings = survey.warnings.into_iter();
+            survey.warnings = warnings
+                .map(|warning| deck.locate_warning(warning))
+                .collect();
+        }
         self.observer.message(&Message::SetUp {
             step: simulation.clock.step(),
             stable_step: simulation.scaled_stable_step(),
-            survey: Survey::new(&mut simulation),
+            survey,
         });
         let decided = decisions(&simulation);
         self.observer.message(&Message::Decided(decided));
@@ -392,15 +418,19 @@ impl<'a> Job<'a> {
         simulation: &Simulation<'_, D>,
     ) -> Vec<(&'static str, String)> {
         // All ranks must write the same; what differs between them is told by rank 0.
-        let source = &self.problem.source;
+        let [text, in_full, path] = match self.options.deck.as_ref().map(Deck::source) {
+            Some(Source { path, text }) => [
+                text.clone(),
+                self.physics.clone(),
+                path.display().to_string(),
+            ],
+            None => Default::default(),
+        };
         let mut metadata = vec![
             ("title", self.problem.title.clone()),
-            ("deck", source.text.clone()),
-            (
-                "deck_in_full",
-                self.options.deck.clone().unwrap_or_default(),
-            ),
-            ("deck_path", source.path.display().to_string()),
+            ("deck", text),
+            ("deck_in_full", in_full),
+            ("deck_path", path),
             ("version", crate::version()),
             ("mpi", self.text_of_rank_0(&mpi::library())),
             ("hdf5", output::library()),

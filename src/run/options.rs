@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use super::signals::Signals;
+use crate::deck::Deck;
 
 /// How a problem is run. Must be the same on all ranks, but for `signals`.
 pub struct Options {
@@ -18,9 +19,9 @@ pub struct Options {
     pub started: Instant,
     /// Signals of this process that stop the run or ask for a checkpoint.
     pub signals: Option<Signals>,
-    /// The problem's deck with every default filled in, see [`Deck::explain`](crate::deck::Deck::explain);
-    /// `None` for a problem that was built in Rust.
-    pub deck: Option<String>,
+    /// The problem's deck; `None` for a problem that was built in Rust. Errors and warnings name places in it, the result
+    /// holds its text, and a restart compares it with that of the checkpoint.
+    pub deck: Option<Deck>,
     /// More attributes of the result: name and text, such as the command line. Rank 0's texts count.
     pub attributes: Vec<(&'static str, String)>,
 }

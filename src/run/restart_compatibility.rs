@@ -23,7 +23,6 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     }
     let mut problem = problem.clone();
     // What may change between the parts of a run.
-    problem.source = Source::default();
     problem.warnings.clear();
     problem.title.clear();
     if let Some(last) = problem.stages.last_mut() {

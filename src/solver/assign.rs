@@ -85,7 +85,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let by_work = breaks_by_work(body, damage);
     let error = |message: String| {
         let message = format!("[body.{}] damage: {message}", body.name);
-        Err(problem.source.error(body.span.clone(), message))
+        Err(Error::input(message).at(&body.span))
     };
     let meets = |other: &Body| problem.interface.between(body, other) != InterfaceRule::None;
     let of_other_kind = problem.bodies.iter().find(|other| {
@@ -101,7 +101,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         ));
     }
     if damage.rule.is_unmeasured() {
-        let message = "what opening the body costs has not been measured: take the problem that `survey::calibrated` returns";
+        let message = "what opening the body costs has not been measured: take the problem that `solver::calibration::calibrated` returns";
         return error(message.to_owned());
     }
     let by_energy = damage.rule != DamageRule::CriticalStretch;

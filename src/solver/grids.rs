@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::comm::{self, Communicator, agree};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::families::GridFrame;
 use crate::partition::Domain;
 use crate::points::Point;
@@ -56,7 +56,7 @@ pub fn grids(
                 body.name
             );
             let wanted = problem.family == FamilyRule::Lattice;
-            let error = || problem.source.error(body.span.clone(), message);
+            let error = || Error::input(message).at(&body.span);
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };

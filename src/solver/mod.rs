@@ -2,6 +2,7 @@
 
 pub mod assign;
 pub mod bonds;
+pub mod calibration;
 pub mod conditions;
 mod grids;
 pub mod model;

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, agree};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
 use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, Time};
@@ -490,7 +490,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
             return self.check_equilibrium();
         }
         let valued = are_finite(self.problem, self.comm, &self.model, time);
-        valued.map_err(|error| Error::run(error.message))?;
+        valued.map_err(|error| Error {
+            kind: ErrorKind::Run,
+            ..error
+        })?;
         let own = self.bad.filter(|bad| bad.step as f64 == step);
         let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
         comm::min(self.comm, &mut smallest);
@@ -508,7 +511,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                         bad.id,
                         &position[..D],
                     );
-                    self.problem.source.error(body.span.clone(), message)
+                    Error::input(message).at(&body.span)
                 } else {
                     Error::run(format!(
                         "step {} (t = {time:.6e} s): the motion of point {} of body `{}` is not \

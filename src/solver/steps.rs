@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::message::format_number;
 use crate::problem::{Adaptive, Method, Problem, Stage, StepRule, Time};
 
@@ -46,11 +46,9 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
             (step, steps_to(length, step))
         }
         (Method::Explicit, StepRule::Automatic(_)) if stable.is_infinite() => {
-            return Err(problem.source.error(
-                problem.places.horizon.clone(),
-                "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
-                 in m and larger than the distance of the points?",
-            ));
+            let message = "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
+                           in m and larger than the distance of the points?";
+            return Err(Error::input(message).at(&problem.places.horizon));
         }
         (Method::Explicit, StepRule::Automatic(safety)) => {
             let steps = (length / automatic_step(problem, time, safety, stable)).ceil();
@@ -69,7 +67,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
             "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",
             format_number(length)
         );
-        return Err(problem.source.error(problem.places.step.clone(), message));
+        return Err(Error::input(message).at(&problem.places.step));
     }
     Ok((step, steps))
 }
@@ -81,11 +79,7 @@ const MOST_REPEATS: f64 = 100.0;
 /// become so small that the stage has no end.
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
-    let error = |message: String| {
-        Err(problem
-            .source
-            .error(problem.places.adaptive.clone(), message))
-    };
+    let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));
     if length / smallest > MOST_STEPS {
         return error(format!(
             "[time] adaptive smallest: {} s take {:.1e} steps of {smallest:.1e} s, {MOST_STEPS:.0e} at most",
@@ -142,7 +136,7 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
         format_number(rate),
         SIGN_CHANGES / rate,
     );
-    Err(problem.source.error(place.clone(), message))
+    Err(Error::input(message).at(place))
 }
 
 /// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks, under an adaptive

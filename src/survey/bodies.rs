@@ -2,6 +2,7 @@
 
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
+use crate::error::Warning;
 use crate::points::{LatticeBody, distance_squared};
 use crate::problem::{PointSource, Problem};
 use crate::solver::Simulation;
@@ -32,7 +33,7 @@ pub struct BodyFigures {
 /// The figures of all bodies, and warnings about volumes that do not fit. Collective.
 pub fn figures<const D: usize>(
     simulation: &Simulation<'_, D>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Vec<BodyFigures> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let nearest = nearest_neighbours(simulation);
@@ -91,7 +92,7 @@ fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64
 }
 
 /// A warning if the points of a body do not fill it, or fill more.
-fn volume_doubt(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<String> {
+fn volume_doubt(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {
         let excess = figures.volume / volume - 1.0;
@@ -123,5 +124,5 @@ fn volume_doubt(problem: &Problem, index: usize, figures: &BodyFigures) -> Optio
         PointSource::Lattice { .. } => &body.span,
         PointSource::File { span, .. } => span,
     };
-    Some(problem.source.warning(place.clone(), message))
+    Some(Warning::new(message).at(place))
 }

@@ -3,13 +3,12 @@
 use crate::comm::threads;
 use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
+use crate::problem::single_body::{alone, fill};
 use crate::problem::{PointSource, Problem, Shape};
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 use crate::solver::bonds::BondUpdate;
 use crate::solver::observers::nearest;
-
-use super::single_body::{alone, fill};
 
 /// Blocks with more bonds than this are not made.
 const MOST_BONDS: f64 = 2e7;

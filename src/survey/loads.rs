@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use crate::comm::sum::reduce;
 use crate::comm::{ExactSum, total};
+use crate::error::Warning;
 use crate::expression::Expression;
 use crate::message::format_number;
 use crate::problem::{Action, Condition, PointSource, Problem, Stage};
@@ -21,7 +22,7 @@ const THICKER: f64 = 1.8;
 const LARGE_LAYER: u64 = 4_000_000;
 
 /// Adds a warning for each of them. Collective.
-pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) {
+pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let problem = simulation.problem;
     let points: Vec<Vec<u32>> = problem
         .conditions
@@ -38,12 +39,12 @@ pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec
     against_the_surface(simulation, &points, warnings);
 }
 
-fn warn(problem: &Problem, condition: &Condition, words: &str, warnings: &mut Vec<String>) {
+fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
     let message = format!(
         "[condition.{}] {}: {words}",
         condition.name, condition.quantity
     );
-    warnings.push(problem.source.warning(condition.place.clone(), message));
+    warnings.push(Warning::new(message).at(&condition.place));
 }
 
 /// What a condition prescribes of the motion, by component; `None` for loads.
@@ -58,7 +59,7 @@ fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
 fn twice_prescribed<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) {
     let conditions = &simulation.problem.conditions;
     for (later, second) in conditions.iter().enumerate() {
@@ -87,7 +88,7 @@ fn twice_prescribed<const D: usize>(
                     first.name,
                     components.join(" and ")
                 );
-                warn(simulation.problem, second, &words, warnings);
+                warn(second, &words, warnings);
             }
         }
     }
@@ -97,7 +98,7 @@ fn twice_prescribed<const D: usize>(
 fn without_effect<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) {
     let problem = simulation.problem;
     for (condition, own) in problem.conditions.iter().zip(points) {
@@ -111,7 +112,7 @@ fn without_effect<const D: usize>(
             Action::Displacement(_) | Action::Velocity(_) => continue,
         };
         if acts.is_empty() {
-            warn(problem, condition, "is 0, so it does nothing", warnings);
+            warn(condition, "is 0, so it does nothing", warnings);
             continue;
         }
         let is_held = |point: &u32, d: usize| {
@@ -128,7 +129,7 @@ fn without_effect<const D: usize>(
         let free = own.iter().filter(is_free).count();
         if total(simulation.comm, free as u64) == 0 {
             let words = "acts only where supports prescribe the motion, so it moves nothing";
-            warn(problem, condition, words, warnings);
+            warn(condition, words, warnings);
         }
     }
 }
@@ -139,7 +140,7 @@ fn layer<const D: usize>(
     condition: &Condition,
     depth: f64,
     points: &[u32],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) {
     let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
     if total(comm, points.len() as u64) > LARGE_LAYER {
@@ -177,7 +178,7 @@ fn layer<const D: usize>(
              the layer's `depth`",
             format_number(depth)
         );
-        warn(problem, condition, &words, warnings);
+        warn(condition, &words, warnings);
     }
 }
 
@@ -220,7 +221,7 @@ fn thickness<const D: usize>(
 fn against_the_surface<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let is_pressure = |condition: &Condition| condition.quantity == "pressure";
@@ -251,7 +252,7 @@ fn against_the_surface<const D: usize>(
         if reduce(simulation.comm, &mut sum)[0] > 0.0 {
             let words =
                 "its `normal` points into the body, so that it pulls; the outward one is meant";
-            warn(problem, condition, words, warnings);
+            warn(condition, words, warnings);
         }
     }
 }

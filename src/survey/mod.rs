@@ -3,28 +3,24 @@
 //! the same.
 
 mod bodies;
-mod calibrated;
 mod cost;
 mod interior;
 mod loads;
 mod look;
 pub mod memory;
-mod parting;
-mod single_body;
 mod size;
 mod speed;
 
 pub use bodies::BodyFigures;
-pub use calibrated::calibrated;
 pub use cost::{Cost, Measured, ghost_share};
 pub use interior::{Interior, interior};
 pub use look::{Look, look};
-pub use parting::separation_energy_ratio;
 pub use size::{Size, size};
 pub use speed::{Speed, speed};
 
 use crate::comm::total;
 use crate::damage::DamageLaw;
+use crate::error::Warning;
 use crate::message::format_number;
 use crate::problem::{Block, PointSource, Problem, Selector, Stage, StepRule};
 use crate::solver::Simulation;
@@ -58,8 +54,8 @@ pub struct Survey {
     pub probes: Vec<Nearest>,
     /// Number of points of each set.
     pub sets: Vec<u64>,
-    /// What is allowed but most likely not meant, most of it with file and line.
-    pub warnings: Vec<String>,
+    /// What is allowed but most likely not meant.
+    pub warnings: Vec<Warning>,
 }
 
 impl Survey {
@@ -81,7 +77,7 @@ impl Survey {
             .filter(|(_, cut)| **cut == 0)
         {
             let message = format!("[crack.{}]: cuts no bond", crack.name);
-            warnings.push(problem.source.warning(crack.span.clone(), message));
+            warnings.push(Warning::new(message).at(&crack.span));
         }
         let sets = sets(simulation, &mut warnings);
         let probes = probes(simulation, &mut warnings);
@@ -115,7 +111,7 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
         .collect()
 }
 
-fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<String>) {
+fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warning>) {
     for (body, figures) in problem.bodies.iter().zip(bodies) {
         let spacing = match &body.points {
             PointSource::Lattice { spacing, .. } => spacing[..problem.dimension.count()]
@@ -132,12 +128,12 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<String
                 format_number(body.horizon),
                 format_number((100.0 * horizon).round() / 100.0)
             );
-            warnings.push(problem.source.warning(body.horizon_place.clone(), message));
+            warnings.push(Warning::new(message).at(&body.horizon_place));
         }
     }
 }
 
-fn stretches(problem: &Problem, warnings: &mut Vec<String>) {
+fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
     for body in &problem.bodies {
         let critical = match block_laws(problem, &Block::unrefined(body)).damage {
             Some(DamageLaw::CriticalStretch(law)) => law.critical,
@@ -148,7 +144,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<String>) {
             let message = format!(
                 "[body.{name}] damage: its bonds break at a stretch of {critical:.3}{consequence}"
             );
-            warnings.push(problem.source.warning(body.span.clone(), message));
+            warnings.push(Warning::new(message).at(&body.span));
         };
         if critical >= LARGEST_STRETCH {
             warn(format!(", at {:.3} times their length", 1.0 + critical));
@@ -186,7 +182,7 @@ fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
 }
 
 /// Number of points of each set.
-fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) -> Vec<u64> {
+fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) -> Vec<u64> {
     let (problem, comm) = (simulation.problem, simulation.comm);
     let count = |set| members(problem, &simulation.model, set).len() as u64;
     let mut sizes: Vec<u64> = (0..problem.sets.len()).map(count).collect();
@@ -195,7 +191,7 @@ fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Strin
         let by_place = matches!(set.selector, Selector::Where(_) | Selector::Within(_));
         if by_place && *size < D as u64 && simulation.model.total > 2 * D as u64 {
             let message = format!("[set.{}]: has {size} point(s) only", set.name);
-            warnings.push(problem.source.warning(set.span.clone(), message));
+            warnings.push(Warning::new(message).at(&set.span));
         }
     }
     sizes
@@ -203,7 +199,7 @@ fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Strin
 
 fn probes<const D: usize>(
     simulation: &Simulation<'_, D>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Vec<Nearest> {
     let problem = simulation.problem;
     let follow = |probe: &crate::problem::Probe| {
@@ -215,29 +211,28 @@ fn probes<const D: usize>(
                 found.distance,
                 &found.position[..D]
             );
-            warnings.push(problem.source.warning(probe.span.clone(), message));
+            warnings.push(Warning::new(message).at(&probe.span));
         }
         found
     };
     problem.history.probes.iter().map(follow).collect()
 }
 
-fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<String>) {
+fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let few = FEW_NEIGHBOURS[D - 1];
     let families = simulation.forces.intact_families(&simulation.model);
     let poor = families.neighbours.iter().filter(|count| **count < few);
     let poor = total(simulation.comm, poor.count() as u64);
     if poor > 0 {
-        warnings.push(format!(
-            "{poor} point(s) have fewer than {few} intact bonds"
-        ));
+        let message = format!("{poor} point(s) have fewer than {few} intact bonds");
+        warnings.push(Warning::new(message));
     }
 }
 
-fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<String>) {
+fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let problem = simulation.problem;
     let mut warn = |message: String| {
-        warnings.push(problem.source.warning(problem.places.step.clone(), message));
+        warnings.push(Warning::new(message).at(&problem.places.step));
     };
     let clock = simulation.clock;
     let (step, stable) = (clock.step(), simulation.scaled_stable_step());

@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 use fissure::comm::threads;
 use fissure::deck::{self, Deck, Source};
 use fissure::error::{ErrorKind, Result};
-use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::survey::look;
 use proptest::prelude::*;
@@ -41,9 +40,10 @@ fn right_decks() -> Vec<Source> {
     sources
 }
 
-/// Number of points, and first step (s) and number of steps of each stage, of the run that a problem makes.
-fn prepare(problem: &Problem) -> Result<(u64, Vec<(f64, f64)>)> {
-    let look = look(problem, 1, false)?;
+/// Number of points, and first step (s) and number of steps of each stage, of the run that a deck makes.
+fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
+    let deck = Deck::new(source.clone())?;
+    let look = look(&deck.problem()?, 1, false).map_err(|error| deck.locate(error))?;
     Ok((look.points, look.steps))
 }
 
@@ -81,7 +81,7 @@ fn a_wrong_deck_gets_the_message_beside_its_mistake() {
     for path in &paths {
         let source = Source::read(path).unwrap();
         let expected = expected(path, &source.text);
-        match deck::parse(&source).and_then(|problem| prepare(&problem)) {
+        match prepare(&source) {
             Ok(_) => failures.push(format!("{}: no error", path.display())),
             Err(error) => {
                 assert_eq!(error.kind, ErrorKind::Input, "{}", path.display());
@@ -99,8 +99,7 @@ fn a_wrong_deck_gets_the_message_beside_its_mistake() {
 #[test]
 fn a_right_deck_makes_a_run() {
     for source in right_decks() {
-        let problem = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
-        let (points, stages) = prepare(&problem).unwrap_or_else(|error| panic!("{error}"));
+        let (points, stages) = prepare(&source).unwrap_or_else(|error| panic!("{error}"));
         let all_step = stages
             .iter()
             .all(|(step, steps)| *step > 0.0 && *steps >= 1.0);
@@ -117,7 +116,7 @@ fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
         };
         let again = deck::explain(&explained).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(explained.text, again, "{}", source.path.display());
-        let run = |source| prepare(&deck::parse(source).unwrap()).unwrap();
+        let run = |source| prepare(source).unwrap();
         assert_eq!(run(&source), run(&explained), "{}", source.path.display());
     }
 }

@@ -22,7 +22,7 @@ fn plate(extra: &str) -> String {
     )
 }
 
-/// The warnings of a deck in the plane, without file and line; the same on any number of ranks.
+/// The warnings of a deck in the plane; the same on any number of ranks.
 fn warnings(text: &str) -> Vec<String> {
     let alone = simulate::<2, _>(text, |mut simulation| Survey::new(&mut simulation).warnings);
     for ranks in [2, 3] {
@@ -32,11 +32,7 @@ fn warnings(text: &str) -> Vec<String> {
             assert_eq!(warnings, alone, "{ranks} ranks");
         }
     }
-    let bare = |line: String| match line.strip_prefix("test.toml:") {
-        Some(rest) => rest.split_once(": ").unwrap().1.to_owned(),
-        None => line,
-    };
-    alone.into_iter().map(bare).collect()
+    alone.into_iter().map(|warning| warning.message).collect()
 }
 
 #[track_caller]

@@ -6,6 +6,7 @@ use crate::support::saved::{state, whole};
 use crate::support::{displace, force, forces, largest_force, problem, simulate, simulate_on};
 use fissure::dimension::{Constraint, Dimension};
 use fissure::material::{Declaration, Invariants, declarations};
+use fissure::problem::Body;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::motion::{Kept, Saved, SavedBonds};
@@ -103,6 +104,16 @@ fn deck(dimension: &str, law: &str, correction: &str, extra: &str) -> String {
     )
 }
 
+/// What distinguishes the cases of a test.
+fn description<const D: usize>(simulation: &Simulation<D>) -> String {
+    let problem = simulation.problem;
+    let (dimension, correction) = (problem.dimension, problem.volume_correction);
+    let Body {
+        material, damage, ..
+    } = &problem.bodies[0];
+    format!("{dimension:?}, {correction:?}, {material:?}, {damage:?}")
+}
+
 fn damage(alpha: f64) -> String {
     format!("damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = {alpha} }}")
 }
@@ -184,7 +195,7 @@ fn a_body_that_is_turned_has_its_forces_turned() {
                 let wanted = turn::<D>(angle, whole);
                 for (after, wanted) in after.iter().zip(wanted) {
                     let error = (after - wanted).abs();
-                    let deck = &simulation.problem.source.text;
+                    let deck = description(&simulation);
                     assert!(error < 1e-11 * scale, "{after} {wanted}: {deck}");
                 }
             }
@@ -208,7 +219,7 @@ fn nothing_under_finite_rotation() {
         for angle in ANGLES {
             displace(&mut simulation, |x| turn::<D>(angle, x));
             let largest = largest_force(&simulation);
-            let deck = &simulation.problem.source.text;
+            let deck = description(&simulation);
             assert!(largest < 1e-12 * scale, "{largest} of {scale}: {deck}");
         }
     }
@@ -230,7 +241,7 @@ fn no_bond_breaks_under_rigid_rotation_of_any_size() {
         let strained = |[x, y, z]: [f64; 3]| [1.001 * x, 0.9995 * y + 5e-4 * x, 0.9997 * z];
         for angle in [0.0, 0.01, 0.3, 1.0, 2.5, std::f64::consts::PI] {
             displace(&mut simulation, |x| turn::<D>(angle, strained(x)));
-            let deck = &simulation.problem.source.text;
+            let deck = description(&simulation);
             assert_eq!(simulation.forces.broken().len(), 0, "{angle}: {deck}");
         }
         assert_eq!(count_intact(&mut simulation), before);
@@ -406,7 +417,7 @@ fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
             simulation.fields.displacement[d][point] = place;
             let slope = -(above - below) / (2.0 * step);
             let scale = force.abs().max(1e-3);
-            let deck = &simulation.problem.source.text;
+            let deck = description(&simulation);
             assert!(
                 (force - slope).abs() < 1e-5 * scale,
                 "{force} {slope}: {deck}"

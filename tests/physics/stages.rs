@@ -5,6 +5,7 @@ use crate::support::history::{column, row, rows_to_the_end};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_on};
 use fissure::comm::{Communicator, threads};
+use fissure::error::Warning;
 use fissure::solver::Simulation;
 use fissure::solver::observers::{Energies, HistoryObserver};
 
@@ -268,10 +269,9 @@ fn a_change_of_density_keeps_momentum_and_books_energy() {
 
 /// The warnings of a deck, without places and from the key on up to the first semicolon.
 fn problem_warnings(deck: &str) -> Vec<String> {
-    let short = |warning: &String| {
-        let text = warning
-            .split_once("]] ")
-            .map_or(&warning[..], |(_, text)| text);
+    let short = |warning: &Warning| {
+        let text = &warning.message;
+        let text = text.split_once("]] ").map_or(&text[..], |(_, text)| text);
         text.split(';').next().unwrap_or_default().to_owned()
     };
     problem(deck).warnings.iter().map(short).collect()

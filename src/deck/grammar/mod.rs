@@ -11,6 +11,7 @@ mod grid;
 mod material;
 mod outputs;
 mod refinement;
+mod sections;
 mod time;
 
 use indexmap::IndexMap;
@@ -25,6 +26,7 @@ pub use grid::*;
 pub use material::*;
 pub use outputs::*;
 pub use refinement::*;
+pub use sections::*;
 pub use time::*;
 
 /// A string with its place in the deck.

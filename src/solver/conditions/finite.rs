@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::comm::{self, Communicator, agree};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::message::format_number;
 use crate::problem::{Action, Problem};
@@ -120,7 +120,7 @@ impl<const D: usize> FiniteCheck<'_, D> {
                 format_number(self.time),
                 &position[..D]
             );
-            Err(self.problem.source.error(place.clone(), message))
+            Err(Error::input(message).at(place))
         });
         agree(self.comm, named)
     }

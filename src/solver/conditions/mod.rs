@@ -8,7 +8,7 @@ mod values;
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{Communicator, total};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::set;
 use crate::problem::{Action, Problem};
@@ -137,7 +137,7 @@ pub fn not_empty(
         "{}: the set `{}` has no points",
         place.0, problem.sets[set].name
     );
-    Err(problem.source.error(place.1, message))
+    Err(Error::input(message).at(&place.1))
 }
 
 impl<const D: usize> Conditions<D> {

@@ -1,6 +1,6 @@
 //! Fronts: how far a field has come along a line.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::problem;
 
 use super::reach::Course;
@@ -29,7 +29,7 @@ impl Front {
                 "[history.front.{}]: no point lies within {} m of the line",
                 rule.name, rule.radius
             );
-            return Err(simulation.problem.source.error(rule.span.clone(), message));
+            return Err(Error::input(message).at(&rule.span));
         }
         Ok(Self {
             rule: rule.clone(),

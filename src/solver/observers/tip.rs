@@ -1,6 +1,6 @@
 //! Crack tips: where the damage ends in one direction, and how fast that moves.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::problem;
 
 use super::reach::{Course, Reached};
@@ -35,7 +35,7 @@ impl Tip {
                 "[history.tip.{}]: all points of the set `{}` lie behind `from`",
                 rule.name, problem.sets[rule.set].name
             );
-            return Err(problem.source.error(rule.span.clone(), message));
+            return Err(Error::input(message).at(&rule.span));
         }
         Ok(Self {
             threshold: rule.threshold,

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use crate::comm::sum::reduce;
 use crate::comm::{self, IdOrder};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::points::{Point, distance_squared};
 use crate::problem::StepRule;
 use crate::refine::{Grids, NodeKey};
@@ -85,7 +85,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                        have not; refine `[refinement.region]` from the start";
         let trigger = self.trigger().filter(|_| self.forces.has_history());
         trigger.map_or(Ok(()), |trigger| {
-            Err(self.problem.source.error(trigger.span.clone(), message))
+            Err(Error::input(message).at(&trigger.span))
         })
     }
 

@@ -1,7 +1,7 @@
 //! Which points are refined during a run, and when.
 
 use crate::comm::all_gather_many;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::bins::Bins;
 use crate::problem::{Action, Problem, Selector, Trigger};
@@ -55,9 +55,7 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
                  metres?",
                 block.level
             );
-            return Err(problem
-                .source
-                .error(problem.places.horizon.clone(), message));
+            return Err(Error::input(message).at(&problem.places.horizon));
         }
     }
     let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
@@ -69,7 +67,7 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
              the set by `where`",
             condition.name
         );
-        return Err(problem.source.error(condition.span.clone(), message));
+        return Err(Error::input(message).at(&condition.span));
     }
     let Some(trigger) = &refinement.trigger else {
         return Ok(());
@@ -84,7 +82,7 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
     let message = format!(
         "[refinement.trigger]: does not go with {other}; refine `[refinement.region]` from the start"
     );
-    Err(problem.source.error(trigger.span.clone(), message))
+    Err(Error::input(message).at(&trigger.span))
 }
 
 fn trigger(problem: &Problem) -> Option<&Trigger> {

@@ -1,19 +1,14 @@
-//! Plans made in Rust, without a deck.
+//! Problems made in Rust, without a deck.
 
-use super::history::DEFAULT_DAMAGE_THRESHOLD;
-use super::outputs::{DEFAULT_CHECKPOINT, DEFAULT_FIELDS, OUTPUTS, ROWS, STEPS_A_ROW};
-use super::resolve::ALL_VARIABLES;
-use super::source::Source;
+use super::{
+    Action, Body, CheckpointRule, Condition, Crack, DEFAULT_DAMAGE_THRESHOLD, DEFAULT_FIELDS,
+    Damage, DamageRule, FamilyRule, History, Initial, Interface, InterfaceRule, Interval, Law,
+    Material, Method, OUTPUTS, Output, Places, PointSource, PreCrack, Problem, Quadrature,
+    Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
+};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::error::{Error, Result};
-use crate::expression::{Expression, Variable};
-use crate::problem::{
-    Action, Body, Calibration, CheckpointRule, Condition, Crack, Damage, DamageRule, FamilyRule,
-    History, Initial, Interface, InterfaceRule, Interval, Law, Material, Method, Output, Places,
-    PointSource, PreCrack, Problem, Quadrature, Selector, Set, Shape, Stage, StepRule, Time,
-    Toughness, VolumeCorrection,
-};
+use crate::expression::Expression;
 
 /// Share of the stable step that is taken if nothing else is said.
 const DEFAULT_SAFETY: f64 = 0.8;
@@ -23,7 +18,6 @@ impl Problem {
     /// does not say more.
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
-            source: Source::default(),
             warnings: Vec::new(),
             places: Places::default(),
             title: String::new(),
@@ -142,57 +136,6 @@ impl Problem {
         });
     }
 
-    /// The stages of the run, of which there is at least one.
-    pub fn all_stages(&self) -> Vec<Stage> {
-        if self.stages.is_empty() {
-            return vec![Stage {
-                time: self.time,
-                acting: vec![true; self.conditions.len()],
-            }];
-        }
-        let mut stages = self.stages.clone();
-        if let Some(last) = stages.last_mut() {
-            last.time.end = self.time.end;
-        }
-        stages
-    }
-
-    /// Whether any stage of the run is a relaxation.
-    pub fn relaxes(&self) -> bool {
-        let mut stages = self.all_stages().into_iter();
-        stages.any(|stage| stage.time.is_relaxation())
-    }
-
-    /// When rows of the history are written.
-    pub fn row_interval(&self) -> Interval {
-        let seconds = self.time.end / ROWS;
-        let default = if self.relaxes() {
-            Interval::Seconds(seconds)
-        } else {
-            let steps = STEPS_A_ROW;
-            Interval::SecondsAtSteps { seconds, steps }
-        };
-        self.history.every.unwrap_or(default)
-    }
-
-    /// Whether the step of any stage follows the number of bonds that break in it.
-    pub fn adapts(&self) -> bool {
-        let mut stages = self.all_stages().into_iter();
-        stages.any(|stage| stage.time.adaptive.is_some())
-    }
-
-    /// Whether bodies have another density in the equation of motion of any stage.
-    pub fn scales_density(&self) -> bool {
-        let mut stages = self.all_stages().into_iter();
-        stages.any(|stage| stage.time.density_scale != 1.0)
-    }
-
-    /// Whether a stage that follows the equation of motion has another density scale than the one before it, which does so
-    /// too.
-    pub fn changes_density_scale(&self) -> bool {
-        self.stages.windows(2).any(changes_density_scale)
-    }
-
     /// Adds an initial velocity (m/s) of a set, given by its index: an expression a component.
     pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
         self.initials.push(Initial {
@@ -202,13 +145,6 @@ impl Problem {
             displacement: None,
             velocity: Some((velocity, 0..0)),
         });
-    }
-}
-
-impl Time {
-    /// Whether the method is relaxation.
-    pub fn is_relaxation(&self) -> bool {
-        matches!(self.method, Method::Relaxation(_))
     }
 }
 
@@ -246,53 +182,4 @@ impl Damage {
             no_failure: Vec::new(),
         }
     }
-}
-
-impl DamageRule {
-    /// Whether it is calibrated by what opening the body costs, and that has not been measured yet.
-    pub fn is_unmeasured(self) -> bool {
-        matches!(
-            self,
-            Self::Energy {
-                calibration: Calibration::Opening(None),
-                ..
-            }
-        )
-    }
-}
-
-impl Default for CheckpointRule {
-    fn default() -> Self {
-        Self::WallClock(DEFAULT_CHECKPOINT)
-    }
-}
-
-impl Expression {
-    /// An expression of position and time, without parameters.
-    ///
-    /// # Errors
-    /// When the text is none.
-    pub fn of(text: &str) -> Result<Self> {
-        Self::with(text, &ALL_VARIABLES)
-    }
-
-    /// An expression of a length `r` (m), without parameters.
-    ///
-    /// # Errors
-    /// When the text is none.
-    pub fn of_length(text: &str) -> Result<Self> {
-        Self::with(text, &[Variable::R])
-    }
-
-    fn with(text: &str, variables: &[Variable]) -> Result<Self> {
-        let parsed = Self::parse(text, &|_| None, &[], variables);
-        parsed.map_err(|error| Error::input(format!("`{text}`: {error}")))
-    }
-}
-
-/// Whether two stages in a row follow the equation of motion with different density scales.
-pub(super) fn changes_density_scale(pair: &[Stage]) -> bool {
-    let [before, after] = [&pair[0].time, &pair[1].time];
-    let moves = !before.is_relaxation() && !after.is_relaxation();
-    moves && before.density_scale != after.density_scale
 }

@@ -1,6 +1,6 @@
 //! A body of a problem alone, as a block of its lattice that nothing acts on.
 
-use crate::problem::{PointSource, Problem, Shape, StepRule};
+use super::{PointSource, Problem, Shape, StepRule};
 
 /// A problem with this body only, and the edges of its cells (m); `None` for points from a file.
 pub fn alone(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
@@ -14,7 +14,6 @@ pub fn alone(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
     // It is never moved by steps.
     body.material.damping = 0.0;
     let mut alone = Problem {
-        source: problem.source.clone(),
         volume_correction: problem.volume_correction,
         quadrature: problem.quadrature,
         family: problem.family,

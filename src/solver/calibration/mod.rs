@@ -1,11 +1,13 @@
 //! Damage whose critical work is to follow from what opening a body costs.
 
+mod separation;
+
 use std::borrow::Cow;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::problem::{Calibration, DamageRule, Problem};
 
-use super::parting::separation_energy_ratio;
+pub use separation::separation_energy_ratio;
 
 /// The problem with what opening its bodies costs, where their damage is calibrated by it.
 ///
@@ -26,7 +28,7 @@ pub fn calibrated(problem: &Problem) -> Result<Cow<'_, Problem>> {
                  bodies on a lattice with horizons of at most 3 spacings in space and 10 in the plane; take \"energy\"",
                 body.name
             );
-            return Err(problem.source.error(body.span.clone(), message));
+            return Err(Error::input(message).at(&body.span));
         };
         set_cost(found.to_mut(), index, cost);
     }

@@ -3,12 +3,11 @@
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
+use crate::problem::single_body::{alone, fill};
 use crate::problem::{Block, Problem, Toughness};
 use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::BondUpdate;
-
-use super::single_body::{alone, fill};
 
 /// Blocks with more bonds than this are not parted: it would take more than seconds.
 const MOST_BONDS: f64 = 1e6;

@@ -1,0 +1,232 @@
+//! The sections of a deck: how their headers are written, which of them others refer to, and what a restart may change.
+
+use std::ops::Range;
+
+use super::{Deck, Tables};
+
+/// A section of the deck, or a key outside of all sections.
+#[derive(Debug, PartialEq)]
+pub struct Section {
+    /// Its path, such as `grid` or `history.probe`.
+    pub path: &'static str,
+    /// How its header is written.
+    pub form: Form,
+    /// Whether its tables are there only to be referred to by their names.
+    pub is_referred_to: bool,
+    /// What a restart may change of it.
+    pub restart: Restart,
+}
+
+/// How the header of a section is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Form {
+    /// No header: a key at the top of the deck.
+    Key,
+    /// `[grid]`
+    Table,
+    /// `[[stage]]`
+    Array,
+    /// `[body.NAME]`
+    Named,
+    /// `[material.NAME.KIND]`
+    NamedKind,
+}
+
+/// What a restart may change of a section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Restart {
+    /// Nothing.
+    Fixed,
+    /// Nothing, not even the order of its tables: later ones take precedence over earlier ones.
+    FixedOrder,
+    /// A table counts where it is used: it may be there or not, but not change.
+    WhereUsed,
+    /// Everything.
+    Free,
+}
+
+use Form::{Array, Key, Named, NamedKind, Table};
+use Restart::{Fixed, FixedOrder, Free, WhereUsed};
+
+/// All sections.
+pub const SECTIONS: [Section; 32] = [
+    Section::new("title", Key, Free),
+    Section::new("dimension", Key, Fixed),
+    Section::new("thickness", Key, Fixed),
+    Section::new("cross_section", Key, Fixed),
+    Section::new("constraint", Key, Fixed),
+    // Parameters count where they are used.
+    Section::new("parameters", Table, Free),
+    Section::new("grid", Table, Fixed),
+    Section::new("interface", Table, Fixed),
+    Section::new("interface.pair", Named, Fixed),
+    Section::new("refinement", Table, Fixed),
+    Section::new("refinement.region", Named, Fixed),
+    Section::new("refinement.trigger", Table, Fixed),
+    Section::new("material", NamedKind, Fixed).is_referred_to(),
+    Section::new("damage", NamedKind, Fixed).is_referred_to(),
+    Section::new("body", Named, FixedOrder),
+    Section::new("set", Named, WhereUsed).is_referred_to(),
+    Section::new("crack", NamedKind, Fixed),
+    Section::new("initial", Named, FixedOrder),
+    Section::new("condition", Named, FixedOrder),
+    Section::new("time", Table, Fixed),
+    Section::new("time.adaptive", Table, Fixed),
+    Section::new("time.relaxation", Table, Fixed),
+    Section::new("stage", Array, Fixed),
+    Section::new("output", Table, Free),
+    // What the columns of the history mean is compared apart.
+    Section::new("history", Table, Free),
+    Section::new("history.force", Named, Fixed),
+    Section::new("history.probe", Named, Fixed),
+    Section::new("history.front", Named, Fixed),
+    Section::new("history.crack", Named, Fixed),
+    Section::new("history.tip", Named, Fixed),
+    Section::new("checkpoint", Table, Free),
+    Section::new("balance", Table, Free),
+];
+
+impl Section {
+    const fn new(path: &'static str, form: Form, restart: Restart) -> Self {
+        Self {
+            path,
+            form,
+            is_referred_to: false,
+            restart,
+        }
+    }
+
+    const fn is_referred_to(self) -> Self {
+        Self {
+            is_referred_to: true,
+            ..self
+        }
+    }
+
+    /// Find the section with this path.
+    pub fn find(path: &str) -> Option<&'static Self> {
+        SECTIONS.iter().find(|section| section.path == path)
+    }
+
+    /// Find the innermost section that a path leads into.
+    pub fn containing(path: &[String]) -> Option<&'static Self> {
+        (1..=path.len().min(2))
+            .rev()
+            .find_map(|depth| Self::find(&path[..depth].join(".")))
+    }
+
+    /// Number of parts of a path that stand in the header.
+    pub fn header_length(&self) -> usize {
+        let parts = self.path.split('.').count();
+        match self.form {
+            Key => 0,
+            Table | Array => parts,
+            Named => parts + 1,
+            NamedKind => parts + 2,
+        }
+    }
+}
+
+/// A table that the deck gives a name.
+pub struct NamedTable<'a> {
+    /// The path of its section.
+    pub section: &'static str,
+    /// Its name.
+    pub name: &'a str,
+    /// Where it stands.
+    pub span: Range<usize>,
+}
+
+impl Deck {
+    /// The tables with names, section by section.
+    pub fn named_tables(&self) -> Vec<NamedTable<'_>> {
+        fn add<'a, T>(
+            found: &mut Vec<NamedTable<'a>>,
+            section: &'static str,
+            tables: &'a Tables<T>,
+        ) {
+            found.extend(tables.iter().map(|(name, table)| NamedTable {
+                section,
+                name,
+                span: table.span(),
+            }));
+        }
+        let mut found = Vec::new();
+        add(&mut found, "material", &self.material);
+        add(&mut found, "damage", &self.damage);
+        add(&mut found, "body", &self.body);
+        add(&mut found, "set", &self.set);
+        add(&mut found, "crack", &self.crack);
+        add(&mut found, "initial", &self.initial);
+        add(&mut found, "condition", &self.condition);
+        add(&mut found, "interface.pair", &self.interface.pair);
+        if let Some(refinement) = &self.refinement {
+            let region = &refinement.get_ref().region;
+            add(&mut found, "refinement.region", region);
+        }
+        let history = self.history.get_ref();
+        add(&mut found, "history.force", &history.force);
+        add(&mut found, "history.probe", &history.probe);
+        add(&mut found, "history.front", &history.front);
+        add(&mut found, "history.crack", &history.crack);
+        add(&mut found, "history.tip", &history.tip);
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The fields of a struct of the grammar, from the error of the reader.
+    fn fields(deck: &str) -> Vec<String> {
+        let error = toml::from_str::<Deck>(deck).unwrap_err();
+        let fields = error.message().split('`').skip(3).step_by(2);
+        fields.map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn every_key_outside_of_sections_and_every_section_is_listed() {
+        let mut listed: Vec<&str> = SECTIONS.iter().map(|section| section.path).collect();
+        listed.retain(|path| !path.contains('.'));
+        assert_eq!(fields("unknown = 1"), listed);
+    }
+
+    #[test]
+    fn every_section_within_another_is_listed() {
+        let example = crate::deck::Source {
+            path: "example.toml".into(),
+            text: crate::deck::EXAMPLE.to_owned(),
+        };
+        let explained = crate::deck::explain(&example).unwrap();
+        let explained: toml::Table = explained.parse().unwrap();
+        let mut count = 0;
+        for (outer, table) in &explained {
+            if Section::find(outer).unwrap().form != Table {
+                continue;
+            }
+            let inner = table.as_table().unwrap().iter();
+            for (key, _) in inner.filter(|(_, value)| value.is_table()) {
+                let path = format!("{outer}.{key}");
+                assert!(Section::find(&path).is_some(), "{path} is not listed");
+                count += 1;
+            }
+        }
+        assert!(count >= 5, "{count}");
+    }
+
+    #[test]
+    fn the_readme_describes_every_section() {
+        let readme = include_str!("../../../README.md");
+        for Section { path, form, .. } in &SECTIONS {
+            let row = match form {
+                Key => format!("`{path}`"),
+                Table => format!("\n| `[{path}]` |"),
+                Array => format!("\n| `[[{path}]]` |"),
+                Named => format!("\n| `[{path}.NAME]` |"),
+                NamedKind => format!("\n| `[{path}.NAME."),
+            };
+            assert!(readme.contains(&row), "not in README.md: {row}");
+        }
+    }
+}
