@@ -1,30 +1,29 @@
-//! The disc's confirmation of what is written to a file through MPI. HDF5 asks for it at every flush; here it can
-//! be left out.
+//! A switch for the fsync of files written through MPI. HDF5 calls `MPI_File_sync` at every flush.
 
 use std::cell::Cell;
 use std::os::raw::c_int;
 
 thread_local! {
-    static LEFT_OUT: Cell<bool> = const { Cell::new(false) };
+    static SKIP_FSYNC: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Does what writes out files, without waiting for a disc to confirm any of it.
-pub fn without_confirmation<T>(work: impl FnOnce() -> T) -> T {
-    LEFT_OUT.set(true);
-    let done = work();
-    LEFT_OUT.set(false);
-    done
+/// Run `work` with fsync disabled on this thread.
+pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
+    SKIP_FSYNC.set(true);
+    let result = work();
+    SKIP_FSYNC.set(false);
+    result
 }
 
-/// MPI's call, by way of its profiling interface: a program's own definition is found before the library's.
+/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition.
 ///
 /// # Safety
-/// As the library's: `file` must be open.
+/// `file` must be open.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn MPI_File_sync(file: mpi_sys::MPI_File) -> c_int {
-    if LEFT_OUT.get() {
+    if SKIP_FSYNC.get() {
         return mpi_sys::MPI_SUCCESS as c_int;
     }
-    // SAFETY: passed on to the caller.
+    // SAFETY: the caller's contract is the same.
     unsafe { mpi_sys::PMPI_File_sync(file) }
 }

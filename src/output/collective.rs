@@ -6,7 +6,7 @@ use super::dataset::{Dataset, Rows};
 use super::failure::innermost;
 use super::reserve::Reservation;
 use super::transfer::{self, Transfer};
-use crate::comm::{Communicator, agree, without_confirmation};
+use crate::comm::{Communicator, agree, without_fsync};
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::VarLenUnicode;
@@ -337,7 +337,7 @@ impl<'a> CollectiveFile<'a> {
         if self.size > self.confirmed {
             return self.confirm();
         }
-        without_confirmation(|| self.write_out())
+        without_fsync(|| self.write_out())
     }
 
     /// As [`flush`](Self::flush), and waits for the disc to confirm it, so that the file survives a loss of power

@@ -210,7 +210,7 @@ pub fn load_history<M: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [M; 
     if M::COUNT == 0 {
         return [M::splat(0.0); 2];
     }
-    let all = groups.numbers(group);
+    let all = groups.history(group);
     [M::each(|k| all[k]), M::each(|k| all[M::COUNT + k])]
 }
 

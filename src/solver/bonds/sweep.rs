@@ -415,7 +415,7 @@ unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
     // SAFETY: passed on to the caller.
-    let here = unsafe { points.here(vector.place) };
+    let here = unsafe { points.here(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
         let mut bonds = unsafe { points.load::<S, true>(simd, &here, vector, o) };
@@ -443,7 +443,7 @@ unsafe fn whole_vector<K: Kernel<D>, S: Simd, const D: usize>(
     let mut sums = kernel.start();
     let mut gone = 0;
     // SAFETY: passed on to the caller.
-    let here = unsafe { points.here(vector.place) };
+    let here = unsafe { points.here(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
         let mut bonds = unsafe { points.load::<S, false>(simd, &here, vector, o) };
@@ -454,7 +454,7 @@ unsafe fn whole_vector<K: Kernel<D>, S: Simd, const D: usize>(
         kernel.add(simd, &mut bonds, &mut sums);
         gone |= before ^ bonds.intact;
         if K::BondHistory::COUNT > 0 && kernel.stores_history() {
-            store_history(vector.groups.numbers(o), &bonds.history, before);
+            store_history(vector.groups.history(o), &bonds.history, before);
         }
     }
     (sums, gone)
@@ -492,7 +492,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 kernel.add(simd, &mut bonds, &mut sums);
                 gone |= before ^ bonds.intact;
                 if K::BondHistory::COUNT > 0 && kernel.stores_history() {
-                    store_history(row.groups.numbers(group), &bonds.history, before);
+                    store_history(row.groups.history(group), &bonds.history, before);
                 }
             }
             for quantity in 0..K::Sums::COUNT {
@@ -580,7 +580,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                 simd.aside(move || {
                     let mut broken = K::Broken::splat(0.0);
                     // SAFETY: as above.
-                    let here = unsafe { points.here(vector.place) };
+                    let here = unsafe { points.here(vector.slot) };
                     for o in 0..vector.offsets.len() {
                         // SAFETY: as above.
                         let mut bonds =
