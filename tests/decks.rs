@@ -12,7 +12,7 @@ use fissure::deck::{self, Deck, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::problem::Problem;
 use fissure::solver::Simulation;
-use fissure::survey::look;
+use fissure::survey::dry_run;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -43,7 +43,7 @@ fn right_decks() -> Vec<Source> {
 
 /// Number of points, and first step (s) and number of steps of each stage, of the run that a problem makes.
 fn prepare(problem: &Problem) -> Result<(u64, Vec<(f64, f64)>)> {
-    let look = look(problem, 1, false)?;
+    let look = dry_run(problem, 1, false)?;
     Ok((look.points, look.steps))
 }
 
