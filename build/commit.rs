@@ -1,21 +1,21 @@
-//! The commit that the program is built from.
+//! The commit of the build.
 
 use std::path::Path;
 use std::process::Command;
 
-/// Tells the crate its commit, in the variable `FISSURE_COMMIT`; not in a debug build, which would be
-/// compiled anew after each commit, and not where the source is no checkout.
-pub fn tell() {
+/// Set `FISSURE_COMMIT` for the crate. Not in debug builds, which would be rebuilt after each commit, and
+/// not outside a checkout.
+pub fn set_environment() {
     if std::env::var("PROFILE").as_deref() != Ok("release") {
         return;
     }
-    // A package that `cargo package` has made knows where it comes from.
+    // `cargo package` records the commit in this file.
     let packaged = std::fs::read_to_string(".cargo_vcs_info.json").ok();
     if let Some(commit) = packaged.as_deref().and_then(sha1) {
         println!("cargo::rustc-env=FISSURE_COMMIT={}", &commit[..12]);
         return;
     }
-    // A folder that lies in the checkout of something else is none of ours.
+    // The folder may lie in the checkout of another project.
     if !Path::new(".git").exists() {
         return;
     }
@@ -42,7 +42,7 @@ pub fn tell() {
     }
 }
 
-/// The commit in the file that `cargo package` writes.
+/// The commit in the file written by `cargo package`.
 fn sha1(information: &str) -> Option<&str> {
     let (_, rest) = information.split_once("\"sha1\"")?;
     let commit = rest.split('"').nth(1)?;
@@ -50,7 +50,7 @@ fn sha1(information: &str) -> Option<&str> {
     is_commit.then_some(commit)
 }
 
-/// What git prints; `None` where it fails or is not there.
+/// Output of git; `None` if it fails or is missing.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

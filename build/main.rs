@@ -1,4 +1,4 @@
-//! Before the crate is compiled: are its MPI and that of HDF5 the same, and which commit is it?
+//! Build script: checks that HDF5 uses the linked MPI, and records the commit.
 
 mod commit;
 mod one_mpi;
@@ -15,7 +15,7 @@ fn main() {
         println!("cargo::rerun-if-env-changed={name}");
     }
     println!("cargo::rustc-check-cfg=cfg(open_mpi)");
-    commit::tell();
+    commit::set_environment();
     match one_mpi::check() {
         Ok(mpi) => {
             if mpi.is_open_mpi {

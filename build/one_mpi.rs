@@ -1,22 +1,21 @@
-//! Refuses an HDF5 that was built with another MPI than the one that is linked: the program would have
-//! both and die at its start.
+//! Check that HDF5 was built with the linked MPI; a program with two MPI libraries crashes at its start.
 //!
-//! `mpi-sys` and `hdf5-metno-sys` each find their library by themselves; this looks where they look, and
-//! compares the names under which the two ask the loader for MPI.
+//! `mpi-sys` and `hdf5-metno-sys` find their libraries independently. This repeats both searches and
+//! compares the names of the MPI shared libraries.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The MPI that is linked.
+/// The linked MPI.
 pub struct Mpi {
-    /// Whether it is Open MPI; its bindings differ from those of MPICH and its relatives.
+    /// It is Open MPI; its bindings differ from those of MPICH and derivatives.
     pub is_open_mpi: bool,
 }
 
-/// Finds MPI and HDF5.
+/// Find MPI and HDF5 and compare their MPI libraries.
 ///
 /// # Errors
-/// HDF5 wants another MPI; what to do about it.
+/// If HDF5 was built with another MPI; the message names the fix.
 pub fn check() -> Result<Mpi, String> {
     let mpi = build_probe_mpi::probe().map_err(|errors| {
         let reasons: Vec<String> = errors.iter().map(ToString::to_string).collect();
@@ -34,11 +33,11 @@ pub fn check() -> Result<Mpi, String> {
     let Some(hdf5) = hdf5_library() else {
         return Ok(Mpi { is_open_mpi });
     };
-    let wanted: Vec<String> = (wanted_libraries(&hdf5).into_iter())
+    let needed: Vec<String> = (needed_libraries(&hdf5).into_iter())
         .filter(|name| name.starts_with("libmpi"))
         .collect();
-    // Either is empty where the library is a static one or the tools that read it are not there.
-    if linked.is_empty() || wanted.is_empty() || wanted.iter().any(|name| linked.contains(name)) {
+    // Either is empty for a static library, or if the tool to read it is missing.
+    if linked.is_empty() || needed.is_empty() || needed.iter().any(|name| linked.contains(name)) {
         return Ok(Mpi { is_open_mpi });
     }
     let compiler = mpi.mpicc.as_deref().unwrap_or("pkg-config");
@@ -47,13 +46,13 @@ pub fn check() -> Result<Mpi, String> {
          set HDF5_DIR to an HDF5 that was built with this MPI{}, or MPICC to the compiler wrapper of \
          the MPI that HDF5 was built with",
         hdf5.display(),
-        wanted.join(", "),
+        needed.join(", "),
         linked.join(", "),
         example(&linked)
     ))
 }
 
-/// Where Debian and its kin keep the HDF5 of this MPI, if it is installed.
+/// Debian's path of the HDF5 for this MPI, if installed.
 fn example(linked: &[String]) -> String {
     let family = if linked.iter().any(|name| name.starts_with("libmpich")) {
         "mpich"
@@ -69,7 +68,7 @@ fn example(linked: &[String]) -> String {
     }
 }
 
-/// The shared library that `hdf5-metno-sys` links, if it can be told.
+/// The shared library that `hdf5-metno-sys` links, if found.
 fn hdf5_library() -> Option<PathBuf> {
     let own = std::env::var_os("HDF5_DIR").map(|root| vec![PathBuf::from(root).join("lib")]);
     let folders = own.or_else(|| {
@@ -88,7 +87,7 @@ fn hdf5_library() -> Option<PathBuf> {
     files.into_iter().find(|file| file.exists())
 }
 
-/// The name under which a program that is linked with `-l NAME` asks for the library.
+/// The soname of a library linked with `-l NAME`.
 fn loader_name(name: &str, folders: &[PathBuf]) -> Option<String> {
     let system = ["/usr/lib64", "/usr/lib"].map(PathBuf::from);
     let files = folders.iter().chain(&system);
@@ -103,8 +102,8 @@ fn loader_name(name: &str, folders: &[PathBuf]) -> Option<String> {
     entries(&file, "SONAME").into_iter().next()
 }
 
-/// The names of the libraries that a shared library asks for.
-fn wanted_libraries(file: &Path) -> Vec<String> {
+/// The sonames of the libraries that a shared library needs.
+fn needed_libraries(file: &Path) -> Vec<String> {
     if file.extension().is_some_and(|ending| ending == "dylib") {
         let lines = printed("otool", &["-L"], file).unwrap_or_default();
         let names = lines
@@ -116,7 +115,7 @@ fn wanted_libraries(file: &Path) -> Vec<String> {
     entries(file, "NEEDED")
 }
 
-/// The values of one kind in the dynamic section of an ELF file.
+/// The values of one tag in the dynamic section of an ELF file.
 fn entries(file: &Path, kind: &str) -> Vec<String> {
     let lines = printed("readelf", &["-d", "-W"], file).unwrap_or_default();
     let value = |line: &str| {
@@ -132,7 +131,7 @@ fn base_name(path: &str) -> String {
     path.rsplit('/').next().unwrap_or(path).to_owned()
 }
 
-/// What a program prints about a file, in English; `None` if there is no such program.
+/// Output of a program for a file, in English; `None` if the program is missing.
 fn printed(program: &str, options: &[&str], file: &Path) -> Option<String> {
     let mut command = Command::new(program);
     let output = command

@@ -1,11 +1,11 @@
-//! The settings that a problem can be posed in.
+//! Dimension of a problem and its out-of-plane conditions.
 
-/// The setting of the problem, with what turns lengths and areas into volumes.
+/// Dimension of a problem, with the out-of-plane measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Dimension {
     /// A bar.
     Line {
-        /// m².
+        /// Cross-section, m².
         cross_section: f64,
         /// Condition across the bar.
         constraint: Constraint,
@@ -43,7 +43,7 @@ impl Dimension {
         }
     }
 
-    /// What a length, area or volume is multiplied by to be a volume: m², m or 1.
+    /// Factor from length, area or volume to volume: m², m or 1.
     pub fn out_of_plane_measure(self) -> f64 {
         match self {
             Self::Line { cross_section, .. } => cross_section,
@@ -52,7 +52,7 @@ impl Dimension {
         }
     }
 
-    /// The Poisson ratio that bond-based laws have.
+    /// Poisson's ratio of bond-based laws.
     pub fn bond_based_poisson_ratio(self) -> f64 {
         match self {
             Self::PlaneStress { .. } => 1.0 / 3.0,
@@ -60,7 +60,7 @@ impl Dimension {
         }
     }
 
-    /// Whether bond-based laws can have any Poisson ratio: a bar that contracts freely across has stiffness E alone.
+    /// Bond-based laws allow any Poisson's ratio: true for a bar in uniaxial stress, whose stiffness is E.
     pub fn allows_any_poisson_ratio(self) -> bool {
         matches!(
             self,
@@ -71,7 +71,7 @@ impl Dimension {
         )
     }
 
-    /// For messages.
+    /// The name in messages.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};
         match self {
@@ -85,7 +85,7 @@ impl Dimension {
         }
     }
 
-    /// The condition across a bar, for people to read.
+    /// Description of the condition across a bar.
     pub fn constraint(self) -> Option<&'static str> {
         match self {
             Self::Line { constraint, .. } => Some(match constraint {

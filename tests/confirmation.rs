@@ -74,7 +74,7 @@ fn outputs_that_have_room_do_not_wait_for_the_disc() {
     asked();
     write(&mut file, 2);
     assert_eq!(asked(), 0);
-    file.confirm().unwrap();
+    file.sync().unwrap();
     assert_eq!(asked(), 1);
     write(&mut file, 509);
     assert_eq!(asked(), 0);

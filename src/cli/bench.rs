@@ -182,7 +182,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         mean: total(time.as_nanos() as u64) / 1e9 / world.size() as f64,
         slowest: largest(time.as_secs_f64()),
     };
-    let (times, sent, alone) = (speed.times, speed.sent, speed.sent_alone);
+    let (times, sent, alone) = (speed.times, speed.sent, speed.sent_without_overlap);
     let steps = f64::from(arguments.steps);
     let messages = sent.messages as f64 / steps;
     let points = speed.points;

@@ -9,7 +9,7 @@ use fissure::solver::assign::cutoffs;
 use fissure::solver::calibration::calibrated;
 use fissure::solver::size::is_feasible;
 use fissure::solver::steps::{choose_steps, even_clock};
-use fissure::survey::{Cost, Interior, Size, interior, look, size};
+use fissure::survey::{Cost, Interior, Size, dry_run, interior, size};
 
 use super::check_report as say;
 use super::report::Report;
@@ -83,8 +83,8 @@ fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
 
 /// Makes points and bonds and looks at them.
 fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
-    let look = look(problem, asked.ranks, asked.trial)?;
-    let (survey, dimension) = (&look.survey, problem.dimension.count());
+    let run = dry_run(problem, asked.ranks, asked.trial)?;
+    let (survey, dimension) = (&run.survey, problem.dimension.count());
     let interiors = interiors(problem);
     let mut report = Report::default();
     say::heading(&mut report, problem, asked.path);
@@ -100,16 +100,16 @@ fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
     say::places(&mut report, problem, survey, dimension);
     say::sets(&mut report, problem, survey);
     report.say("size");
-    say::size(&mut report, problem, look.points, look.bonds);
+    say::size(&mut report, problem, run.points, run.bonds);
     report.line(
         "of them as lattice",
-        super::format::count(look.lattice_bonds),
+        super::format::count(run.lattice_bonds),
     );
-    say::cost(&mut report, &look.cost, asked.ranks, look.ghosts);
-    say::time(&mut report, problem, look.stable_step);
-    say::steps(&mut report, problem, &look.steps);
-    if let Some(seconds) = look.seconds {
-        say::run_time(&mut report, problem, &look.steps, seconds, asked.ranks);
+    say::cost(&mut report, &run.cost, asked.ranks, run.ghosts);
+    say::time(&mut report, problem, run.stable_step);
+    say::steps(&mut report, problem, &run.steps);
+    if let Some(seconds) = run.seconds {
+        say::run_time(&mut report, problem, &run.steps, seconds, asked.ranks);
     }
     say::warnings(&mut report, asked.deck, &survey.warnings);
     Ok(report)

@@ -115,7 +115,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
     };
     report.line("neighbours inside", interior.neighbours);
     let share = |found: f64, wanted: f64| format!("{:+.1} %", 100.0 * (found / wanted - 1.0));
-    let [bulk, shear] = interior.wanted;
+    let [bulk, shear] = interior.exact;
     let name = match problem.dimension {
         Dimension::Space => "bulk modulus inside",
         _ => "expansion inside",

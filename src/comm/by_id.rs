@@ -1,8 +1,7 @@
-//! Values of points in the order of their global ids, dealt out to the ranks in blocks.
+//! Redistribution of point values between owners and blocks of consecutive global ids.
 //!
-//! Files hold points in this order, so that they do not depend on the number of ranks. Points of refined
-//! grids have ids above those of level 0, and follow the one of level 0 that their id is a multiple of the
-//! number of such points away from.
+//! Files store points by id, so they do not depend on the number of ranks. A point of a refined level
+//! has the id m + k n, where n is the number of level-0 points and k ≥ 1. It follows level-0 point m.
 
 use std::ops::Range;
 
@@ -11,23 +10,24 @@ use rayon::prelude::*;
 
 use super::Communicator;
 
-/// The way between the points that a rank owns and its block of points by id.
+/// The plan between the owned points of a rank and its block of ids.
 pub struct IdOrder {
     first: u64,
     count: usize,
-    /// For each rank, which owned points have ids in its block.
+    /// For each rank: the owned points with ids in its block.
     owned: Vec<Vec<u32>>,
-    /// For each rank, which rows of this rank's block are points that it owns.
+    /// For each rank: the rows of this rank's block that it owns.
     rows: Vec<Vec<u32>>,
 }
 
 impl IdOrder {
-    /// For owned points with these ids; on all ranks `coarsest` points are of level 0. Collective.
+    /// Build the plan for the ids of the owned points; `coarsest` is the number of level-0 points of all
+    /// ranks. Collective.
     pub fn new(comm: &dyn Communicator, ids: &[u64], coarsest: u64) -> Self {
         let size = comm.size() as u64;
         let border =
             |rank: u64| (u128::from(coarsest) * u128::from(rank) / u128::from(size)) as u64;
-        // The first guess can be one too low, by the rounding of the borders.
+        // The guess can be one too low, as the borders are rounded down.
         let home = |id: u64| {
             let id = id % coarsest;
             let guess = (u128::from(id) * u128::from(size) / u128::from(coarsest)) as u64;
@@ -75,16 +75,14 @@ impl IdOrder {
         self.count
     }
 
-    /// From values of the owned points, `width` a point, to those of this rank's block of ids.
-    /// Collective.
+    /// Redistribute values, `width` per point, from the owned points to this rank's block. Collective.
     pub fn collect<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
         let row = |row: usize| row * width..(row + 1) * width;
         let from = (&self.owned[..], values, row);
         transfer(comm, from, (&self.rows[..], self.count * width, row))
     }
 
-    /// From values of this rank's block of ids, `width` an id, to those of the owned points.
-    /// Collective.
+    /// Redistribute values, `width` per point, from this rank's block to the owned points. Collective.
     pub fn spread<T: Pod>(&self, comm: &dyn Communicator, values: &[T], width: usize) -> Vec<T> {
         let row = |row: usize| row * width..(row + 1) * width;
         let from = (&self.rows[..], values, row);
@@ -92,8 +90,8 @@ impl IdOrder {
         transfer(comm, from, (&self.owned[..], owned * width, row))
     }
 
-    /// As [`Self::collect`] for rows of different lengths: `owned` and `block` are the lengths of the
-    /// rows of the owned points and of this rank's block.
+    /// As [`Self::collect`], for rows of different lengths: `owned` and `block` are the row lengths of the
+    /// owned points and of this rank's block.
     pub fn collect_ragged<T: Pod>(
         &self,
         comm: &dyn Communicator,
@@ -132,7 +130,7 @@ impl IdOrder {
     }
 }
 
-/// Where each row starts, and where the last one ends.
+/// The start of each row, then the end of the last one.
 fn offsets(lengths: &[u32]) -> Vec<usize> {
     let ends = lengths.iter().scan(0, |end, length| {
         *end += *length as usize;
@@ -141,17 +139,18 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
     std::iter::once(0).chain(ends).collect()
 }
 
-/// Sends the listed rows of an array to each rank, and puts what comes into the listed rows of a new
-/// array of the size given; the functions tell where a row stands.
+/// Send rows of `values` to each rank and write the received rows to a new array of length `size`.
+///
+/// `from_rows` and `to_rows` list the rows per rank; `from` and `to` map a row to its range.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),
     (to_rows, size, to): (&[Vec<u32>], usize, impl Fn(usize) -> Range<usize>),
 ) -> Vec<T> {
-    let here = comm.rank();
+    let this_rank = comm.rank();
     let pack = |(rank, rows): (usize, &Vec<u32>)| {
-        // What stays needs no message.
-        let rows = if rank == here { &[] } else { &rows[..] };
+        // Rows that stay on this rank are copied below without a message.
+        let rows = if rank == this_rank { &[] } else { &rows[..] };
         let lengths = rows.iter().map(|row| from(*row as usize).len());
         let mut bytes = Vec::with_capacity(size_of::<T>() * lengths.sum::<usize>());
         for row in rows {
@@ -161,19 +160,19 @@ fn transfer<T: Pod>(
     };
     let incoming = comm.all_to_all(from_rows.iter().enumerate().map(pack).collect());
     let mut result = vec![T::zeroed(); size];
-    for (own, place) in from_rows[here].iter().zip(&to_rows[here]) {
-        result[to(*place as usize)].copy_from_slice(&values[from(*own as usize)]);
+    for (source, target) in from_rows[this_rank].iter().zip(&to_rows[this_rank]) {
+        result[to(*target as usize)].copy_from_slice(&values[from(*source as usize)]);
     }
     for (rank, (rows, bytes)) in to_rows.iter().zip(incoming).enumerate() {
-        if rank == here {
+        if rank == this_rank {
             continue;
         }
         let mut rest = &bytes[..];
         for row in rows {
-            let place: &mut [u8] = bytemuck::cast_slice_mut(&mut result[to(*row as usize)]);
-            let (own, more) = rest.split_at(place.len());
-            place.copy_from_slice(own);
-            rest = more;
+            let target: &mut [u8] = bytemuck::cast_slice_mut(&mut result[to(*row as usize)]);
+            let (source, remaining) = rest.split_at(target.len());
+            target.copy_from_slice(source);
+            rest = remaining;
         }
     }
     result
@@ -188,14 +187,14 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn there_and_back(
+        fn spread_inverts_collect(
             owners in prop::collection::vec(0_usize..4, 1..60),
             ranks in 1_usize..5,
         ) {
             let total = owners.len() as u64;
             let blocks = threads::run(ranks, |comm| {
-                let mine = |(id, owner): (u64, &usize)| (owner % ranks == comm.rank()).then_some(id);
-                let mut ids: Vec<u64> = (0..).zip(&owners).filter_map(mine).collect();
+                let owned_id = |(id, owner): (u64, &usize)| (owner % ranks == comm.rank()).then_some(id);
+                let mut ids: Vec<u64> = (0..).zip(&owners).filter_map(owned_id).collect();
                 ids.reverse();
                 let order = IdOrder::new(comm, &ids, total);
                 let values: Vec<f64> = ids.iter().flat_map(|id| [*id as f64, -1.0]).collect();

@@ -1,38 +1,37 @@
-//! Flushing of files that are written through MPI to disk (fsync). HDF5 asks for it at every flush; a thread can leave it
-//! out.
+//! A switch for the fsync of files written through MPI. HDF5 calls `MPI_File_sync` at every flush.
 
 use std::cell::Cell;
 use std::os::raw::c_int;
 
 thread_local! {
-    static LEFT_OUT: Cell<bool> = const { Cell::new(false) };
+    static SKIP_FSYNC: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `work`, which writes files through MPI, without flushing them to disk (fsync).
-pub fn without_confirmation<T>(work: impl FnOnce() -> T) -> T {
-    /// Restores what was set before, also when `work` panics.
+/// Run `work` with fsync disabled on this thread.
+pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
+    /// Restores the previous value, also when `work` panics.
     struct Restore(bool);
 
     impl Drop for Restore {
         fn drop(&mut self) {
-            LEFT_OUT.set(self.0);
+            SKIP_FSYNC.set(self.0);
         }
     }
 
-    let _restore = Restore(LEFT_OUT.replace(true));
+    let _restore = Restore(SKIP_FSYNC.replace(true));
     work()
 }
 
-/// MPI's call, by way of its profiling interface: a program's own definition is found before the library's.
+/// Override of `MPI_File_sync` through MPI's profiling interface: the linker prefers this definition.
 ///
 /// # Safety
-/// As the library's: `file` must be open.
+/// `file` must be open.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn MPI_File_sync(file: mpi_sys::MPI_File) -> c_int {
-    if LEFT_OUT.get() {
+    if SKIP_FSYNC.get() {
         return mpi_sys::MPI_SUCCESS as c_int;
     }
-    // SAFETY: passed on to the caller.
+    // SAFETY: the caller's contract is the same.
     unsafe { mpi_sys::PMPI_File_sync(file) }
 }
 
@@ -42,12 +41,12 @@ mod tests {
 
     #[test]
     fn files_are_flushed_again_after_a_panic() {
-        let caught = std::panic::catch_unwind(|| without_confirmation(|| panic!("while writing")));
-        assert!(caught.is_err() && !LEFT_OUT.get());
-        without_confirmation(|| {
-            without_confirmation(|| ());
-            assert!(LEFT_OUT.get());
+        let caught = std::panic::catch_unwind(|| without_fsync(|| panic!("while writing")));
+        assert!(caught.is_err() && !SKIP_FSYNC.get());
+        without_fsync(|| {
+            without_fsync(|| ());
+            assert!(SKIP_FSYNC.get());
         });
-        assert!(!LEFT_OUT.get());
+        assert!(!SKIP_FSYNC.get());
     }
 }

@@ -1,51 +1,50 @@
-//! The halo plan: which owned points go to which rank, and where the ghosts that come back lie.
+//! The halo plan: the owned points sent to each rank, and the ghosts received from it.
 //!
-//! Ghosts follow the owned points, grouped by owner and sorted by id, so that what one rank sends is
-//! one contiguous range here.
+//! Ghosts follow the owned points, grouped by owner and sorted by id. So the ghosts of one owner are
+//! one contiguous range.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use super::{Communicator, During, Message};
+use super::{Communicator, During, PeerBuffers};
 
-/// What is exchanged with one other rank.
+/// The exchange with one other rank.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Neighbour {
     /// The other rank.
     pub rank: usize,
-    /// Local indices of owned points that are ghosts there, in the order of that rank's ghosts.
+    /// Local indices of owned points that are ghosts of the other rank, in the order of its ghosts.
     pub send: Vec<u32>,
-    /// Local indices of the ghosts that this rank owns.
+    /// Local indices of the ghosts that the other rank owns.
     pub receive: Range<usize>,
 }
 
-/// What a rank has sent so far.
+/// Accumulated traffic of a rank.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// Messages.
+    /// Messages sent.
     pub messages: u64,
-    /// Bytes in them.
+    /// Bytes sent.
     pub bytes: u64,
-    /// Time that they took of the rank: sending, driving them on and waiting, without the work that
-    /// was done meanwhile.
+    /// Communication time: sending, progress and waiting, without the overlapped work.
     pub time: Duration,
 }
 
-/// The problem with its message buffers, all allocated once.
+/// The halo plan with its buffers, allocated once.
 #[derive(Debug, Default)]
 pub struct Halo {
     neighbours: Vec<Neighbour>,
-    messages: Vec<Message>,
-    /// What has been sent by [`Self::exchange`].
+    buffers: Vec<PeerBuffers>,
+    /// Accumulated traffic of [`Self::exchange`].
     pub sent: Traffic,
 }
 
 impl Halo {
-    /// Prepares messages of up to `width` numbers a point.
+    /// Allocate buffers of up to `width` values per point.
     pub fn new(neighbours: Vec<Neighbour>, width: usize) -> Self {
-        let messages = neighbours
+        let buffers = neighbours
             .iter()
-            .map(|neighbour| Message {
+            .map(|neighbour| PeerBuffers {
                 rank: neighbour.rank,
                 send: Vec::with_capacity(width * neighbour.send.len()),
                 receive: Vec::with_capacity(width * neighbour.receive.len()),
@@ -53,76 +52,75 @@ impl Halo {
             .collect();
         Self {
             neighbours,
-            messages,
+            buffers,
             sent: Traffic::default(),
         }
     }
 
-    /// Number of ranks that it exchanges with.
+    /// Number of neighbouring ranks.
     pub fn neighbours(&self) -> usize {
         self.neighbours.len()
     }
 
-    /// Follows the owned points to another order; `place` has the new local index of each.
-    pub fn renumber(&mut self, place: &[u32]) {
+    /// Renumber the owned points; `new_index` maps old to new local indices.
+    pub fn renumber(&mut self, new_index: &[u32]) {
         for neighbour in &mut self.neighbours {
             for index in &mut neighbour.send {
-                *index = place[*index as usize];
+                *index = new_index[*index as usize];
             }
         }
     }
 
-    /// Brings the entries of ghosts from their owners: `components` are arrays over the local points. Collective.
-    pub fn bring(&mut self, comm: &dyn Communicator, components: &mut [&mut [f64]]) {
+    /// Update the ghost entries of `components`, arrays over the local points. Collective.
+    pub fn update_ghosts(&mut self, comm: &dyn Communicator, components: &mut [&mut [f64]]) {
         self.pack(components.iter().map(|component| &**component));
         self.exchange(comm, &mut |_| {});
         self.unpack(components.iter_mut().map(|component| &mut **component));
     }
 
-    /// Copies the values that other ranks need into the messages: `components` are arrays over the
-    /// local points, each sent for every point.
+    /// Copy values of owned points into the send buffers; `components` are arrays over the local points.
     pub fn pack<'a>(&mut self, components: impl ExactSizeIterator<Item = &'a [f64]> + Clone) {
-        for (neighbour, message) in self.neighbours.iter().zip(&mut self.messages) {
-            message.send.clear();
+        for (neighbour, buffers) in self.neighbours.iter().zip(&mut self.buffers) {
+            buffers.send.clear();
             let count = components.len();
             for component in components.clone() {
                 let values = neighbour.send.iter().map(|i| component[*i as usize]);
-                message.send.extend(values);
+                buffers.send.extend(values);
             }
-            message.receive.resize(count * neighbour.receive.len(), 0.0);
+            buffers.receive.resize(count * neighbour.receive.len(), 0.0);
         }
     }
 
-    /// Sends what was packed, and calls `during` while the messages are in flight; see
+    /// Send the packed values, and call `during` while the messages are in flight; see
     /// [`Communicator::exchange`].
     pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut During<'_>) {
         let start = Instant::now();
         let mut working = Duration::ZERO;
-        self.sent.messages += self.messages.len() as u64;
-        for message in &self.messages {
-            self.sent.bytes += size_of_val(&message.send[..]) as u64;
+        self.sent.messages += self.buffers.len() as u64;
+        for buffers in &self.buffers {
+            self.sent.bytes += size_of_val(&buffers.send[..]) as u64;
         }
-        comm.exchange(&mut self.messages, &mut |progress| {
+        comm.exchange(&mut self.buffers, &mut |progress| {
             let start = Instant::now();
-            let mut driving = Duration::ZERO;
+            let mut progressing = Duration::ZERO;
             during(&mut || {
                 let start = Instant::now();
-                let under_way = progress();
-                driving += start.elapsed();
-                under_way
+                let in_flight = progress();
+                progressing += start.elapsed();
+                in_flight
             });
-            working += start.elapsed() - driving;
+            working += start.elapsed() - progressing;
         });
         self.sent.time += start.elapsed() - working;
     }
 
-    /// Copies what was received to the ghosts: the same arrays, in the same order, as in `pack`.
+    /// Copy the received values to the ghosts of the arrays that were packed, in the same order.
     pub fn unpack<'a>(&self, components: impl Iterator<Item = &'a mut [f64]>) {
         for (k, component) in components.enumerate() {
-            for (neighbour, message) in self.neighbours.iter().zip(&self.messages) {
+            for (neighbour, buffers) in self.neighbours.iter().zip(&self.buffers) {
                 let count = neighbour.receive.len();
                 component[neighbour.receive.clone()]
-                    .copy_from_slice(&message.receive[k * count..(k + 1) * count]);
+                    .copy_from_slice(&buffers.receive[k * count..(k + 1) * count]);
             }
         }
     }

@@ -1,9 +1,8 @@
-//! Talking between ranks. The only folder that names MPI.
+//! Communication between ranks. No other folder calls MPI.
 //!
-//! The rest of the code sees [`Communicator`]: a handful of collective operations and one
-//! nearest-neighbour exchange that runs work while messages are in flight. Two things implement it:
-//! [`mpi::World`] for real runs and [`threads`] for one rank without MPI and for ranks that are
-//! threads of one process, in tests.
+//! All other code uses [`Communicator`]: a few collective operations and one halo exchange that
+//! overlaps with computation. It has two implementations: [`mpi::World`], and [`threads`] for one rank
+//! without MPI and for tests with several ranks in one process.
 
 mod by_id;
 mod file_sync;
@@ -13,30 +12,30 @@ pub mod sum;
 pub mod threads;
 
 pub use by_id::IdOrder;
-pub use file_sync::without_confirmation;
+pub use file_sync::without_fsync;
 pub use halo::Halo;
 pub use sum::ExactSum;
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// The raw MPI handle that the parallel file layer needs.
+/// The raw MPI handle; parallel HDF5 needs it.
 pub type RawCommunicator = mpi_sys::MPI_Comm;
 
-/// One message each way between this rank and another.
+/// The send and receive buffers of one pair of ranks.
 #[derive(Debug, Default)]
-pub struct Message {
+pub struct PeerBuffers {
     /// The other rank.
     pub rank: usize,
-    /// What goes there.
+    /// Values to send.
     pub send: Vec<f64>,
-    /// Where its message lands; the length is what is expected.
+    /// Received values; its length is the expected message length.
     pub receive: Vec<f64>,
 }
 
-/// Work that is done while messages are in flight; see [`Communicator::exchange`].
+/// Work that overlaps with an exchange; see [`Communicator::exchange`].
 pub type During<'a> = dyn FnMut(&mut dyn FnMut() -> bool) + 'a;
 
-/// What a rank can ask of the others. Every method is collective: all ranks call it alike.
+/// A group of ranks. All methods but [`Self::rank`], [`Self::size`], [`Self::abort`] and [`Self::raw`] are collective.
 pub trait Communicator {
     /// This rank's number, from 0.
     fn rank(&self) -> usize;
@@ -50,26 +49,26 @@ pub trait Communicator {
     /// Element-wise maximum over the ranks, in place. Values must not be NaN.
     fn max(&self, values: &mut [f64]);
 
-    /// Replaces `data` on every rank by that of `root`.
+    /// Replace `data` on every rank by that of rank `root`.
     fn broadcast(&self, root: usize, data: &mut Vec<u8>);
 
-    /// Sends `outgoing[q]` to rank q; returns what each rank sent here, by rank.
+    /// Send `outgoing[q]` to rank q; return the received buffers by rank.
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
 
-    /// Sends and receives all messages, and calls `during` while they are in flight.
+    /// Send and receive all buffers, and call `during` while messages are in flight.
     ///
-    /// Large messages move only while MPI is called: `during` should call its argument now and then,
-    /// which drives them on and returns whether any is still under way.
-    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>);
+    /// Large messages progress only inside MPI calls. So `during` should call its argument from time to
+    /// time: it drives progress and returns true while any message is in flight.
+    fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>);
 
-    /// Ends all ranks at once, for when agreement is no longer possible.
+    /// Abort all ranks, for errors on which they can no longer agree.
     fn abort(&self, code: i32) -> !;
 
-    /// The raw MPI handle, where there is one.
+    /// The raw MPI handle; `None` without MPI.
     fn raw(&self) -> Option<RawCommunicator>;
 }
 
-/// Sum of one count over the ranks.
+/// Sum of one value over the ranks.
 pub fn total(comm: &dyn Communicator, value: u64) -> u64 {
     let mut values = [value];
     comm.sum(&mut values);
@@ -91,7 +90,7 @@ pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
     values
 }
 
-/// The values of all ranks, one after the other in rank order; ranks may have different numbers of them.
+/// The values of all ranks, concatenated in rank order; ranks may have different counts.
 pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
     let bytes: &[u8] = bytemuck::cast_slice(own);
     let all = comm.all_to_all(vec![bytes.to_vec(); comm.size()]).concat();
@@ -105,8 +104,7 @@ pub fn scan(comm: &dyn Communicator, value: u64) -> (u64, u64) {
     (before, values.iter().sum())
 }
 
-/// Turns a result that can differ between ranks into one that does not: where any rank failed, all
-/// get the error of the lowest rank that did.
+/// Make a result equal on all ranks: if any rank failed, all return the error of the lowest failed rank.
 pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     let none = comm.size() as f64;
     let mut first = [if result.is_err() {
@@ -156,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_ranks_leave_with_the_lowest_failing_ranks_error() {
+    fn all_ranks_return_the_error_of_the_lowest_failed_rank() {
         for span in [None, Some(3..5), Some(0..0)] {
             let errors = threads::run(4, |comm| {
                 let rank = comm.rank();
@@ -186,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn scan_gives_what_came_before_and_the_total() {
+    fn scan_returns_the_exclusive_prefix_sum_and_the_total() {
         let scans = threads::run(3, |comm| scan(comm, 10 * (comm.rank() as u64 + 1)));
         assert_eq!(scans, [(0, 60), (10, 60), (30, 60)]);
     }

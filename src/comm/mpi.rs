@@ -1,6 +1,6 @@
-//! The communicator of a real run: MPI's world.
+//! The communicator of MPI runs: `MPI_COMM_WORLD`.
 //!
-//! Only the thread that made the world may call it (MPI's "funneled" level of thread support).
+//! Only the thread that created the world may call it (`MPI_THREAD_FUNNELED`).
 
 use std::cell::{RefCell, RefMut};
 use std::ffi::c_void;
@@ -13,24 +13,24 @@ use mpi::topology::{Communicator as _, SimpleCommunicator};
 use mpi::traits::*;
 use mpi_sys::{MPI_Request, RSMPI_COMM_WORLD};
 
-use super::{Communicator, During, Message, RawCommunicator};
+use super::{Communicator, During, PeerBuffers, RawCommunicator};
 use crate::error::{Error, Result};
 
-/// One MPI message holds at most this many bytes: counts are 32-bit.
+/// Maximum bytes per MPI message, as counts are 32-bit.
 const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
 
-// `mpi-sys` is not built anew when another MPI is chosen within one target folder.
+// Cargo does not rebuild `mpi-sys` when the MPI library changes.
 const _: () = assert!(
     OF_OPEN_MPI == cfg!(open_mpi),
     "the target folder holds bindings to another MPI: take one folder for each (--target-dir), or \
      run `cargo clean -p mpi-sys`"
 );
 
-/// Whether the bindings are those of Open MPI.
+/// The bindings are those of Open MPI.
 const OF_OPEN_MPI: bool = {
-    // Theirs, where there is one, goes before the one below.
+    // The constant of Open MPI's bindings, if present, shadows the fallback below.
     #[allow(unused_imports)]
     use mpi_sys::*;
     OMPI_MAJOR_VERSION > 0
@@ -49,7 +49,7 @@ pub fn library() -> String {
     name_and_version(&text)
 }
 
-/// The beginning of what an MPI library says of itself, such as `Open MPI v4.1.4, package: …`.
+/// The name and version at the start of an MPI version string, such as `Open MPI v4.1.4, package: …`.
 fn name_and_version(text: &str) -> String {
     let line = text.lines().next().unwrap_or_default();
     let beginning = line.split(',').next().unwrap_or_default();
@@ -59,9 +59,9 @@ fn name_and_version(text: &str) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// All ranks that `mpirun` started; one rank when started without it.
+/// All ranks that `mpirun` started; one rank without `mpirun`.
 ///
-/// It stays on the thread that made it, whatever the MPI library's handles are:
+/// It is not `Send`, whatever the type of the MPI library's handles:
 ///
 /// ```compile_fail,E0277
 /// fn move_to_a_thread<T: Send>() {}
@@ -69,9 +69,9 @@ fn name_and_version(text: &str) -> String {
 /// ```
 pub struct World {
     world: SimpleCommunicator,
-    /// Kept so that an exchange in the time loop allocates nothing.
+    /// Reused, so an exchange in the time loop does not allocate.
     requests: RefCell<Vec<MPI_Request>>,
-    _stays: PhantomData<*const ()>,
+    _not_send: PhantomData<*const ()>,
     // Dropped last: it calls MPI_Finalize.
     _universe: Universe,
 }
@@ -80,7 +80,7 @@ impl World {
     /// Starts MPI.
     ///
     /// # Errors
-    /// When MPI was started before in this process or has no support for threads.
+    /// If MPI is already running in this process or lacks `MPI_THREAD_FUNNELED`.
     pub fn start() -> Result<Self> {
         let (universe, level) = mpi::initialize_with_threading(mpi::Threading::Funneled)
             .ok_or_else(|| Error::run("MPI is already running in this process"))?;
@@ -92,12 +92,12 @@ impl World {
         Ok(Self {
             world: universe.world(),
             requests: RefCell::default(),
-            _stays: PhantomData,
+            _not_send: PhantomData,
             _universe: universe,
         })
     }
 
-    /// For new messages; those of before have arrived.
+    /// The empty set of requests; all previous ones have completed.
     fn in_flight(&self) -> InFlight<'_> {
         InFlight(self.requests.borrow_mut())
     }
@@ -127,19 +127,19 @@ impl World {
     }
 }
 
-/// Messages under way. Dropping it waits for all of them, also while a panic unwinds, so that no
-/// buffer is freed that MPI still reads or writes.
+/// Non-blocking messages in flight. Drop waits for all of them, also during unwinding, so MPI never
+/// accesses a freed buffer.
 struct InFlight<'a>(RefMut<'a, Vec<MPI_Request>>);
 
 impl InFlight<'_> {
-    /// Begins to send.
+    /// Start a send.
     ///
     /// # Safety
-    /// The bytes must stay in place and unchanged until `self` is dropped, and it must be dropped.
+    /// The bytes must stay valid and unchanged until `self` is dropped, and `self` must be dropped.
     unsafe fn send(&mut self, bytes: &[u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks(LARGEST_MESSAGE) {
-            // SAFETY: the chunk is valid for as long as the caller promises, and its length fits a
-            // C integer. MPI ends the job where the rank or the call is wrong.
+            // SAFETY: the caller keeps the chunk valid, and its length fits a C integer. MPI aborts
+            // the job on an invalid rank or call.
             self.0.push(unsafe {
                 let mut request = mpi_sys::RSMPI_REQUEST_NULL;
                 mpi_sys::MPI_Isend(
@@ -156,14 +156,13 @@ impl InFlight<'_> {
         }
     }
 
-    /// Begins to receive.
+    /// Start a receive.
     ///
     /// # Safety
-    /// The bytes must stay in place, and nobody else may touch them, until `self` is dropped, and it
-    /// must be dropped.
+    /// The bytes must stay valid and unaccessed until `self` is dropped, and `self` must be dropped.
     unsafe fn receive(&mut self, bytes: &mut [u8], rank: usize, tag: c_int) {
         for chunk in bytes.chunks_mut(LARGEST_MESSAGE) {
-            // SAFETY: as for sending. A message longer than the chunk ends the job.
+            // SAFETY: as for sending. MPI aborts the job if a message is longer than the chunk.
             self.0.push(unsafe {
                 let mut request = mpi_sys::RSMPI_REQUEST_NULL;
                 mpi_sys::MPI_Irecv(
@@ -180,11 +179,11 @@ impl InFlight<'_> {
         }
     }
 
-    /// Moves what can be moved now; returns whether any message is still under way.
+    /// Drive progress; return true while any message is in flight.
     fn advance(&mut self) -> bool {
         let count = self.0.len() as c_int;
         let mut arrived = 0;
-        // SAFETY: these are as many requests, each made by MPI; those that are completed are null.
+        // SAFETY: `count` requests created by MPI; completed ones are null.
         unsafe {
             mpi_sys::MPI_Testall(
                 count,
@@ -200,7 +199,7 @@ impl InFlight<'_> {
 impl Drop for InFlight<'_> {
     fn drop(&mut self) {
         let count = self.0.len() as c_int;
-        // SAFETY: these are as many requests, each made by MPI; those that are completed are null.
+        // SAFETY: `count` requests created by MPI; completed ones are null.
         unsafe {
             mpi_sys::MPI_Waitall(count, self.0.as_mut_ptr(), mpi_sys::RSMPI_STATUSES_IGNORE);
         }
@@ -251,32 +250,32 @@ impl Communicator for World {
             .collect();
         let mut in_flight = self.in_flight();
         for (rank, bytes) in incoming.iter_mut().enumerate() {
-            // SAFETY: `incoming` outlives `in_flight` and is not touched meanwhile.
+            // SAFETY: `incoming` outlives `in_flight` and is not accessed before its drop.
             unsafe { in_flight.receive(bytes, rank, SET_UP_TAG) };
         }
         for (rank, bytes) in outgoing.iter().enumerate() {
-            // SAFETY: `outgoing` outlives `in_flight` and is not changed meanwhile.
+            // SAFETY: `outgoing` outlives `in_flight` and is not changed before its drop.
             unsafe { in_flight.send(bytes, rank, SET_UP_TAG) };
         }
         drop(in_flight);
         incoming
     }
 
-    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>) {
+    fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>) {
         let mut in_flight = self.in_flight();
-        for message in messages.iter_mut() {
-            let bytes = bytemuck::cast_slice_mut(&mut message.receive);
-            // SAFETY: `messages` outlives `in_flight`; nobody but this function can reach it, and
-            // it leaves the buffers alone.
-            unsafe { in_flight.receive(bytes, message.rank, HALO_TAG) };
+        for peer in buffers.iter_mut() {
+            let bytes = bytemuck::cast_slice_mut(&mut peer.receive);
+            // SAFETY: `buffers` outlives `in_flight`, is borrowed exclusively by this function, and is
+            // not accessed before the drop.
+            unsafe { in_flight.receive(bytes, peer.rank, HALO_TAG) };
         }
-        for message in messages.iter() {
-            let bytes = bytemuck::cast_slice(&message.send);
+        for peer in buffers.iter() {
+            let bytes = bytemuck::cast_slice(&peer.send);
             // SAFETY: as above.
-            unsafe { in_flight.send(bytes, message.rank, HALO_TAG) };
+            unsafe { in_flight.send(bytes, peer.rank, HALO_TAG) };
         }
         during(&mut || in_flight.advance());
-        // Waits, here and where `during` panics.
+        // Waits; the implicit drop does so if `during` panics.
         drop(in_flight);
     }
 
@@ -285,7 +284,7 @@ impl Communicator for World {
     }
 
     fn raw(&self) -> Option<RawCommunicator> {
-        // SAFETY: a constant of the MPI library.
+        // SAFETY: reads a constant of the MPI library.
         Some(unsafe { RSMPI_COMM_WORLD })
     }
 }
@@ -295,7 +294,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn libraries_by_their_names() {
+    fn library_names_and_versions() {
         for (text, name) in [
             (
                 "Open MPI v4.1.4, package: Debian OpenMPI, ident: 4.1.4",

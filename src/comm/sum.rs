@@ -1,15 +1,15 @@
-//! A sum of floating-point numbers that does not depend on their order.
+//! An exact floating-point sum, independent of the order of its terms.
 //!
-//! Every `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide enough fixed-point integer holds any sum
-//! exactly. Integer addition is associative: whatever the ranks and threads, the result is the same
-//! to the bit, and correctly rounded to within one unit in the last place.
+//! Every finite `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide fixed-point integer holds any sum
+//! exactly. Integer addition is associative, so the result is bit-identical on any number of ranks and
+//! threads. It is within one unit in the last place of the exact sum.
 
 use super::Communicator;
 
 const LIMB_BITS: usize = 32;
 /// 2⁻¹⁰⁷⁴ … 2¹⁰²³ are 2098 bits; two more limbs hold the carries of 2⁶³ terms.
 const LIMBS: usize = 2098_usize.div_ceil(LIMB_BITS) + 2;
-/// Each term adds less than 2³² to a limb, so a limb holds 2³⁰ terms before it must be carried.
+/// Each term adds less than 2³² to a limb, so 2³⁰ terms fit before a carry.
 const TERMS_BEFORE_CARRY: u32 = 1 << 30;
 
 /// An exact accumulator of finite `f64` terms.
@@ -36,7 +36,7 @@ impl Default for ExactSum {
 }
 
 impl ExactSum {
-    /// Adds one term. A term that is not finite makes the whole sum NaN.
+    /// Add one term. A term that is not finite makes the sum NaN.
     pub fn add(&mut self, term: f64) {
         let bits = term.to_bits();
         let exponent = (bits >> 52 & 0x7ff) as usize;
@@ -65,7 +65,7 @@ impl ExactSum {
         }
     }
 
-    /// Adds all terms of another sum.
+    /// Add another sum.
     pub fn merge(&mut self, other: &Self) {
         let mut other = other.clone();
         other.carry();
@@ -77,7 +77,7 @@ impl ExactSum {
         self.carry();
     }
 
-    /// Brings every limb but the highest into 0 … 2³² − 1.
+    /// Propagate carries, so every limb but the highest is in 0 … 2³² − 1.
     fn carry(&mut self) {
         let mut carry = 0;
         for limb in &mut self.limbs[..LIMBS - 1] {
@@ -89,7 +89,7 @@ impl ExactSum {
         self.pending = 1;
     }
 
-    /// The sum of the terms on this rank.
+    /// The sum of this rank's terms.
     pub fn value(&self) -> f64 {
         if !self.finite {
             return f64::NAN;
@@ -104,7 +104,7 @@ impl ExactSum {
         let Some(top) = magnitude.limbs.iter().rposition(|limb| *limb != 0) else {
             return 0.0;
         };
-        // The four highest limbs hold at least 97 significant bits: one rounding to 53.
+        // The four highest limbs hold at least 97 significant bits; the conversion rounds once to 53.
         let lowest = top.saturating_sub(3);
         let head = magnitude.limbs[lowest..=top]
             .iter()
@@ -115,13 +115,13 @@ impl ExactSum {
     }
 }
 
-/// `value` · 2^`exponent`, in two factors since 2^`exponent` alone may underflow.
+/// `value` · 2^`exponent`, in two factors because 2^`exponent` can underflow.
 fn scale(value: f64, exponent: i32) -> f64 {
     let half = exponent / 2;
     value * 2_f64.powi(half) * 2_f64.powi(exponent - half)
 }
 
-/// Sums over all ranks, one result for each accumulator; equal to the bit on any number of ranks.
+/// Sum each accumulator over all ranks; the results are bit-identical on any number of ranks. Collective.
 pub fn reduce(comm: &dyn Communicator, sums: &mut [ExactSum]) -> Vec<f64> {
     let mut words = Vec::with_capacity(sums.len() * (LIMBS + 1));
     for sum in sums.iter_mut() {
@@ -167,7 +167,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_order_and_any_split_give_the_same_bits(
+        fn the_sum_is_independent_of_order_and_ranks(
             terms in prop::collection::vec(-1e20..1e20_f64, 0..40),
             small in prop::collection::vec(-1e-20..1e-20_f64, 0..40),
             ranks in 1_usize..5,

@@ -1,10 +1,10 @@
-//! Ranks that are threads of one process: for one rank without MPI, and for tests of several.
+//! Ranks as threads of one process: for one rank without MPI, and for tests with several.
 
 use std::sync::{Arc, Barrier, Mutex};
 
-use super::{Communicator, During, Message, RawCommunicator};
+use super::{Communicator, During, PeerBuffers, RawCommunicator};
 
-/// What the ranks share: a barrier and, per pair of ranks, a slot for one message.
+/// The shared state of the ranks: a barrier, and a slot for one message per pair of ranks.
 struct Shared {
     barrier: Barrier,
     slots: Vec<Mutex<Vec<u8>>>,
@@ -36,7 +36,7 @@ fn group(size: usize) -> Vec<ThreadRank> {
         .collect()
 }
 
-/// Runs `body` on `size` ranks, each a thread, and returns their results in rank order.
+/// Run `body` on `size` ranks, one thread each; return their results in rank order.
 pub fn run<T: Send>(size: usize, body: impl Fn(&dyn Communicator) -> T + Sync) -> Vec<T> {
     std::thread::scope(|scope| {
         let handles: Vec<_> = group(size)
@@ -122,18 +122,18 @@ impl Communicator for ThreadRank {
         incoming
     }
 
-    fn exchange(&self, messages: &mut [Message], during: &mut During<'_>) {
+    fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>) {
         let mut outgoing = vec![Vec::new(); self.size];
-        for message in messages.iter() {
-            outgoing[message.rank] = bytemuck::cast_slice(&message.send).to_vec();
+        for peer in buffers.iter() {
+            outgoing[peer.rank] = bytemuck::cast_slice(&peer.send).to_vec();
         }
-        // Messages move when all ranks have done their work.
-        let under_way = !messages.is_empty();
-        during(&mut || under_way);
+        // Messages are delivered only after `during`, so they count as in flight until then.
+        let in_flight = !buffers.is_empty();
+        during(&mut || in_flight);
         let incoming = self.all_to_all(outgoing);
-        for message in messages {
-            let values: Vec<f64> = bytemuck::pod_collect_to_vec(&incoming[message.rank]);
-            message.receive.copy_from_slice(&values);
+        for peer in buffers {
+            let values: Vec<f64> = bytemuck::pod_collect_to_vec(&incoming[peer.rank]);
+            peer.receive.copy_from_slice(&values);
         }
     }
 

@@ -1,5 +1,4 @@
-//! The order of a rank's points: points of a grid so that adjacent ones that are worked on together
-//! follow one another.
+//! The order of a rank's points: the points of a lane group get consecutive local indices.
 
 use rayon::prelude::*;
 
@@ -8,19 +7,19 @@ use crate::partition::Domain;
 
 use super::grid::GridFrame;
 
-/// Lines in a tile, in y and in z; the points around a tile stay in the cache while it is worked on.
+/// Lines per tile in y and in z; a tile and its neighbours fit in the cache.
 const TILE: i64 = 8;
 
-/// A point of a grid on its way to its place in the order.
+/// A sort record of a grid point.
 #[derive(Clone, Copy)]
-struct Placed {
+struct GridPoint {
     cell: [i64; 3],
     index: u32,
     grid: u16,
     border: bool,
 }
 
-impl Placed {
+impl GridPoint {
     fn line(&self) -> (u16, [i64; 3]) {
         let [x, y, z] = self.cell;
         (self.grid, [z, y, x])
@@ -33,24 +32,27 @@ impl Placed {
     }
 }
 
-/// Orders the owned points of a domain. Of those on a grid, up to eight that are adjacent along x get
-/// consecutive local indices, all of them counted as border points if any of them is one. Interior
-/// points come first; then those on no grid, in the order that they had; then those of each grid.
+/// Sort the owned points of a domain.
+///
+/// - Up to eight grid points adjacent along x get consecutive local indices. If one of them is a
+///   border point, all count as border points.
+/// - Interior points come before border points.
+/// - Within each of these, points on no grid come first, in their previous order; then each grid's.
 pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     if frames.is_empty() {
         return;
     }
     let owned = &domain.points[..domain.owned];
-    let mut placed = Vec::with_capacity(domain.owned);
+    let mut grid_points = Vec::with_capacity(domain.owned);
     let mut order: Vec<u32> = Vec::with_capacity(domain.owned);
     let mut scattered_border = Vec::new();
     for (point, index) in owned.iter().zip(0..) {
         let border = index as usize >= domain.interior;
-        let on = |frame: &GridFrame| frame.blocks[point.block as usize];
-        match frames.iter().position(on) {
+        let contains = |frame: &GridFrame| frame.blocks[point.block as usize];
+        match frames.iter().position(contains) {
             None if border => scattered_border.push(index),
             None => order.push(index),
-            Some(grid) => placed.push(Placed {
+            Some(grid) => grid_points.push(GridPoint {
                 cell: frames[grid].cell(point.position),
                 index,
                 grid: grid as u16,
@@ -58,26 +60,27 @@ pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
             }),
         }
     }
-    placed.par_sort_unstable_by_key(Placed::line);
-    for vector in vectors_mut(&mut placed) {
+    grid_points.par_sort_unstable_by_key(GridPoint::line);
+    for vector in vectors_mut(&mut grid_points) {
         let border = vector.iter().any(|point| point.border);
         for point in vector {
             point.border = border;
         }
     }
-    placed.par_sort_unstable_by_key(Placed::order);
-    let (inner, outer) = placed.split_at(placed.partition_point(|point| !point.border));
-    order.extend(inner.iter().map(|point| point.index));
+    grid_points.par_sort_unstable_by_key(GridPoint::order);
+    let (interior_points, border_points) =
+        grid_points.split_at(grid_points.partition_point(|point| !point.border));
+    order.extend(interior_points.iter().map(|point| point.index));
     let interior = order.len();
     order.extend(scattered_border);
-    order.extend(outer.iter().map(|point| point.index));
-    drop(placed);
+    order.extend(border_points.iter().map(|point| point.index));
+    drop(grid_points);
     domain.reorder(&order, interior);
 }
 
-/// Points in line order by groups of up to eight that are adjacent along x.
-fn vectors_mut(points: &mut [Placed]) -> impl Iterator<Item = &mut [Placed]> {
-    let adjacent = |a: &Placed, b: &Placed| {
+/// Split points in line order into groups of up to eight that are adjacent along x.
+fn vectors_mut(points: &mut [GridPoint]) -> impl Iterator<Item = &mut [GridPoint]> {
+    let adjacent = |a: &GridPoint, b: &GridPoint| {
         let (grid, [z, y, x]) = a.line();
         (grid, [z, y, x + 1]) == b.line()
     };

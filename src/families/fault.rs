@@ -1,4 +1,4 @@
-//! What can be wrong with points so that they cannot be bonded.
+//! Errors of building families.
 
 use crate::error::Error;
 use crate::memory::Shortage;
@@ -7,36 +7,36 @@ use crate::points::Point;
 use crate::problem::Problem;
 use crate::problem::{Body, PointSource};
 
-/// The most neighbours of a point; a horizon of 16 spacings has as many in 3-D, one of 80 in the plane.
+/// Upper limit on the neighbours of a point, reached at a horizon of 16 spacings in 3-D and 80 in 2-D.
 pub const MOST_NEIGHBOURS: f64 = 20_000.0;
 
-/// Why points cannot be bonded.
+/// An error of building families.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
-    /// Two points lie at the same place.
+    /// Two points with the same position.
     SamePlace([Point; 2]),
-    /// A point would have too many neighbours.
+    /// A point with more than [`MOST_NEIGHBOURS`] neighbours.
     TooManyNeighbours {
-        /// Its block and that of the neighbours.
+        /// The blocks of the point and of its neighbours.
         blocks: [usize; 2],
-        /// How many there would be, as far as that is known.
+        /// Estimated number of neighbours, where it is known.
         neighbours: Option<f64>,
-        /// The horizon in spacings of the neighbours, if they lie on a lattice.
+        /// Horizon over the spacing of the neighbours, if they lie on a lattice.
         spacings: Option<f64>,
     },
-    /// Bonds do not fit in memory.
+    /// Bonds that do not fit in memory.
     TooLittleMemory {
-        /// The blocks that most of them join.
+        /// The blocks joined by most of the bonds.
         blocks: [usize; 2],
-        /// What the bonds take, and what there is.
+        /// Needed and available memory.
         shortage: Shortage,
     },
-    /// The layout of a grid has too many places without a point.
+    /// A grid layout with too many empty slots.
     TooManyHoles,
 }
 
 impl Fault {
-    /// The error, with the place in the deck that it is about.
+    /// The error message, with the deck key that causes it.
     pub fn error(&self, problem: &Problem) -> Error {
         match self {
             Self::SamePlace(points) => same_place(problem, points),
@@ -60,15 +60,15 @@ fn same_place(problem: &Problem, points: &[Point; 2]) -> Error {
     let [a, b] = *points;
     let [first, second] = if a.id < b.id { [a, b] } else { [b, a] };
     let [body, other] = [second, first].map(|point| problem.block(point.block as usize).body);
-    let place = &first.position[..problem.dimension.count()];
+    let position = &first.position[..problem.dimension.count()];
     let message = if body.name == other.name {
         format!(
-            "[body.{}]: its points {} and {} lie at the same place, {place:?} m",
+            "[body.{}]: its points {} and {} lie at the same place, {position:?} m",
             body.name, first.id, second.id
         )
     } else {
         format!(
-            "[body.{}]: its point {} lies at the same place as point {} of [body.{}], {place:?} m; \
+            "[body.{}]: its point {} lies at the same place as point {} of [body.{}], {position:?} m; \
              do the bodies overlap?",
             body.name, second.id, first.id, other.name
         )
@@ -76,13 +76,13 @@ fn same_place(problem: &Problem, points: &[Point; 2]) -> Error {
     Error::input(message).at(&body.span)
 }
 
-/// A large number for a message, to two digits.
+/// Format a large number to two significant digits.
 fn rounded(value: f64) -> String {
     let unit = libm::pow(10_f64, libm::log10(value).floor() - 1.0);
     format_number((value / unit).round() * unit)
 }
 
-/// The key that gives a body its horizon.
+/// The deck key that sets the horizon of a body.
 fn horizon_key(problem: &Problem, body: &Body) -> String {
     if body.horizon_place == problem.places.horizon {
         "[grid] horizon".to_owned()
@@ -124,7 +124,7 @@ fn too_many_neighbours(
     let [near, other] = blocks.map(|block| problem.block(block));
     let (body, other) = (near.body, other.body);
     let key = horizon_key(problem, body);
-    // The horizon itself, where the longest bond may be longer: cells are shared.
+    // The longest bond may exceed the horizon by part of a cell, so compute the ratio from the deck's horizon.
     let spacings = match &other.points {
         PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),
         PointSource::File { .. } => spacings,

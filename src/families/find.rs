@@ -1,4 +1,4 @@
-//! All families of a rank: lattices where two blocks lie on the same grid, lists elsewhere.
+//! The families of a rank: lattices for two blocks on the same grid, lists for all others.
 
 use std::sync::Arc;
 
@@ -8,12 +8,13 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::offset::most_neighbours;
 use super::{BlockBonds, BondLattice, Grid, GridFrame, search};
 
-/// The families of a domain that has been [arranged](super::arrange) for these grids, for blocks
-/// 0 … `blocks` − 1, by blocks; and the layouts of the grids. `cutoffs` has the longest bond (m) of
-/// each pair of blocks, row by row, and is symmetric.
+/// Build the families of a domain, sorted by block pair, and the layouts of the grids.
+///
+/// The domain has been [arranged](super::arrange) for these grids. `cutoffs` is the symmetric
+/// `blocks` × `blocks` matrix of longest bonds, m.
 ///
 /// # Errors
-/// When two points lie at the same place, one would have too many neighbours, or there is not enough memory.
+/// If two points coincide, a point would have too many neighbours, or memory is insufficient.
 pub fn find(
     domain: &Domain,
     frames: &[GridFrame],
@@ -22,14 +23,14 @@ pub fn find(
     dimension: usize,
 ) -> Result<(Vec<BlockBonds>, Vec<Arc<Grid>>), Fault> {
     let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-    let shared = |pair: usize| {
-        let [here, there] = [pair / blocks, pair % blocks];
+    let common_frame = |pair: usize| {
+        let [block_i, block_j] = [pair / blocks, pair % blocks];
         frames
             .iter()
-            .position(|frame| frame.blocks[here] && frame.blocks[there])
+            .position(|frame| frame.blocks[block_i] && frame.blocks[block_j])
     };
     for (pair, cutoff) in cutoffs.iter().enumerate() {
-        let Some(frame) = shared(pair).map(|index| &frames[index]) else {
+        let Some(frame) = common_frame(pair).map(|index| &frames[index]) else {
             continue;
         };
         let cells = std::array::from_fn(|k| domain.extent[k] / frame.spacing[k] + 1.0);
@@ -47,11 +48,17 @@ pub fn find(
         .iter()
         .map(layout)
         .collect::<Result<Vec<_>, Fault>>()?;
-    // Points of one grid that lie at the same place have been found with its layout.
+    // Grid::new has checked the points of one grid for coincidence; the list search checks the others.
     let listed: Vec<f64> = cutoffs
         .iter()
         .enumerate()
-        .map(|(pair, cutoff)| if shared(pair).is_some() { 0.0 } else { *cutoff })
+        .map(|(pair, cutoff)| {
+            if common_frame(pair).is_some() {
+                0.0
+            } else {
+                *cutoff
+            }
+        })
         .collect();
     let mut families = Vec::new();
     if listed.iter().any(|cutoff| *cutoff > 0.0) {
@@ -61,18 +68,18 @@ pub fn find(
                 .map(BlockBonds::List),
         );
     }
-    let mut is_there = vec![[false; 2]; blocks];
+    let mut present = vec![[false; 2]; blocks];
     for (k, point) in domain.points.iter().enumerate() {
-        let [owned, local] = &mut is_there[point.block as usize];
+        let [owned, local] = &mut present[point.block as usize];
         *owned |= k < domain.owned;
         *local = true;
     }
     for (pair, cutoff) in cutoffs.iter().enumerate() {
         let ends = [pair / blocks, pair % blocks];
-        if !is_there[ends[0]][0] || !is_there[ends[1]][1] {
+        if !present[ends[0]][0] || !present[ends[1]][1] {
             continue;
         }
-        if let Some(index) = shared(pair) {
+        if let Some(index) = common_frame(pair) {
             let grid = grids[index].clone();
             let lattice = BondLattice::new(index, grid, domain, ends, *cutoff, dimension)?;
             if !lattice.is_empty() {
@@ -92,8 +99,9 @@ mod tests {
     use crate::points::Point;
 
     fn cube(edge: u64) -> (Domain, GridFrame) {
-        let place = |k: u64| [k % edge, k / edge % edge, k / edge / edge].map(|x| 1e-3 * x as f64);
-        let points = (0..edge.pow(3)).map(|k| Point::new(k, place(k), 1e-9, 0));
+        let position =
+            |k: u64| [k % edge, k / edge % edge, k / edge / edge].map(|x| 1e-3 * x as f64);
+        let points = (0..edge.pow(3)).map(|k| Point::new(k, position(k), 1e-9, 0));
         let domain = distribute(&threads::alone(), points.collect(), edge.pow(3), 3.0).unwrap();
         let frame = GridFrame {
             origin: [0.0; 3],

@@ -1,10 +1,10 @@
-//! The local points of a regular grid, line by line: the layout in which the neighbours of adjacent
-//! points are adjacent.
+//! The layout of the local points of a regular grid: adjacent points have adjacent neighbours.
 //!
-//! A line holds the points with the same y and z, x fastest, from the first to the last one here;
-//! places without a point are holes. Where no point is near, all lines end and others begin: the
-//! grid falls into bands, between which there are no bonds. Lines follow one another without gaps, so
-//! a place is one number.
+//! - A slot is an index in this layout. It holds one point or is a hole.
+//! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
+//!   last. Lines are stored without gaps.
+//! - A band is a range of x. Bands are farther apart than the longest bond, so no bond crosses from one
+//!   to another, and no line spans the space between them.
 
 use std::ops::Range;
 
@@ -17,74 +17,74 @@ use crate::partition::Domain;
 use super::fault::Fault;
 use super::offset::steps;
 
-/// A block number for holes.
+/// The block number of a hole.
 pub(super) const HOLE: u16 = u16::MAX;
 
-/// Places copied by one task.
+/// Slots copied by one task.
 const CHUNK: usize = 4096;
 
-/// Which blocks lie on a grid, and where the grid lies.
+/// The origin and spacing of a grid and the blocks on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridFrame {
     /// Centre of a cell, m.
     pub origin: [f64; 3],
     /// Edges of the cells by direction, m.
     pub spacing: [f64; 3],
-    /// Whether each block's points lie on it.
+    /// For each block: its points lie on the grid.
     pub blocks: Vec<bool>,
 }
 
 impl GridFrame {
-    /// The cell whose centre is at a position (m).
+    /// The cell whose centre is nearest to a position, m.
     pub fn cell(&self, position: [f64; 3]) -> [i64; 3] {
         std::array::from_fn(|k| ((position[k] - self.origin[k]) / self.spacing[k]).round() as i64)
     }
 }
 
-/// Points that lie in a row both in the grid and among the local points.
+/// Points with consecutive slots and consecutive local indices.
 #[derive(Debug, Clone, Copy)]
 struct Run {
-    place: u32,
+    slot: u32,
     point: u32,
     length: u32,
 }
 
-/// A line of places.
+/// A line of slots.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
-    /// The band, y and z.
+    /// Band, y and z.
     pub(super) at: [i64; 3],
-    /// x of the first place.
+    /// x of the first slot.
     pub(super) first: i64,
-    /// The first place.
+    /// The first slot.
     pub(super) start: usize,
-    /// Number of places.
+    /// Number of slots.
     pub(super) length: usize,
 }
 
-/// The layout of a grid's points on a rank, ghosts included. Before the first and after the last
-/// line there are more places without a point: from any place with one, eight can be read where its
-/// neighbours on any line of its band would be.
+/// The layout of a grid's local points, ghosts included.
+///
+/// Holes pad the layout at both ends. So a load of eight slots at any offset from an occupied slot
+/// stays in bounds.
 #[derive(Debug)]
 pub struct Grid {
     /// The grid.
     pub frame: GridFrame,
     pub(super) lines: Vec<Line>,
-    /// Block of the point in each place, or [`HOLE`].
+    /// Block of the point in each slot, or [`HOLE`].
     pub(super) blocks: Vec<u16>,
-    /// Owned points and ghosts, and where each chunk's runs start.
+    /// For owned points and for ghosts: the runs by slot, and the first run of each chunk.
     runs: [(Vec<Run>, Vec<u32>); 2],
-    /// Those of the owned points by ascending point.
+    /// The runs of the owned points, by local index.
     by_point: Vec<Run>,
     by_line: FxHashMap<[i64; 3], u32>,
 }
 
 impl Grid {
-    /// Lays out the points of a domain that lie on a grid; `longest` is the length of the longest
-    /// bond, m.
+    /// Lay out the points of a domain that lie on a grid; `longest` is the longest bond, m.
     ///
     /// # Errors
-    /// When two points lie at the same place, or there are too many holes between them.
+    /// If two points coincide, or the layout has too many holes.
     pub fn new(frame: GridFrame, domain: &Domain, longest: f64) -> Result<Self, Fault> {
         let cells: Vec<([i64; 3], u32)> = domain
             .points
@@ -124,7 +124,7 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // From any line of a band it must be possible to look at the same x on any other.
+        // Pad so that every x of a band, plus the longest bond, is in bounds relative to each of its lines.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];
@@ -135,26 +135,26 @@ impl Grid {
         let [front, back] = lines.iter().map(beyond).fold([width; 2], |most, next| {
             [most[0].max(next[0]), most[1].max(next[1])]
         });
-        let places = front as usize + total + back as usize;
-        if places > i32::MAX as usize {
+        let slots = front as usize + total + back as usize;
+        if slots > i32::MAX as usize {
             return Err(Fault::TooManyHoles);
         }
-        let (mut points, mut blocks) = (vec![0; places], vec![HOLE; places]);
+        let (mut points, mut blocks) = (vec![0; slots], vec![HOLE; slots]);
         let chunks = cells.chunk_by(|a, b| line_of(a) == line_of(b));
         for (line, own) in lines.iter_mut().zip(chunks) {
             line.start += front as usize;
             for ([_, _, x], index) in own {
-                let place = line.start + (x - line.first) as usize;
-                points[place] = *index;
-                blocks[place] = domain.points[*index as usize].block as u16;
+                let slot = line.start + (x - line.first) as usize;
+                points[slot] = *index;
+                blocks[slot] = domain.points[*index as usize].block as u16;
             }
         }
         let by_line = lines.iter().map(|line| line.at).zip(0..).collect();
         let runs = [true, false].map(|owned| {
-            let wanted = |place: usize| {
-                blocks[place] != HOLE && ((points[place] as usize) < domain.owned) == owned
+            let selected = |slot: usize| {
+                blocks[slot] != HOLE && ((points[slot] as usize) < domain.owned) == owned
             };
-            runs(&points, wanted)
+            runs(&points, selected)
         });
         let by_point = by_point(&runs[0].0);
         Ok(Self {
@@ -167,76 +167,74 @@ impl Grid {
         })
     }
 
-    /// Number of places, those before and after all lines included.
-    pub fn places(&self) -> usize {
+    /// Number of slots, padding included.
+    pub fn slots(&self) -> usize {
         self.blocks.len()
     }
 
-    /// The places of the owned points with their local indices, in the order of places.
+    /// The slots and local indices of the owned points, by slot.
     pub(super) fn owned(&self) -> impl Iterator<Item = (usize, u32)> {
         let (runs, _) = &self.runs[0];
         runs.iter()
-            .flat_map(|run| (0..run.length).map(|k| ((run.place + k) as usize, run.point + k)))
+            .flat_map(|run| (0..run.length).map(|k| ((run.slot + k) as usize, run.point + k)))
     }
 
-    /// Finds which points places have.
+    /// A cursor that maps slots to local indices.
     pub(super) fn lookup(&self) -> Lookup<'_> {
         Lookup {
             grid: self,
             last: Run {
-                place: 0,
+                slot: 0,
                 point: 0,
                 length: 0,
             },
         }
     }
 
-    /// The line in this band with this y and z, if there is one.
+    /// The line with a given band, y and z.
     pub(super) fn line(&self, at: [i64; 3]) -> Option<&Line> {
         let index = self.by_line.get(&at)?;
         Some(&self.lines[*index as usize])
     }
 
-    /// Copies the values of the local points, or of the ghosts among them only, to their places.
-    pub fn update(&self, which: Which, values: &[f64], places: &mut [f64]) {
+    /// Scatter the values of the selected local points to their slots.
+    pub fn update(&self, which: Which, values: &[f64], slots: &mut [f64]) {
         let kinds = match which {
             Which::Owned => 0..1,
             Which::Ghosts => 1..2,
             Which::All => 0..2,
         };
-        places
+        slots
             .par_chunks_mut(CHUNK)
             .enumerate()
-            .for_each(|(chunk, places)| {
+            .for_each(|(chunk, slots)| {
                 for (runs, starts) in &self.runs[kinds.clone()] {
                     for run in &runs[starts[chunk] as usize..starts[chunk + 1] as usize] {
-                        let place = run.place as usize - chunk * CHUNK;
+                        let slot = run.slot as usize - chunk * CHUNK;
                         let (point, length) = (run.point as usize, run.length as usize);
-                        places[place..place + length]
-                            .copy_from_slice(&values[point..point + length]);
+                        slots[slot..slot + length].copy_from_slice(&values[point..point + length]);
                     }
                 }
             });
     }
 
-    /// Where some of the owned points lie: each first place with the points, by local index, of which it is
-    /// that of the first, and after which those of the others follow. No two points have the same place.
-    pub fn places_of(&self, points: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+    /// Split a range of owned points into ranges with consecutive slots: each first slot and its points.
+    pub fn slots_of(&self, points: Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
         let end = |run: &Run| (run.point + run.length) as usize;
         let first = (self.by_point).partition_point(|run| end(run) <= points.start);
         let runs = self.by_point[first..].iter();
         let runs = runs.take_while(move |run| (run.point as usize) < points.end);
         runs.map(move |run| {
             let from = points.start.max(run.point as usize);
-            let place = run.place as usize + from - run.point as usize;
-            (place, from..points.end.min(end(run)))
+            let slot = run.slot as usize + from - run.point as usize;
+            (slot, from..points.end.min(end(run)))
         })
     }
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        let by_place: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
-        let runs = by_place + self.by_point.len();
+        let by_slot: usize = self.runs.iter().map(|(runs, _)| runs.len()).sum();
+        let runs = by_slot + self.by_point.len();
         self.blocks.len() * 2
             + size_of_val(&self.lines[..])
             + runs * size_of::<Run>()
@@ -244,45 +242,45 @@ impl Grid {
     }
 }
 
-/// Finds the local indices of the points at places, those of places near one another fastest.
+/// A cursor that maps slots to local indices; it caches the last run.
 pub(super) struct Lookup<'a> {
     grid: &'a Grid,
     last: Run,
 }
 
 impl Lookup<'_> {
-    /// The local index of the point at a place that has one.
-    pub(super) fn point(&mut self, place: usize) -> usize {
-        let place = place as u32;
-        let has = |run: &Run| (run.place..run.place + run.length).contains(&place);
+    /// The local index of the point in an occupied slot.
+    pub(super) fn point(&mut self, slot: usize) -> usize {
+        let slot = slot as u32;
+        let has = |run: &Run| (run.slot..run.slot + run.length).contains(&slot);
         if !has(&self.last) {
-            let chunk = place as usize / CHUNK;
+            let chunk = slot as usize / CHUNK;
             let last = |(runs, starts): &(Vec<Run>, Vec<u32>)| {
                 let runs = &runs[starts[chunk] as usize..starts[chunk + 1] as usize];
                 let before = runs
-                    .partition_point(|run| run.place <= place)
+                    .partition_point(|run| run.slot <= slot)
                     .checked_sub(1)?;
                 Some(runs[before]).filter(has)
             };
             let run = self.grid.runs.iter().find_map(last);
-            self.last = run.expect("the place has a point");
+            self.last = run.expect("the slot has a point");
         }
-        (self.last.point + (place - self.last.place)) as usize
+        (self.last.point + (slot - self.last.slot)) as usize
     }
 }
 
-/// Which of the local points.
+/// A subset of the local points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Which {
-    /// Those that the rank owns.
+    /// Points owned by this rank.
     Owned,
-    /// Those of other ranks.
+    /// Points owned by other ranks.
     Ghosts,
     /// Both.
     All,
 }
 
-/// The first x of each band: where more than `reach` steps before it there is no point.
+/// The first x of each band: no point lies within `reach` steps before it.
 fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
     let mut all: Vec<i64> = cells.iter().map(|([_, _, x], _)| *x).collect();
     all.par_sort_unstable();
@@ -295,13 +293,13 @@ fn bands(cells: &[([i64; 3], u32)], reach: i64) -> Vec<i64> {
         .collect()
 }
 
-/// Runs by ascending point, those that follow one another as one.
+/// Sort runs by local index and merge consecutive ones.
 fn by_point(runs: &[Run]) -> Vec<Run> {
     let mut sorted = runs.to_vec();
     sorted.sort_unstable_by_key(|run| run.point);
     sorted.dedup_by(|later, first| {
         let follows =
-            first.point + first.length == later.point && first.place + first.length == later.place;
+            first.point + first.length == later.point && first.slot + first.length == later.slot;
         if follows {
             first.length += later.length;
         }
@@ -311,29 +309,28 @@ fn by_point(runs: &[Run]) -> Vec<Run> {
     sorted
 }
 
-/// The longest runs of wanted places whose points follow one another, cut at the ends of chunks, and
-/// the first of each chunk.
-fn runs(points: &[u32], wanted: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
+/// The longest runs of the selected slots, split at chunk boundaries, and the first run of each chunk.
+fn runs(points: &[u32], selected: impl Fn(usize) -> bool) -> (Vec<Run>, Vec<u32>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut starts = Vec::new();
-    for place in 0..points.len() {
-        if place.is_multiple_of(CHUNK) {
+    for slot in 0..points.len() {
+        if slot.is_multiple_of(CHUNK) {
             starts.push(runs.len() as u32);
         }
-        if !wanted(place) {
+        if !selected(slot) {
             continue;
         }
-        let (point, place) = (points[place], place as u32);
+        let (point, slot) = (points[slot], slot as u32);
         match runs.last_mut() {
             Some(run)
-                if !(place as usize).is_multiple_of(CHUNK)
-                    && run.place + run.length == place
+                if !(slot as usize).is_multiple_of(CHUNK)
+                    && run.slot + run.length == slot
                     && run.point + run.length == point =>
             {
                 run.length += 1;
             }
             _ => runs.push(Run {
-                place,
+                slot,
                 point,
                 length: 1,
             }),
@@ -352,14 +349,14 @@ mod tests {
     use crate::points::Point;
 
     #[test]
-    fn every_point_lies_where_any_range_of_points_says() {
-        let place = |k: u64| [k % 9, k / 9 % 9, k / 81].map(|x| x as f64);
-        // Holes, and two bands.
-        let there = |at: &[f64; 3]| (at[0] - 4.0).abs() > 1.0 && at.iter().sum::<f64>() != 7.0;
-        let places: Vec<[f64; 3]> = (0..729).map(place).filter(there).collect();
-        let points = (0..).zip(&places);
+    fn slots_of_any_range_are_those_of_its_points() {
+        let position = |k: u64| [k % 9, k / 9 % 9, k / 81].map(|x| x as f64);
+        // A gap in x makes two bands; a plane of missing points makes holes.
+        let occupied = |at: &[f64; 3]| (at[0] - 4.0).abs() > 1.0 && at.iter().sum::<f64>() != 7.0;
+        let positions: Vec<[f64; 3]> = (0..729).map(position).filter(occupied).collect();
+        let points = (0..).zip(&positions);
         let points = points.map(|(k, at)| Point::new(k, *at, 1.0, 0)).collect();
-        let count = places.len();
+        let count = positions.len();
         let domain = distribute(&threads::alone(), points, count as u64, 1.5).unwrap();
         let frame = GridFrame {
             origin: [0.0; 3],
@@ -369,15 +366,15 @@ mod tests {
         let grid = Grid::new(frame, &domain, 1.5).unwrap();
         let mut expected = vec![0; count];
         grid.owned()
-            .for_each(|(place, point)| expected[point as usize] = place);
+            .for_each(|(slot, point)| expected[point as usize] = slot);
         for step in [1, 7, 100, count] {
             let mut found = vec![0; count];
             for first in (0..count).step_by(step) {
                 let points = first..(first + step).min(count);
-                for (place, some) in grid.places_of(points.clone()) {
+                for (slot, some) in grid.slots_of(points.clone()) {
                     assert!(points.start <= some.start && some.end <= points.end);
                     some.clone()
-                        .for_each(|point| found[point] = place + point - some.start);
+                        .for_each(|point| found[point] = slot + point - some.start);
                 }
             }
             assert_eq!(found, expected, "{step}");

@@ -1,5 +1,5 @@
-//! The lattice family: points of a regular grid, whose neighbours lie at fixed offsets. No list of
-//! neighbours is kept: a bond is one bit, and eight adjacent points along x are worked on together.
+//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is one
+//! bit, without a stored neighbour index. Eight points adjacent along x form a lane group.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,46 +14,45 @@ use super::fault::Fault;
 use super::grid::Grid;
 use super::offset::{Offset, offsets};
 use super::store::{Store, bit_bytes};
-use super::vectors::{Shared, Vector, Vectors, vectors};
+use super::vectors::{LatticeTables, Vector, Vectors, vectors};
 
 /// Vectors set up by one task.
 const CHUNK: usize = 256;
 
-/// The bonds from points of one block to points of one block on the same grid.
+/// The bonds from points i of one block to points j of one block on the same grid.
 #[derive(Debug, Clone)]
 pub struct BondLattice {
-    /// Block of the points that sum over these bonds.
-    pub here: usize,
-    /// Block of their neighbours.
-    pub there: usize,
-    /// Which of the rank's grids they lie on.
+    /// Block of i, the points that sum over these bonds.
+    pub block_i: usize,
+    /// Block of j, their neighbours.
+    pub block_j: usize,
+    /// Index of the grid.
     pub index: usize,
-    /// That grid.
+    /// The layout of the grid.
     pub grid: Arc<Grid>,
-    /// Volume of each neighbour, m³.
+    /// Volume of j, m³.
     pub volume: f64,
-    /// Volume of each point itself, m³.
+    /// Volume of i, m³.
     pub own_volume: f64,
     offsets: Vec<Offset>,
-    /// Whether any weight of an offset is not 1, and whether those of the ends differ.
+    /// Some weights differ from 1; the weights of i and j differ.
     weighted: [bool; 2],
-    /// By local index.
+    /// Sorted by local index.
     vectors: Vec<Vector>,
-    /// y and z of the lines around, in steps.
-    around: Vec<[i64; 2]>,
-    /// For each line of the grid: how far from a place the place with the same x lies on each of the
-    /// lines around.
+    /// Offsets in y and z, in steps, of the lines that hold neighbours.
+    line_offsets: Vec<[i64; 2]>,
+    /// For each line of the grid and each line offset: difference of the slots with equal x.
     shifts: Vec<i32>,
-    /// For each vector and offset what is kept of the bonds of the vector's points.
+    /// State of the bonds: a group for each vector and offset.
     pub(super) store: Store,
     bonds: u64,
 }
 
 impl BondLattice {
-    /// The bonds between two blocks on a grid of `dimension` dimensions; `cutoff` (m) is the longest.
+    /// Build the bonds, up to a length `cutoff` (m), between two blocks on a grid.
     ///
     /// # Errors
-    /// When there is not enough memory for them.
+    /// If memory is insufficient.
     pub fn new(
         index: usize,
         grid: Arc<Grid>,
@@ -62,22 +61,22 @@ impl BondLattice {
         cutoff: f64,
         dimension: usize,
     ) -> Result<Self, Fault> {
-        let (offsets, around) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
-        // A body whose points are farther apart than its bonds reach has none.
+        let (offsets, line_offsets) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
+        // A cutoff below the spacing leaves no offsets.
         let none = offsets.is_empty();
         let vectors = if none { Vec::new() } else { vectors(&grid) };
-        let shift_bytes = size_of::<i32>() * grid.lines.len() * around.len();
+        let shift_bytes = size_of::<i32>() * grid.lines.len() * line_offsets.len();
         let bytes = shift_bytes as u64 + vectors.len() as u64 * offsets.len() as u64;
         check_room(bytes).map_err(|shortage| Fault::TooLittleMemory { blocks, shortage })?;
-        let mut shifts = vec![0; grid.lines.len() * around.len()];
+        let mut shifts = vec![0; grid.lines.len() * line_offsets.len()];
         let origin = |line: &super::grid::Line| line.start as i64 - line.first;
         for (line, shifts) in grid
             .lines
             .iter()
-            .zip(shifts.chunks_mut(around.len().max(1)))
+            .zip(shifts.chunks_mut(line_offsets.len().max(1)))
         {
-            for ([y, z], shift) in around.iter().zip(shifts) {
-                // Where there is no line there is no bond either, so any place will do.
+            for ([y, z], shift) in line_offsets.iter().zip(shifts) {
+                // Without a line there is no bond, so the shift is never used.
                 if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
                     *shift = (origin(other) - origin(line)) as i32;
                 }
@@ -88,17 +87,17 @@ impl BondLattice {
             let point = domain.points.iter().find(of_block);
             point.map_or(0.0, |point| point.volume)
         };
-        let [here, there] = blocks;
+        let [block_i, block_j] = blocks;
         let mut lattice = Self {
-            here,
-            there,
+            block_i,
+            block_j,
             index,
-            volume: volume(there),
-            own_volume: volume(here),
+            volume: volume(block_j),
+            own_volume: volume(block_i),
             offsets,
             weighted: [false; 2],
             vectors,
-            around,
+            line_offsets,
             shifts,
             store: Store::default(),
             bonds: 0,
@@ -108,7 +107,7 @@ impl BondLattice {
         Ok(lattice)
     }
 
-    /// Sets all bits of bonds and keeps the vectors that have any.
+    /// Set the bits of all bonds and drop the vectors without any.
     fn find_bonds(&mut self) {
         let count = self.offsets.len().max(1);
         let mut intact = vec![0; self.vectors.len() * count];
@@ -121,42 +120,42 @@ impl BondLattice {
                 }
             });
         self.bonds = intact.iter().map(|bits| u64::from(bits.count_ones())).sum();
-        let mut kept = 0;
+        let mut used = 0;
         for k in 0..self.vectors.len() {
             let bits = k * count..(k + 1) * count;
             let members = intact[bits.clone()].iter().fold(0, |all, bits| all | bits);
             if members != 0 {
-                intact.copy_within(bits, kept * count);
-                self.vectors[kept] = Vector {
+                intact.copy_within(bits, used * count);
+                self.vectors[used] = Vector {
                     members,
                     ..self.vectors[k]
                 };
-                kept += 1;
+                used += 1;
             }
         }
-        self.vectors.truncate(kept);
+        self.vectors.truncate(used);
         self.vectors.shrink_to_fit();
-        intact.truncate(kept * count);
+        intact.truncate(used * count);
         intact.shrink_to_fit();
         self.store.intact = intact;
     }
 
-    /// The bits of a vector's bonds, broken ones included.
+    /// Compute the bits of a vector's bonds, intact or broken.
     fn family(&self, vector: &Vector, bits: &mut [u8]) {
         let grid = &*self.grid;
         let line = &grid.lines[vector.line as usize];
-        let x = line.first + vector.place as i64 - line.start as i64;
-        let own = vector.members & mask(grid, vector.place as usize, self.here);
-        if own == 0 {
+        let x = line.first + vector.slot as i64 - line.start as i64;
+        let mask_i = vector.members & mask(grid, vector.slot as usize, self.block_i);
+        if mask_i == 0 {
             bits.fill(0);
             return;
         }
-        let mut around = usize::MAX;
+        let mut current = usize::MAX;
         let mut target = None;
         for (offset, bits) in self.offsets.iter().zip(bits) {
-            if offset.line as usize != around {
-                around = offset.line as usize;
-                let [y, z] = self.around[around];
+            if offset.line as usize != current {
+                current = offset.line as usize;
+                let [y, z] = self.line_offsets[current];
                 target = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]);
             }
             *bits = 0;
@@ -172,12 +171,12 @@ impl BondLattice {
             } else {
                 (0..WIDTH).fold(0, |all, k| all | bit(k))
             };
-            let place = (target.start as i64 + first) as usize;
-            *bits = own & inside & mask(grid, place, self.there);
+            let slot = (target.start as i64 + first) as usize;
+            *bits = mask_i & inside & mask(grid, slot, self.block_j);
         }
     }
 
-    /// All bonds, broken ones included.
+    /// Number of bonds, intact or broken.
     pub fn bonds(&self) -> u64 {
         self.bonds
     }
@@ -192,7 +191,7 @@ impl BondLattice {
         self.vectors.is_empty()
     }
 
-    /// Number of bonds of a point with a whole family.
+    /// Number of bonds of a point whose family is complete.
     pub fn offsets(&self) -> usize {
         self.offsets.len()
     }
@@ -208,11 +207,11 @@ impl BondLattice {
         let count = self.offsets.len();
         let bits = range.start * count..range.end * count;
         Vectors {
-            lattice: Shared {
+            lattice: LatticeTables {
                 offsets: &self.offsets,
                 weighted: self.weighted,
                 shifts: &self.shifts,
-                around: self.around.len(),
+                lines: self.line_offsets.len(),
             },
             first: range.start,
             vectors: &self.vectors[range],
@@ -220,8 +219,7 @@ impl BondLattice {
         }
     }
 
-    /// Sets what volumes are multiplied by in the sums of one end, 0 the own, 1 the far one: `weight` of an
-    /// offset ξ (m).
+    /// Set the volume weights of end i (`end` = 0) or j (`end` = 1) to `weight(ξ)`, ξ in m.
     pub fn weigh(&mut self, end: usize, weight: impl Fn([f64; 3]) -> f64) {
         for offset in &mut self.offsets {
             offset.weights[end] = weight(offset.reference);
@@ -232,11 +230,10 @@ impl BondLattice {
         self.weighted[end] = true;
     }
 
-    /// Calls `found` with the index of the byte and the bit of each intact bond, and the local indices
-    /// of both ends.
-    fn for_each(&self, mut found: impl FnMut(usize, usize, [usize; 2])) {
+    /// Call `visit(group, lane, [i, j])` for each intact bond.
+    fn for_each(&self, mut visit: impl FnMut(usize, usize, [usize; 2])) {
         for k in 0..self.vectors.len() {
-            self.for_each_of(self.intact(k), k, &mut found);
+            self.for_each_of(self.intact(k), k, &mut visit);
         }
     }
 
@@ -246,16 +243,16 @@ impl BondLattice {
         &self.store.intact[vector * count..(vector + 1) * count]
     }
 
-    /// As [`Self::for_each`], of the bonds of one vector whose bits are given.
+    /// Call `visit(group, lane, [i, j])` for each set bit of one vector.
     fn for_each_of(
         &self,
         bits: &[u8],
         vector: usize,
-        found: &mut impl FnMut(usize, usize, [usize; 2]),
+        visit: &mut impl FnMut(usize, usize, [usize; 2]),
     ) {
         let first = vector * self.offsets.len();
         let vector = &self.vectors[vector];
-        let shifts = &self.shifts[vector.line as usize * self.around.len()..];
+        let shifts = &self.shifts[vector.line as usize * self.line_offsets.len()..];
         let mut lookup = self.grid.lookup();
         for (o, (offset, bits)) in self.offsets.iter().zip(bits).enumerate() {
             let mut bits = *bits;
@@ -263,44 +260,44 @@ impl BondLattice {
                 let lane = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let shift = shifts[offset.line as usize] + offset.x;
-                let place = vector.place as i64 + i64::from(shift) + lane as i64;
-                let there = lookup.point(place as usize);
-                found(first + o, lane, [vector.point as usize + lane, there]);
+                let slot = vector.slot as i64 + i64::from(shift) + lane as i64;
+                let j = lookup.point(slot as usize);
+                visit(first + o, lane, [vector.point as usize + lane, j]);
             }
         }
     }
 
-    /// The vector that a point is one of, if it has bonds here.
+    /// The vector of a point, if the point has bonds.
     fn vector_of(&self, point: usize) -> Option<usize> {
         let k = self.vectors_below(point + 1).checked_sub(1)?;
         (point < self.points_of(k).end).then_some(k)
     }
 
-    /// The points from the first of a vector to the last one that has bonds here.
+    /// The points of a vector up to the last one with bonds.
     fn points_of(&self, vector: usize) -> Range<usize> {
         let vector = &self.vectors[vector];
         let first = vector.point as usize;
         first..first + WIDTH - vector.members.leading_zeros() as usize
     }
 
-    /// See [`super::BlockBonds::together`].
+    /// See [`super::BlockBonds::lane_group`].
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         self.vector_of(point)
             .map_or(point..point + 1, |vector| self.points_of(vector))
     }
 
     /// See [`super::BlockBonds::for_each_neighbour`].
-    pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
+    pub fn for_each_neighbour(&self, point: usize, visit: &mut impl FnMut(usize)) {
         if let Some(vector) = self.vector_of(point) {
-            self.for_each_of(self.intact(vector), vector, &mut |_, _, [here, there]| {
-                if here == point {
-                    found(there);
+            self.for_each_of(self.intact(vector), vector, &mut |_, _, [i, j]| {
+                if i == point {
+                    visit(j);
                 }
             });
         }
     }
 
-    /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let mut breakable = vec![u8::MAX; self.store.intact.len()];
         self.for_each(|byte, lane, ends| {
@@ -312,29 +309,29 @@ impl BondLattice {
     }
 
     /// See [`super::BlockBonds::cut`].
-    pub fn cut(&mut self, concerned: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
-        let mut gone = Vec::new();
+    pub fn cut(&mut self, selected: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
+        let mut broken = Vec::new();
         for k in 0..self.vectors.len() {
-            if self.points_of(k).any(&concerned) {
-                self.for_each_of(self.intact(k), k, &mut |byte, lane, [here, there]| {
-                    if concerned(here) && cut(here, there) {
-                        gone.push((byte, lane));
+            if self.points_of(k).any(&selected) {
+                self.for_each_of(self.intact(k), k, &mut |byte, lane, [i, j]| {
+                    if selected(i) && cut(i, j) {
+                        broken.push((byte, lane));
                     }
                 });
             }
         }
-        for (byte, lane) in gone {
+        for (byte, lane) in broken {
             self.store.intact[byte] &= !(1 << lane);
         }
     }
 
-    /// Calls `found` with the local indices of both ends of every intact bond.
-    pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
-        self.for_each(|_, _, [here, there]| found(here, there));
+    /// Call `visit(i, j)` with the local indices of every intact bond.
+    pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
+        self.for_each(|_, _, [i, j]| visit(i, j));
     }
 
-    /// Calls `found` with the local indices of both ends of every broken bond.
-    pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
+    /// Call `visit(i, j)` with the local indices of every broken bond.
+    pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
         let mut broken = vec![0; self.offsets.len()];
         for (k, vector) in self.vectors.iter().enumerate() {
             let intact = self.intact(k);
@@ -345,55 +342,54 @@ impl BondLattice {
             for (bits, intact) in broken.iter_mut().zip(intact) {
                 *bits &= !intact;
             }
-            self.for_each_of(&broken, k, &mut |_, _, [here, there]| found(here, there));
+            self.for_each_of(&broken, k, &mut |_, _, [i, j]| visit(i, j));
         }
     }
 
-    /// Bytes of a checkpoint that the bonds of a point take.
+    /// Length of the checkpoint row of a point, bytes.
     pub fn row_length(&self) -> usize {
-        bit_bytes(self.offsets.len()) + self.offsets.len() * self.store.number_bytes()
+        bit_bytes(self.offsets.len()) + self.offsets.len() * self.store.history_bytes_per_bond()
     }
 
-    /// Calls `row` with the local index of each point and the number of the vector and lane that it
-    /// is.
-    pub fn for_each_point(&self, mut row: impl FnMut(usize, usize, usize)) {
+    /// Call `visit(point, vector, lane)` for each point with bonds.
+    pub fn for_each_point(&self, mut visit: impl FnMut(usize, usize, usize)) {
         for (k, vector) in self.vectors.iter().enumerate() {
             for lane in (0..WIDTH).filter(|lane| vector.members >> lane & 1 == 1) {
-                row(vector.point as usize + lane, k, lane);
+                visit(vector.point as usize + lane, k, lane);
             }
         }
     }
 
-    /// Copies what is kept of a point's bonds to bytes: first all bits, then the numbers.
+    /// Write the checkpoint row of a point: the intact bits, then the history.
     pub fn save_row(&self, vector: usize, lane: usize, row: &mut [u8]) {
         let count = self.offsets.len();
         let (bits, numbers) = row.split_at_mut(bit_bytes(count));
         bits.fill(0);
-        let width = self.store.number_bytes();
+        let width = self.store.history_bytes_per_bond();
         for o in 0..count {
             let group = vector * count + o;
             bits[o / 8] |= (self.store.intact[group] >> lane & 1) << (o % 8);
-            let place = o * width..(o + 1) * width;
-            self.store.save_numbers(group, lane, &mut numbers[place]);
+            let range = o * width..(o + 1) * width;
+            self.store.save_history(group, lane, &mut numbers[range]);
         }
     }
 
-    /// Puts back what [`Self::save_row`] gave.
+    /// Restore the row that [`Self::save_row`] wrote.
     pub fn restore_row(&mut self, vector: usize, lane: usize, row: &[u8]) {
         let count = self.offsets.len();
         let (bits, numbers) = row.split_at(bit_bytes(count));
-        let width = self.store.number_bytes();
+        let width = self.store.history_bytes_per_bond();
         for o in 0..count {
             let group = vector * count + o;
             let bit = bits[o / 8] >> (o % 8) & 1;
             let intact = &mut self.store.intact[group];
             *intact = *intact & !(1 << lane) | bit << lane;
-            let place = o * width..(o + 1) * width;
-            self.store.restore_numbers(group, lane, &numbers[place]);
+            let range = o * width..(o + 1) * width;
+            self.store.restore_history(group, lane, &numbers[range]);
         }
     }
 
-    /// A byte for each vector and offset with a bit for each bond, broken or not.
+    /// The bits of all bonds, intact or broken: a byte for each vector and offset.
     pub fn whole(&self) -> Vec<u8> {
         let count = self.offsets.len();
         let mut filled = vec![0; self.store.intact.len()];
@@ -403,15 +399,15 @@ impl BondLattice {
         filled
     }
 
-    /// Memory that the lattice takes beside its grid, bytes.
+    /// Memory without the grid, bytes.
     pub fn bytes(&self) -> usize {
         self.store.bytes() + size_of_val(&self.vectors[..]) + size_of_val(&self.shifts[..])
     }
 }
 
-/// A bit for each of eight places with a point of a block.
-fn mask(grid: &Grid, place: usize, block: usize) -> u8 {
-    let blocks = &grid.blocks[place..place + WIDTH];
+/// The bits of eight slots, set for points of a block.
+fn mask(grid: &Grid, slot: usize, block: usize) -> u8 {
+    let blocks = &grid.blocks[slot..slot + WIDTH];
     let bit = |k: usize| u8::from(blocks[k] as usize == block) << k;
     (0..WIDTH).fold(0, |all, k| all | bit(k))
 }

@@ -1,5 +1,5 @@
-//! The list family: for each point the indices of its neighbours, in groups of eight, and one bit a
-//! bond that says whether it is intact. Serves any cloud of points.
+//! List families, for any cloud of points: the neighbour indices of each point, in groups of eight, and
+//! one intact bit per bond.
 
 use rayon::prelude::*;
 
@@ -10,24 +10,24 @@ use crate::lanes::{Lanes, WIDTH};
 /// Rows handled by one task.
 const CHUNK: usize = 512;
 
-/// The bonds from points of one block to points of one block.
+/// The bonds from points i of one block to points j of one block.
 #[derive(Debug, Clone, Default)]
 pub struct BondList {
-    /// Block of the points that sum over these bonds.
-    pub here: usize,
-    /// Block of their neighbours.
-    pub there: usize,
+    /// Block of i, the points that sum over these bonds.
+    pub block_i: usize,
+    /// Block of j, their neighbours.
+    pub block_j: usize,
     /// Local index of each row's point, ascending.
     pub(super) points: Vec<u32>,
-    /// First group of each row, and the number of groups.
+    /// First group of each row, then the number of groups.
     pub(super) starts: Vec<usize>,
-    /// Local indices of the neighbours, row by row sorted by global id; the last group of a row is
-    /// filled up with the row's own point.
+    /// Local indices of the neighbours, sorted by global id in each row. Index i pads the last group of
+    /// a row.
     pub(super) neighbours: Neighbours,
-    /// What is kept of the bonds; bits are clear where a bond only fills up a group.
+    /// State of the bonds; the bits of padding are clear.
     pub(super) store: Store,
-    /// What volumes are multiplied by in the sums of the own and of the far end, 0 where a bond only
-    /// fills up a group; 1 if there are none, the own end's if the far end has none.
+    /// Volume weights of the ends i and j, 0 for padding. Without weights of i, all are 1; without
+    /// weights of j, those of i apply to both ends.
     pub(super) weights: [Option<Vec<Lanes>>; 2],
     /// One more than the largest local index in the list.
     pub(super) reach: usize,
@@ -39,10 +39,10 @@ pub struct Row<'a> {
     pub point: usize,
     /// Local indices of the neighbours.
     pub neighbours: NeighbourGroups<'a>,
-    /// What is kept of the bonds.
+    /// State of the bonds.
     pub groups: Groups<'a>,
-    /// What volumes are multiplied by in the sums of the own and of the far end; 1 if there are
-    /// none, the own end's if the far end has none.
+    /// Volume weights of the ends i and j. Without weights of i, all are 1; without weights of j, those
+    /// of i apply to both ends.
     pub weights: [Option<&'a [Lanes]>; 2],
 }
 
@@ -56,20 +56,20 @@ pub struct Rows<'a> {
 }
 
 impl BondList {
-    /// All bonds, broken ones included.
+    /// Number of bonds, intact or broken.
     pub fn bonds(&self) -> u64 {
         let filled = |row: usize| {
             let groups = self.starts[row]..self.starts[row + 1];
-            let own = self.points[row];
+            let i = self.points[row];
             groups
                 .flat_map(|group| self.neighbours.indices(group))
-                .filter(|there| *there != own)
+                .filter(|j| *j != i)
                 .count() as u64
         };
         (0..self.points.len()).map(filled).sum()
     }
 
-    /// Number of rows, those whose point has a local index below `limit`.
+    /// Number of rows whose point has a local index below `limit`.
     pub fn rows_below(&self, limit: usize) -> usize {
         self.points
             .partition_point(|point| (*point as usize) < limit)
@@ -80,17 +80,17 @@ impl BondList {
         self.points.len()
     }
 
-    /// Groups of a row, on average.
+    /// Mean number of groups per row.
     pub fn groups_a_row(&self) -> usize {
         self.neighbours.len().div_ceil(self.points.len().max(1))
     }
 
-    /// Whether there is no bond.
+    /// Whether j is no bond.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// One more than the largest local index that the list names.
+    /// One more than the largest local index in the list.
     pub fn reach(&self) -> usize {
         self.reach
     }
@@ -110,39 +110,39 @@ impl BondList {
         }
     }
 
-    /// Sets what volumes are multiplied by in the sums of the first `ends` ends, 0 the own, 1 the far one: `weight`
-    /// of an end and of ξ (m), which `offset` has of the two local indices.
+    /// Set the volume weights of end i (`ends` = 1) or of i and j (`ends` = 2) to `weight(end, ξ)`, with
+    /// ξ = `offset(i, j)` in m.
     pub fn weigh(
         &mut self,
         ends: usize,
         offset: impl Fn(usize, usize) -> [f64; 3] + Sync,
         weight: impl Fn(usize, [f64; 3]) -> f64 + Sync,
     ) {
-        let none =
+        let zeros =
             |end| vec![Lanes::splat(0.0); if end < ends { self.neighbours.len() } else { 0 }];
-        let mut all = [none(0), none(1)];
+        let mut all = [zeros(0), zeros(1)];
         let mut rest = all.each_mut().map(Vec::as_mut_slice);
         let mut tasks = Vec::new();
         for first in (0..self.points.len()).step_by(CHUNK) {
             let rows = first..(first + CHUNK).min(self.points.len());
             let groups = self.starts[rows.end] - self.starts[rows.start];
-            let own = rest.each_mut().map(|rest| {
+            let weights = rest.each_mut().map(|rest| {
                 let groups = groups.min(rest.len());
                 rest.split_off_mut(..groups).unwrap_or_default()
             });
-            tasks.push((rows, own));
+            tasks.push((rows, weights));
         }
         tasks.into_par_iter().for_each(|(rows, mut weights)| {
             let first = self.starts[rows.start];
             for row in rows {
-                let own = self.points[row];
+                let i = self.points[row];
                 for group in self.starts[row]..self.starts[row + 1] {
                     let neighbours = self.neighbours.indices(group);
-                    for (lane, there) in neighbours.iter().enumerate() {
-                        if *there == own {
+                    for (lane, j) in neighbours.iter().enumerate() {
+                        if *j == i {
                             continue;
                         }
-                        let offset = offset(own as usize, *there as usize);
+                        let offset = offset(i as usize, *j as usize);
                         for (end, weights) in weights.iter_mut().enumerate().take(ends) {
                             weights[group - first].0[lane] = weight(end, offset);
                         }
@@ -150,24 +150,24 @@ impl BondList {
                 }
             }
         });
-        for (kept, weights) in self.weights.iter_mut().zip(all).take(ends) {
-            *kept = Some(weights);
+        for (target, weights) in self.weights.iter_mut().zip(all).take(ends) {
+            *target = Some(weights);
         }
     }
 
-    /// Bytes that [`Self::weigh`] takes for so many ends.
+    /// Memory of the weights of `ends` ends, bytes.
     pub fn weight_bytes(&self, ends: usize) -> u64 {
         (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
     }
 
-    /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let mut breakable = vec![u8::MAX; self.neighbours.len()];
         for row in 0..self.points.len() {
-            let own = protected(self.points[row] as usize);
+            let protected_i = protected(self.points[row] as usize);
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
-                    if own || protected(*there as usize) {
+                for (k, j) in self.neighbours.indices(group).iter().enumerate() {
+                    if protected_i || protected(*j as usize) {
                         breakable[group] &= !(1 << k);
                     }
                 }
@@ -177,15 +177,15 @@ impl BondList {
     }
 
     /// See [`super::BlockBonds::cut`].
-    pub fn cut(&mut self, concerned: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
+    pub fn cut(&mut self, selected: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
         for row in 0..self.points.len() {
-            let own = self.points[row];
-            if !concerned(own as usize) {
+            let i = self.points[row];
+            if !selected(i as usize) {
                 continue;
             }
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
-                    if *there != own && cut(own as usize, *there as usize) {
+                for (k, j) in self.neighbours.indices(group).iter().enumerate() {
+                    if *j != i && cut(i as usize, *j as usize) {
                         self.store.intact[group] &= !(1 << k);
                     }
                 }
@@ -193,85 +193,85 @@ impl BondList {
         }
     }
 
-    /// Calls `found` with the local indices of both ends of every intact bond.
-    pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
+    /// Call `visit(i, j)` with the local indices of every intact bond.
+    pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
         for row in 0..self.points.len() {
             for group in self.starts[row]..self.starts[row + 1] {
-                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
+                for (k, j) in self.neighbours.indices(group).iter().enumerate() {
                     if self.store.intact[group] >> k & 1 == 1 {
-                        found(self.points[row] as usize, *there as usize);
+                        visit(self.points[row] as usize, *j as usize);
                     }
                 }
             }
         }
     }
 
-    /// Calls `found` with the local index of the far end of every intact bond of a point.
-    pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
+    /// Call `visit(j)` with the local index of every intact neighbour of a point.
+    pub fn for_each_neighbour(&self, point: usize, visit: &mut impl FnMut(usize)) {
         let Ok(row) = self.points.binary_search(&(point as u32)) else {
             return;
         };
         for group in self.starts[row]..self.starts[row + 1] {
-            for (k, there) in self.neighbours.indices(group).iter().enumerate() {
+            for (k, j) in self.neighbours.indices(group).iter().enumerate() {
                 if self.store.intact[group] >> k & 1 == 1 {
-                    found(*there as usize);
+                    visit(*j as usize);
                 }
             }
         }
     }
 
-    /// Calls `found` with the local indices of both ends of every broken bond.
-    pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
+    /// Call `visit(i, j)` with the local indices of every broken bond.
+    pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
         for row in 0..self.points.len() {
-            let own = self.points[row];
+            let i = self.points[row];
             let groups = self.starts[row]..self.starts[row + 1];
             for group in groups.filter(|group| self.store.intact[*group] != u8::MAX) {
-                for (k, there) in self.neighbours.indices(group).iter().enumerate() {
-                    if *there != own && self.store.intact[group] >> k & 1 == 0 {
-                        found(own as usize, *there as usize);
+                for (k, j) in self.neighbours.indices(group).iter().enumerate() {
+                    if *j != i && self.store.intact[group] >> k & 1 == 0 {
+                        visit(i as usize, *j as usize);
                     }
                 }
             }
         }
     }
 
-    /// Calls `found` with the number of each row, its point and the bytes of a checkpoint that its
-    /// bonds take, which are the same on any number of ranks.
-    pub fn for_each_row(&self, mut found: impl FnMut(usize, usize, usize)) {
-        let bytes = 1 + WIDTH * self.store.number_bytes();
+    /// Call `visit(row, point, bytes)` for each row: its index, its point and the length of its
+    /// checkpoint row.
+    pub fn for_each_row(&self, mut visit: impl FnMut(usize, usize, usize)) {
+        let bytes = 1 + WIDTH * self.store.history_bytes_per_bond();
         for (row, point) in self.points.iter().enumerate() {
             let groups = self.starts[row + 1] - self.starts[row];
-            found(row, *point as usize, groups * bytes);
+            visit(row, *point as usize, groups * bytes);
         }
     }
 
-    /// Copies what is kept of a row's bonds to bytes: for each group the bits, then the numbers.
+    /// Write the checkpoint row: for each group the intact bits, then the history.
     pub fn save_row(&self, row: usize, bytes: &mut [u8]) {
-        let width = self.store.number_bytes();
+        let width = self.store.history_bytes_per_bond();
         let groups = self.starts[row]..self.starts[row + 1];
         for (group, bytes) in groups.zip(bytes.chunks_exact_mut(1 + WIDTH * width)) {
             bytes[0] = self.store.intact[group];
             for lane in 0..WIDTH {
-                let place = 1 + lane * width..1 + (lane + 1) * width;
-                self.store.save_numbers(group, lane, &mut bytes[place]);
+                let range = 1 + lane * width..1 + (lane + 1) * width;
+                self.store.save_history(group, lane, &mut bytes[range]);
             }
         }
     }
 
-    /// Puts back what [`Self::save_row`] gave.
+    /// Restore the row that [`Self::save_row`] wrote.
     pub fn restore_row(&mut self, row: usize, bytes: &[u8]) {
-        let width = self.store.number_bytes();
+        let width = self.store.history_bytes_per_bond();
         let groups = self.starts[row]..self.starts[row + 1];
         for (group, bytes) in groups.zip(bytes.chunks_exact(1 + WIDTH * width)) {
             self.store.intact[group] = bytes[0];
             for lane in 0..WIDTH {
-                let place = 1 + lane * width..1 + (lane + 1) * width;
-                self.store.restore_numbers(group, lane, &bytes[place]);
+                let range = 1 + lane * width..1 + (lane + 1) * width;
+                self.store.restore_history(group, lane, &bytes[range]);
             }
         }
     }
 
-    /// Memory that the list takes, bytes.
+    /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         let groups = self.neighbours.len();
         4 * self.points.len()
@@ -288,7 +288,7 @@ impl<'a> Rows<'a> {
         self.points.len()
     }
 
-    /// Whether there is no row.
+    /// Whether j is no row.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
@@ -298,7 +298,7 @@ impl<'a> Rows<'a> {
         self.points[row] as usize
     }
 
-    /// The rows before `row` and those from it on.
+    /// Split before `row`.
     pub fn split_at(self, row: usize) -> (Self, Self) {
         let (points_a, points_b) = self.points.split_at(row);
         let group = self.starts[row] - self.starts[0];
@@ -339,12 +339,12 @@ impl<'a> Rows<'a> {
 }
 
 impl Row<'_> {
-    /// A bit for each bond of a group, broken or not, clear where it only fills up the group.
+    /// The bits of all bonds of a group, intact or broken; the bits of padding are clear.
     #[inline(always)]
     pub fn whole(&self, group: usize) -> u8 {
         let mut bits = 0;
-        for (k, there) in self.neighbours.group(group).indices().iter().enumerate() {
-            bits |= u8::from(*there as usize != self.point) << k;
+        for (k, j) in self.neighbours.group(group).indices().iter().enumerate() {
+            bits |= u8::from(*j as usize != self.point) << k;
         }
         bits
     }

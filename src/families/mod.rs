@@ -1,8 +1,8 @@
-//! Families: which points are bonded to which.
+//! Families: the bonds between points.
 //!
-//! Bonds are kept per ordered pair of blocks, so that one law serves all of a family. The sum over a
-//! point's bonds is the same sequence of operations on any number of ranks: a list is sorted by
-//! global id, a lattice by offset.
+//! Bonds are stored per ordered pair of blocks, so one law applies to all bonds of a [`BlockBonds`].
+//! The sum over the bonds of a point has the same order of operations on any number of ranks: lists
+//! are sorted by global id, lattices by offset.
 
 mod arrange;
 mod fault;
@@ -32,16 +32,16 @@ pub use store::{Groups, Store};
 pub use vectors::{VectorBonds, Vectors};
 pub use volume::CellShare;
 
-/// The bonds from points of one block to points of one block.
+/// The bonds from points i of one block to points j of one block.
 #[derive(Debug, Clone)]
 pub enum BlockBonds {
-    /// Of any cloud of points.
+    /// Neighbour lists, for any cloud of points.
     List(BondList),
-    /// Of points on a regular grid.
+    /// Bit masks by lattice offset, for points on a regular grid.
     Lattice(BondLattice),
 }
 
-/// Runs code for whichever storage bonds have.
+/// Dispatches on the storage of the bonds.
 macro_rules! with {
     ($all:expr, $bonds:ident => $body:expr) => {
         match $all {
@@ -52,12 +52,12 @@ macro_rules! with {
 }
 
 impl BlockBonds {
-    /// The blocks of the points that sum over these bonds, and of their neighbours.
+    /// The blocks of i (the points that sum over these bonds) and of j.
     pub fn blocks(&self) -> [usize; 2] {
-        with!(self, bonds => [bonds.here, bonds.there])
+        with!(self, bonds => [bonds.block_i, bonds.block_j])
     }
 
-    /// All bonds, each counted from its end here, broken ones included.
+    /// Number of bonds ij, intact or broken; a bond of two owned points counts at each end.
     pub fn bonds(&self) -> u64 {
         with!(self, bonds => bonds.bonds())
     }
@@ -67,29 +67,27 @@ impl BlockBonds {
         with!(self, bonds => bonds.bytes())
     }
 
-    /// Makes the bonds unbreakable that have an end for which `protected` (by local index) holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         with!(self, bonds => bonds.protect(protected));
     }
 
-    /// Breaks the bonds for which `cut` (of the two local indices) holds, of those points (by local index) that
-    /// are concerned.
-    pub fn cut(&mut self, concerned: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
-        with!(self, bonds => bonds.cut(concerned, cut));
+    /// Break the bonds ij for which `selected(i)` and `cut(i, j)` hold; i and j are local indices.
+    pub fn cut(&mut self, selected: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
+        with!(self, bonds => bonds.cut(selected, cut));
     }
 
-    /// Calls `found` with the local indices of both ends of every intact bond.
-    pub fn for_each_intact(&self, found: &mut impl FnMut(usize, usize)) {
-        with!(self, bonds => bonds.for_each_intact(found));
+    /// Call `visit(i, j)` with the local indices of every intact bond.
+    pub fn for_each_intact(&self, visit: &mut impl FnMut(usize, usize)) {
+        with!(self, bonds => bonds.for_each_intact(visit));
     }
 
-    /// Calls `found` with the local index of the far end of every intact bond of an owned point.
-    pub fn for_each_neighbour(&self, point: usize, found: &mut impl FnMut(usize)) {
-        with!(self, bonds => bonds.for_each_neighbour(point, found));
+    /// Call `visit(j)` with the local index of every intact neighbour of an owned point.
+    pub fn for_each_neighbour(&self, point: usize, visit: &mut impl FnMut(usize)) {
+        with!(self, bonds => bonds.for_each_neighbour(point, visit));
     }
 
-    /// The owned points, one after the other, whose bonds here are worked on together with those of a
-    /// point.
+    /// The consecutive owned points that share a lane group with a point.
     pub fn lane_group(&self, point: usize) -> Range<usize> {
         match self {
             Self::List(_) => point..point + 1,
@@ -97,39 +95,39 @@ impl BlockBonds {
         }
     }
 
-    /// Calls `found` with the local indices of both ends of every broken bond.
-    pub fn for_each_broken(&self, found: &mut impl FnMut(usize, usize)) {
-        with!(self, bonds => bonds.for_each_broken(found));
+    /// Call `visit(i, j)` with the local indices of every broken bond.
+    pub fn for_each_broken(&self, visit: &mut impl FnMut(usize, usize)) {
+        with!(self, bonds => bonds.for_each_broken(visit));
     }
 
-    /// Gives every bond so many numbers, which are 0.
-    pub fn allocate_history(&mut self, numbers: usize) {
-        with!(self, bonds => bonds.store.allocate_history(numbers));
+    /// Allocate `width` history numbers per bond, set to 0.
+    pub fn allocate_history(&mut self, width: usize) {
+        with!(self, bonds => bonds.store.allocate_history(width));
     }
 
-    /// What is kept of the bonds.
+    /// The state of the bonds.
     pub fn store(&self) -> &Store {
         with!(self, bonds => &bonds.store)
     }
 
-    /// What is kept of the bonds.
+    /// The state of the bonds.
     pub fn store_mut(&mut self) -> &mut Store {
         with!(self, bonds => &mut bonds.store)
     }
 
-    /// Calls `found` with each point that has bonds here and the number of bytes of a checkpoint that
-    /// they take. These bytes are the same on any number of ranks.
-    pub fn row_lengths(&self, mut found: impl FnMut(usize, usize)) {
+    /// Call `visit(i, bytes)` for each point with bonds: its local index and the length of its
+    /// checkpoint row. Rows are the same on any number of ranks.
+    pub fn row_lengths(&self, mut visit: impl FnMut(usize, usize)) {
         match self {
-            Self::List(list) => list.for_each_row(|_, point, length| found(point, length)),
+            Self::List(list) => list.for_each_row(|_, point, length| visit(point, length)),
             Self::Lattice(lattice) => {
                 let length = lattice.row_length();
-                lattice.for_each_point(|point, _, _| found(point, length));
+                lattice.for_each_point(|point, _, _| visit(point, length));
             }
         }
     }
 
-    /// Copies each point's bytes to where `next` says, and moves `next` on.
+    /// Write the checkpoint row of each point at `bytes[next[point]..]` and advance `next[point]`.
     pub fn save(&self, next: &mut [usize], bytes: &mut [u8]) {
         match self {
             Self::List(list) => list.for_each_row(|row, point, length| {
@@ -139,15 +137,15 @@ impl BlockBonds {
             Self::Lattice(lattice) => {
                 let length = lattice.row_length();
                 lattice.for_each_point(|point, vector, lane| {
-                    let place = next[point]..next[point] + length;
-                    lattice.save_row(vector, lane, &mut bytes[place]);
+                    let range = next[point]..next[point] + length;
+                    lattice.save_row(vector, lane, &mut bytes[range]);
                     next[point] += length;
                 });
             }
         }
     }
 
-    /// Puts back what [`Self::save`] gave.
+    /// Restore the rows that [`Self::save`] wrote.
     pub fn restore(&mut self, next: &mut [usize], bytes: &[u8]) {
         match self {
             Self::List(list) => {
@@ -163,8 +161,8 @@ impl BlockBonds {
                 let mut points = Vec::new();
                 lattice.for_each_point(|point, vector, lane| points.push((point, vector, lane)));
                 for (point, vector, lane) in points {
-                    let place = next[point]..next[point] + length;
-                    lattice.restore_row(vector, lane, &bytes[place]);
+                    let range = next[point]..next[point] + length;
+                    lattice.restore_row(vector, lane, &bytes[range]);
                     next[point] += length;
                 }
             }

@@ -1,8 +1,8 @@
-//! The local indices of the far ends of listed bonds, eight by eight, in as few bytes as they allow.
+//! Compressed neighbour indices of list families, in groups of eight.
 //!
-//! Points that lie near one another mostly have indices near one another, so a group keeps the lowest index
-//! and the distances from it in 16 bits. One whose indices lie farther apart, such as those of points on the
-//! rank and of ghosts, has them in full elsewhere.
+//! Points close in space mostly have close indices. A compact group stores its lowest index and eight
+//! 16-bit differences. A group with a wider range, such as owned points with ghosts, stores eight full
+//! indices in a second array.
 
 use std::ops::Range;
 
@@ -10,97 +10,97 @@ use rayon::prelude::*;
 
 use crate::lanes::WIDTH;
 
-/// The bit of [`Near::first`] that says that the others are the place among the groups in full. Local
-/// indices stay below it.
+/// Flag of [`Compact::first`]: the other bits are an index into the full groups. Local indices are
+/// below it.
 const IN_FULL: u32 = 1 << 31;
 
-/// A group of eight.
+/// A group of eight indices.
 #[derive(Debug, Clone, Copy)]
-struct Near {
+struct Compact {
     /// The lowest index.
     first: u32,
-    /// The distances from it.
-    distances: [u16; WIDTH],
+    /// The differences from it.
+    differences: [u16; WIDTH],
 }
 
-/// The far ends of listed bonds.
+/// The neighbour indices of a list.
 #[derive(Debug, Clone, Default)]
 pub struct Neighbours {
-    near: Vec<Near>,
+    compact: Vec<Compact>,
     full: Vec<[u32; WIDTH]>,
 }
 
-/// Some groups of far ends that follow one another.
+/// A range of groups.
 #[derive(Debug, Clone, Copy)]
 pub struct NeighbourGroups<'a> {
-    near: &'a [Near],
+    compact: &'a [Compact],
     full: &'a [[u32; WIDTH]],
 }
 
-/// The far ends of the bonds of a group.
+/// The neighbour indices of a group.
 #[derive(Debug, Clone, Copy)]
 pub enum Group<'a> {
-    /// The lowest index, and the distances from it.
-    Near(u32, &'a [u16; WIDTH]),
+    /// The lowest index and the differences from it.
+    Compact(u32, &'a [u16; WIDTH]),
     /// The indices.
     Full(&'a [u32; WIDTH]),
 }
 
 impl Neighbours {
-    /// Adds a group.
+    /// Append a group.
     pub fn push(&mut self, indices: [u32; WIDTH]) {
         let first = indices.into_iter().fold(u32::MAX, u32::min);
         assert!(first < IN_FULL, "too many points for one rank");
-        let mut distances = [0; WIDTH];
-        for (distance, index) in distances.iter_mut().zip(indices) {
+        let mut differences = [0; WIDTH];
+        for (difference, index) in differences.iter_mut().zip(indices) {
             let Ok(short) = u16::try_from(index - first) else {
                 let first = in_full(self.full.len());
                 self.full.push(indices);
-                self.near.push(Near { first, distances });
+                self.compact.push(Compact { first, differences });
                 return;
             };
-            *distance = short;
+            *difference = short;
         }
-        self.near.push(Near { first, distances });
+        self.compact.push(Compact { first, differences });
     }
 
-    /// Adds groups of others.
+    /// Append groups of another set.
     pub fn extend(&mut self, others: NeighbourGroups<'_>) {
-        let before = self.near.len();
-        self.near.extend_from_slice(others.near);
+        let before = self.compact.len();
+        self.compact.extend_from_slice(others.compact);
         if others.full.is_empty() {
             return;
         }
-        for near in &mut self.near[before..] {
-            if near.first & IN_FULL != 0 {
-                let indices = others.full[(near.first & !IN_FULL) as usize];
-                near.first = in_full(self.full.len());
+        for compact in &mut self.compact[before..] {
+            if compact.first & IN_FULL != 0 {
+                let indices = others.full[(compact.first & !IN_FULL) as usize];
+                compact.first = in_full(self.full.len());
                 self.full.push(indices);
             }
         }
     }
 
-    /// Forgets all groups.
+    /// Remove all groups.
     pub fn clear(&mut self) {
-        self.near.clear();
+        self.compact.clear();
         self.full.clear();
     }
 
-    /// Gives back memory beyond what the groups take.
+    /// Free unused capacity.
     pub fn shrink_to_fit(&mut self) {
-        self.near.shrink_to_fit();
+        self.compact.shrink_to_fit();
         self.full.shrink_to_fit();
     }
 
     /// Number of groups.
     pub fn len(&self) -> usize {
-        self.near.len()
+        self.compact.len()
     }
 
-    /// Some of the groups.
+    /// A range of the groups.
     pub fn groups(&self, range: Range<usize>) -> NeighbourGroups<'_> {
         NeighbourGroups {
-            near: &self.near[range],
+            compact: &self.compact[range],
             full: &self.full,
         }
     }
@@ -121,47 +121,47 @@ impl Neighbours {
         (0..self.len()).into_par_iter().map(largest).max()
     }
 
-    /// Memory that they take, bytes.
+    /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.near[..]) + size_of_val(&self.full[..])
+        size_of_val(&self.compact[..]) + size_of_val(&self.full[..])
     }
 }
 
-/// [`Near::first`] of the group that is in full at a place.
-fn in_full(place: usize) -> u32 {
-    assert!(place < IN_FULL as usize, "too many bonds for one rank");
-    IN_FULL | place as u32
+/// [`Compact::first`] of a full group.
+fn in_full(index: usize) -> u32 {
+    assert!(index < IN_FULL as usize, "too many bonds for one rank");
+    IN_FULL | index as u32
 }
 
 impl<'a> NeighbourGroups<'a> {
     /// Number of groups.
     #[inline(always)]
     pub fn len(self) -> usize {
-        self.near.len()
+        self.compact.len()
     }
 
-    /// Some of them.
+    /// A range of the groups.
     #[inline(always)]
     pub fn range(self, range: Range<usize>) -> Self {
         Self {
-            near: &self.near[range],
+            compact: &self.compact[range],
             full: self.full,
         }
     }
 
-    /// Those before one of them, and the rest.
+    /// Split before `group`.
     pub fn split_at(self, group: usize) -> [Self; 2] {
         [self.range(0..group), self.range(group..self.len())]
     }
 
-    /// One of them.
+    /// One group.
     #[inline(always)]
     pub fn group(self, group: usize) -> Group<'a> {
-        let near = &self.near[group];
-        if near.first & IN_FULL != 0 {
-            Group::Full(&self.full[(near.first & !IN_FULL) as usize])
+        let compact = &self.compact[group];
+        if compact.first & IN_FULL != 0 {
+            Group::Full(&self.full[(compact.first & !IN_FULL) as usize])
         } else {
-            Group::Near(near.first, &near.distances)
+            Group::Compact(compact.first, &compact.differences)
         }
     }
 }
@@ -171,16 +171,21 @@ impl Group<'_> {
     #[inline(always)]
     pub fn indices(self) -> [u32; WIDTH] {
         match self {
-            Self::Near(first, distances) => distances.map(|distance| first + u32::from(distance)),
+            Self::Compact(first, differences) => {
+                differences.map(|difference| first + u32::from(difference))
+            }
             Self::Full(indices) => *indices,
         }
     }
 
-    /// An index, and how far each of the eight lies beyond it.
+    /// A base index and the eight offsets from it.
     #[inline(always)]
     pub fn base_and_offsets(self) -> (usize, [usize; WIDTH]) {
         match self {
-            Self::Near(first, distances) => (first as usize, distances.map(usize::from)),
+            Self::Compact(first, differences) => (
+                first as usize,
+                std::array::from_fn(|k| differences[k] as usize),
+            ),
             Self::Full(indices) => (0, std::array::from_fn(|k| indices[k] as usize)),
         }
     }
@@ -191,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_put_in_comes_out() {
+    fn groups_are_read_as_they_were_pushed() {
         let groups = [
             [7, 3, 4, 3, 9, 8, 65_530, 3],
             [3, 65_538, 3, 3, 3, 3, 3, 3],
@@ -208,8 +213,11 @@ mod tests {
         copied.extend(pushed.groups(1..groups.len()));
         for (k, group) in groups.into_iter().enumerate() {
             assert_eq!(pushed.indices(k), group);
-            let (first, distances) = pushed.all().group(k).base_and_offsets();
-            assert_eq!(distances.map(|distance| (first + distance) as u32), group);
+            let (first, differences) = pushed.all().group(k).base_and_offsets();
+            assert_eq!(
+                differences.map(|difference| (first + difference) as u32),
+                group
+            );
             if k > 0 {
                 assert_eq!(copied.indices(k), group);
             }

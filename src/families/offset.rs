@@ -1,8 +1,8 @@
-//! The offsets at which the neighbours of a point of a lattice lie.
+//! The offsets from a lattice point to its neighbours.
 
 use crate::points::distance_squared;
 
-/// A bond of every point: where its far end lies.
+/// The offset of one bond of every lattice point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
     /// ξ, m.
@@ -15,23 +15,22 @@ pub struct Offset {
     pub inverse: f64,
     /// 1/|ξ|², 1/m².
     pub inverse_square: f64,
-    /// What volumes are multiplied by in the sums of the own and of the far end.
+    /// Volume weights of the ends i and j.
     pub weights: [f64; 2],
     /// Steps along x.
     pub(super) x: i32,
-    /// Which of the lines around.
+    /// Index of the line offset.
     pub(super) line: u32,
 }
 
-/// How many steps of a spacing (m) a bond up to a length (m) can make among points that are at most
-/// `extent` (m) apart.
+/// Steps of a spacing (m) within a length `cutoff` (m), limited by the extent of the points (m).
 pub(super) fn steps(cutoff: f64, spacing: f64, extent: f64) -> i64 {
-    let most = (extent / spacing).ceil();
-    (cutoff / spacing).floor().min(most) as i64
+    let limit = (extent / spacing).ceil();
+    (cutoff / spacing).floor().min(limit) as i64
 }
 
-/// The most neighbours that a point can have up to a length (m) on a lattice with so many cells by
-/// direction, about.
+/// Estimate the largest number of neighbours within `cutoff` (m) on a lattice with `cells` cells per
+/// direction.
 pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimension: usize) -> f64 {
     use std::f64::consts::PI;
     let reach = |k: usize| cutoff / spacing[k];
@@ -42,8 +41,8 @@ pub fn most_neighbours(spacing: [f64; 3], cutoff: f64, cells: [f64; 3], dimensio
     within.min(widths.product())
 }
 
-/// The offsets up to a length (m) by z, y and x among points that are at most `extent` (m) apart by
-/// direction, and the lines that they lead to.
+/// The offsets up to the length `cutoff` (m), sorted by z, y and x, and the line offsets they use.
+/// `extent` is the extent of the points per direction, m.
 pub(super) fn offsets(
     spacing: [f64; 3],
     cutoff: f64,
@@ -58,7 +57,7 @@ pub(super) fn offsets(
             0..=0
         }
     };
-    let (mut offsets, mut around) = (Vec::new(), Vec::new());
+    let (mut offsets, mut line_offsets) = (Vec::new(), Vec::new());
     for z in range(2) {
         for y in range(1) {
             let mut used = false;
@@ -79,15 +78,15 @@ pub(super) fn offsets(
                     inverse_square: 1.0 / square,
                     weights: [1.0; 2],
                     x: x as i32,
-                    line: around.len() as u32,
+                    line: line_offsets.len() as u32,
                 });
             }
             if used {
-                around.push([y, z]);
+                line_offsets.push([y, z]);
             }
         }
     }
-    (offsets, around)
+    (offsets, line_offsets)
 }
 
 #[cfg(test)]
@@ -114,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn offsets_lead_no_farther_than_the_points_lie() {
+    fn offsets_stay_within_the_extent_of_the_points() {
         let count = |extent, dimension| offsets([0.1; 3], 300.0, extent, dimension).0.len();
         assert_eq!(count([0.2, 0.2, 0.0], 2), 5 * 5 - 1);
         assert_eq!(count([0.2, 0.1, 0.0], 3), 5 * 3 - 1);
@@ -123,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_are_counted_without_looking_at_them() {
+    fn estimated_neighbours_are_near_the_counted_ones() {
         let cells = [30.0, 60.0, 30.0];
         assert_eq!(most_neighbours([1e-3; 3], 3.0, cells, 3), 54_000.0);
         for (cutoff, dimension) in [(9.5, 1), (9.5, 2), (9.5, 3), (3.015, 3)] {

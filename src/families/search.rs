@@ -1,4 +1,4 @@
-//! Finding the neighbours of every owned point.
+//! Neighbour search for list families.
 
 use std::ops::Range;
 
@@ -14,13 +14,13 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
 use super::neighbours::Neighbours;
 
-/// A bond as long as the horizon must not depend on rounding: lengths up to δ (1 + 10⁻⁹) count.
+/// Relative tolerance of the cutoff: round-off must not decide on a bond as long as the horizon.
 const HORIZON_TOLERANCE: f64 = 1e-9;
 
 /// Points searched by one task.
 const CHUNK: usize = 512;
 
-/// Chunks that are searched before their rows are appended; bounds the memory that they take.
+/// Chunks searched before their rows are appended; bounds the buffer memory.
 const WAVE: usize = 32;
 
 /// The longest bond (m) for a horizon (m).
@@ -28,20 +28,20 @@ pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }
 
-/// The points of a domain in the order of rows, by block and then by global id. Neighbours are found
-/// by their place in it, so that sorting places sorts a row.
+/// The points of a domain sorted by block, then by global id. The search returns ranks in this order,
+/// so sorting the ranks sorts a row.
 struct Order {
-    /// Local index of each place.
+    /// Local index of each sorted index.
     local: Vec<u32>,
-    /// The first place of each block, and the number of places.
+    /// First sorted index of each block, then the number of points.
     first: Vec<u32>,
-    /// The places of each block from its first one on. Where few points of a block have bonds to another
-    /// one, the others do not even see each other.
+    /// Bins of each block, by sorted index relative to the block's first. A block per set of bins: where
+    /// few points have bonds to a block, the others search no bins of it.
     bins: Vec<Bins>,
 }
 
 impl Order {
-    /// `cutoffs` has the longest bond (m) of each pair of blocks.
+    /// `cutoffs` is the matrix of longest bonds, m.
     fn new(points: &[Point], blocks: usize, cutoffs: &[f64]) -> Self {
         let mut keys: Vec<(u32, u64, u32)> = points
             .iter()
@@ -53,13 +53,13 @@ impl Order {
         let first: Vec<u32> = (0..=blocks as u32).map(before).collect();
         let local: Vec<u32> = keys.iter().map(|key| key.2).collect();
         drop(keys);
-        let bins = first.windows(2).enumerate().map(|(there, ends)| {
-            let cutoffs = cutoffs.iter().skip(there).step_by(blocks).copied();
-            // The points with the shortest bonds to this block are the most that look for them.
+        let bins = first.windows(2).enumerate().map(|(block_j, ends)| {
+            let cutoffs = cutoffs.iter().skip(block_j).step_by(blocks).copied();
+            // Most points search this block with the shortest cutoff, so it sets the bin size.
             let shortest = cutoffs.filter(|cutoff| *cutoff > 0.0).reduce(f64::min);
             let searched = &local[ends[0] as usize..ends[1] as usize];
-            let places = shortest.map_or(&[][..], |_| searched).iter();
-            let positions: Vec<[f64; 3]> = places.map(|k| points[*k as usize].position).collect();
+            let sorted = shortest.map_or(&[][..], |_| searched).iter();
+            let positions: Vec<[f64; 3]> = sorted.map(|k| points[*k as usize].position).collect();
             Bins::new(&positions, shortest.unwrap_or(f64::INFINITY))
         });
         Self {
@@ -69,10 +69,10 @@ impl Order {
         }
     }
 
-    /// Another point of a block at the very place of one.
+    /// Another point of a block with the position of point `index`.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
-        let places = self.first[block] as usize..self.first[block + 1] as usize;
-        let points = self.local[places].iter().map(|k| *k as usize);
+        let sorted = self.first[block] as usize..self.first[block + 1] as usize;
+        let points = self.local[sorted].iter().map(|k| *k as usize);
         let position = domain.points[index].position;
         let mut others = points
             .filter(|other| *other != index)
@@ -89,27 +89,27 @@ struct Chunk {
     rows: Vec<(u32, u32, u32)>,
     neighbours: Neighbours,
     intact: Vec<u8>,
-    /// Places of one point's neighbours.
-    places: Vec<u32>,
+    /// Sorted indices of one point's neighbours.
+    sorted: Vec<u32>,
 }
 
-/// The bond lists of a domain, for blocks 0 … `blocks` − 1; `cutoffs` has the longest bond (m) of each
-/// pair of them, row by row, and is symmetric.
+/// Build the bond lists of a domain. `cutoffs` is the symmetric `blocks` × `blocks` matrix of longest
+/// bonds, m.
 ///
 /// # Errors
-/// When two points lie at the same place, one has too many neighbours, or there is not enough memory.
+/// If two points coincide, a point has too many neighbours, or memory is insufficient.
 pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<BondList>, Fault> {
     let order = Order::new(&domain.points, blocks, cutoffs);
     let squares: Vec<f64> = cutoffs.iter().map(|cutoff| cutoff * cutoff).collect();
     let mut lists: Vec<BondList> = (0..blocks * blocks)
         .map(|pair| BondList {
-            here: pair / blocks,
-            there: pair % blocks,
+            block_i: pair / blocks,
+            block_j: pair % blocks,
             starts: vec![0],
             ..BondList::default()
         })
         .collect();
-    // Made once, so that they do not come from the system anew for each wave.
+    // Allocated once and reused by all waves.
     let mut wave: Vec<Chunk> = (0..WAVE).map(|_| Chunk::default()).collect();
     for first in (0..domain.owned).step_by(WAVE * CHUNK) {
         wave.par_iter_mut().enumerate().try_for_each(|(k, chunk)| {
@@ -135,13 +135,13 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
     Ok(lists)
 }
 
-/// An error if lists do not fit in memory that grow as they have so far, with this share of all points.
+/// Extrapolate the memory of the lists from the fraction `done` of points; fail if it does not fit.
 fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
-    let to_come = bytes as f64 * (1.0 / done - 1.0);
-    check_room(to_come as u64).map_err(|shortage| {
+    let remaining = bytes as f64 * (1.0 / done - 1.0);
+    check_room(remaining as u64).map_err(|shortage| {
         let largest = lists.iter().max_by_key(|list| list.bytes());
-        let blocks = largest.map_or([0; 2], |list| [list.here, list.there]);
+        let blocks = largest.map_or([0; 2], |list| [list.block_i, list.block_j]);
         Fault::TooLittleMemory { blocks, shortage }
     })
 }
@@ -160,42 +160,44 @@ impl Chunk {
         self.intact.clear();
         let blocks = order.first.len() - 1;
         for index in range {
-            let here = &domain.points[index];
-            let squares = &squares[here.block as usize * blocks..][..blocks];
+            let point = &domain.points[index];
+            let squares = &squares[point.block as usize * blocks..][..blocks];
             let mut neighbours = 0;
-            for (there, square) in squares.iter().enumerate() {
+            for (block_j, square) in squares.iter().enumerate() {
                 if *square == 0.0 {
                     continue;
                 }
-                let first = order.first[there];
-                self.places.clear();
-                let bins = &order.bins[there];
-                let at_place = bins.collect(here.position, *square, &mut self.places);
-                if at_place > usize::from(there == here.block as usize) {
+                let first = order.first[block_j];
+                self.sorted.clear();
+                let bins = &order.bins[block_j];
+                let coincident = bins.collect(point.position, *square, &mut self.sorted);
+                if coincident > usize::from(block_j == point.block as usize) {
                     return Err(Fault::SamePlace([
-                        *here,
-                        order.other_at(domain, there, index),
+                        *point,
+                        order.other_at(domain, block_j, index),
                     ]));
                 }
-                neighbours += self.places.len();
+                neighbours += self.sorted.len();
                 if neighbours as f64 > MOST_NEIGHBOURS {
                     return Err(Fault::TooManyNeighbours {
-                        blocks: [here.block as usize; 2],
+                        blocks: [point.block as usize; 2],
                         neighbours: None,
                         spacings: None,
                     });
                 }
-                if self.places.is_empty() {
+                if self.sorted.is_empty() {
                     continue;
                 }
-                self.places.sort_unstable();
-                self.places.iter_mut().for_each(|place| *place += first);
-                let groups = self.places.len().div_ceil(WIDTH) as u32;
-                self.rows.push((index as u32, there as u32, groups));
-                for group in self.places.chunks(WIDTH) {
+                self.sorted.sort_unstable();
+                self.sorted
+                    .iter_mut()
+                    .for_each(|sorted_index| *sorted_index += first);
+                let groups = self.sorted.len().div_ceil(WIDTH) as u32;
+                self.rows.push((index as u32, block_j as u32, groups));
+                for group in self.sorted.chunks(WIDTH) {
                     let mut neighbours = [index as u32; WIDTH];
-                    for (slot, place) in neighbours.iter_mut().zip(group) {
-                        *slot = order.local[*place as usize];
+                    for (slot, sorted_index) in neighbours.iter_mut().zip(group) {
+                        *slot = order.local[*sorted_index as usize];
                     }
                     self.neighbours.push(neighbours);
                     self.intact.push((0xff_u16 >> (WIDTH - group.len())) as u8);
@@ -208,9 +210,9 @@ impl Chunk {
 
 fn append(lists: &mut [BondList], domain: &Domain, blocks: usize, chunk: &Chunk) {
     let mut group = 0;
-    for (point, there, groups) in &chunk.rows {
-        let here = domain.points[*point as usize].block as usize;
-        let list = &mut lists[here * blocks + *there as usize];
+    for (point, block_j, groups) in &chunk.rows {
+        let block_i = domain.points[*point as usize].block as usize;
+        let list = &mut lists[block_i * blocks + *block_j as usize];
         let groups = group..group + *groups as usize;
         group = groups.end;
         list.points.push(*point);
@@ -245,7 +247,7 @@ mod tests {
                 let mut lists = search(&domain, 3, &[cutoff(1.0); 9]).unwrap();
                 let mut rows = Vec::new();
                 for list in &mut lists {
-                    let (there, length) = (list.there, list.len());
+                    let (block_j, length) = (list.block_j, list.len());
                     let mut all_rows = list.rows(0..length);
                     for k in 0..length {
                         let row = all_rows.row(k);
@@ -260,7 +262,7 @@ mod tests {
                             })
                             .map(|index| domain.points[index as usize].id)
                             .collect();
-                        rows.push((domain.points[row.point].id, there, ids));
+                        rows.push((domain.points[row.point].id, block_j, ids));
                     }
                 }
                 rows

@@ -1,4 +1,4 @@
-//! Up to eight adjacent points of a lattice, which are worked on together, and ranges of them.
+//! Lane groups of a lattice: vectors of up to eight points adjacent along x.
 
 use std::ops::Range;
 
@@ -8,67 +8,68 @@ use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
-/// Up to eight adjacent points: the first one's place and local index; the others follow.
+/// Up to eight adjacent points: the slot, the local index and the line of the first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
-    pub(super) place: u32,
+    pub(super) slot: u32,
     pub(super) point: u32,
     pub(super) line: u32,
-    /// A bit for each of the points that has a neighbour.
+    /// Mask of the points that have neighbours.
     pub(super) members: u8,
 }
 
 /// The bonds of up to eight adjacent points.
 pub struct VectorBonds<'a> {
-    /// The first point's place on the grid.
-    pub place: usize,
-    /// Its local index.
+    /// Slot of the first point.
+    pub slot: usize,
+    /// Local index of the first point.
     pub point: usize,
-    /// A bit for each of the points that has a neighbour.
+    /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Where its bits stand among those of all vectors.
+    /// Range of its groups among those of all vectors.
     pub bits: Range<usize>,
-    /// The offsets.
+    /// The offsets of the lattice.
     pub offsets: &'a [Offset],
-    /// What is kept of the bonds; a group for each offset.
+    /// State of the bonds: a group for each offset.
     pub groups: Groups<'a>,
-    /// Whether any weight is not 1, and whether those of the ends differ.
+    /// Some weights differ from 1; the weights of i and j differ.
     pub weighted: [bool; 2],
     shifts: &'a [i32],
 }
 
 /// A range of vectors that can be split between threads.
 pub struct Vectors<'a> {
-    pub(super) lattice: Shared<'a>,
+    pub(super) lattice: LatticeTables<'a>,
     pub(super) vectors: &'a [Vector],
-    /// Number of the first one.
+    /// Index of the first vector.
     pub(super) first: usize,
     pub(super) groups: Groups<'a>,
 }
 
-/// What all vectors of a lattice share.
+/// The tables of a lattice that all vectors use.
 #[derive(Clone, Copy)]
-pub(super) struct Shared<'a> {
+pub(super) struct LatticeTables<'a> {
     pub(super) offsets: &'a [Offset],
     pub(super) weighted: [bool; 2],
     pub(super) shifts: &'a [i32],
-    pub(super) around: usize,
+    /// Number of line offsets.
+    pub(super) lines: usize,
 }
 
-/// The vectors of a grid by local index; all their points are members.
+/// The vectors of a grid, sorted by local index; all their points are members.
 pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
     let mut vectors: Vec<Vector> = Vec::new();
     let mut line = 0;
     let mut length = 0;
-    for (place, point) in grid.owned() {
-        while place >= grid.lines[line].start + grid.lines[line].length {
+    for (slot, point) in grid.owned() {
+        while slot >= grid.lines[line].start + grid.lines[line].length {
             line += 1;
         }
         match vectors.last_mut() {
             Some(vector)
                 if (length as usize) < WIDTH
                     && vector.line as usize == line
-                    && vector.place + length == place as u32
+                    && vector.slot + length == slot as u32
                     && vector.point + length == point =>
             {
                 vector.members |= 1 << length;
@@ -77,7 +78,7 @@ pub(super) fn vectors(grid: &Grid) -> Vec<Vector> {
             _ => {
                 length = 1;
                 vectors.push(Vector {
-                    place: place as u32,
+                    slot: slot as u32,
                     point,
                     line: line as u32,
                     members: 1,
@@ -105,7 +106,7 @@ impl<'a> Vectors<'a> {
         self.vectors[vector].point as usize
     }
 
-    /// The vectors before `vector` and those from it on.
+    /// Split before `vector`.
     pub fn split_at(self, vector: usize) -> (Self, Self) {
         let bits = vector * self.lattice.offsets.len();
         let (vectors_a, vectors_b) = self.vectors.split_at(vector);
@@ -128,40 +129,40 @@ impl<'a> Vectors<'a> {
     /// The bonds of one vector.
     #[inline(always)]
     pub fn vector(&mut self, vector: usize) -> VectorBonds<'_> {
-        let Shared {
+        let LatticeTables {
             offsets,
             weighted,
             shifts,
-            around,
+            lines,
         } = self.lattice;
         let count = offsets.len();
         let all = (self.first + vector) * count..(self.first + vector + 1) * count;
         let bits = vector * count..(vector + 1) * count;
         let vector = &self.vectors[vector];
         VectorBonds {
-            place: vector.place as usize,
+            slot: vector.slot as usize,
             point: vector.point as usize,
             members: vector.members,
             bits: all,
             offsets,
             groups: self.groups.range(bits),
             weighted,
-            shifts: &shifts[vector.line as usize * around..(vector.line as usize + 1) * around],
+            shifts: &shifts[vector.line as usize * lines..(vector.line as usize + 1) * lines],
         }
     }
 }
 
 impl VectorBonds<'_> {
-    /// The place of the first of the eight far ends at an offset, with seven more after it. Where
-    /// none of the bonds exists it is meaningless, but still a place.
+    /// The slot of the first of eight consecutive neighbours at an offset. It is in bounds even if none
+    /// of the eight bonds exists.
     ///
     /// # Safety
     /// The offset must be one of [`Self::offsets`].
     #[inline(always)]
     pub unsafe fn far(&self, offset: &Offset) -> usize {
         debug_assert!((offset.line as usize) < self.shifts.len());
-        // SAFETY: the lines of own offsets are numbered from 0, and there is a shift for each.
+        // SAFETY: an offset's line is below the number of line offsets, and there is a shift for each.
         let shift = unsafe { *self.shifts.get_unchecked(offset.line as usize) };
-        (self.place as isize + (shift + offset.x) as isize) as usize
+        (self.slot as isize + (shift + offset.x) as isize) as usize
     }
 }

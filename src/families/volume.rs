@@ -1,9 +1,10 @@
-//! The share of a lattice cell that counts in a family: Ṽ/V.
+//! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family.
 //!
-//! `linear` falls from 1 to 0 between δ − dx/2 and δ + dx/2, so that families hold points beyond the
-//! horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014); LAMMPS (Parks et al. 2008) ends the same
-//! taper at δ. `exact` is the share of the cell that lies within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl
-//! & Schweitzer 2016, eq. 2): closed form in 1-D and 2-D, quadrature over slices in 3-D.
+//! - `linear` falls from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families hold points beyond the
+//!   horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). LAMMPS (Parks et al. 2008) ends the same
+//!   taper at δ.
+//! - `exact` is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl & Schweitzer
+//!   2016, eq. 2): a closed form in 1-D and 2-D, quadrature over slices in 3-D.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -14,58 +15,58 @@ use crate::problem::VolumeCorrection;
 
 use super::search::cutoff;
 
-/// Slices of a cell in 3-D.
+/// Quadrature slices of a cell in 3-D.
 const SLICES: u32 = 256;
 
-/// Offsets are told apart to this share of the cell's edge.
+/// Resolution of cached offsets, in cell edges.
 const RESOLUTION: f64 = 1e-6;
 
-/// So many of these are a quarter of the edge: offsets on a grid that has been refined are multiples of it.
+/// A quarter of the edge in units of [`RESOLUTION`]; offsets on a refined grid are multiples of it.
 const QUARTER: i64 = 250_000;
 
-/// The most multiples that are looked up by their number.
+/// Largest size of the direct lookup table.
 const MOST_MULTIPLES: usize = 1 << 17;
 
-/// Bits of a share that has not been found yet.
+/// Bit pattern of a table entry that has not been computed.
 const UNKNOWN: u64 = u64::MAX;
 
-/// The longest bond (m) whose cell counts, where those of a length (m) count nothing any more: what
-/// rounding makes of them must not matter.
+/// The longest bond (m) with a positive factor if the factor is 0 at `length` (m). The tolerance keeps
+/// round-off from adding bonds of zero weight.
 fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }
 
-/// The share of the cells of one edge in the families of one horizon.
+/// The volume correction factors for one horizon and one cell size; safe to share between threads.
 pub struct CellShare {
     correction: VolumeCorrection,
     horizon: f64,
     edge: f64,
-    /// By which offsets are multiplied to be told apart, 1/m.
-    fineness: f64,
+    /// 1/([`RESOLUTION`] × edge), 1/m.
+    per_resolution: f64,
     dimension: usize,
-    /// The square of the longest bond that counts, m².
+    /// Square of the longest bond with a positive factor, m².
     reach_squared: f64,
-    /// Multiples of a quarter of the edge, in each direction, within the longest bond that counts; 0 where they are
-    /// too many.
+    /// Table entries per direction, one per quarter of the edge; 0 if the table would be too large.
     multiples: usize,
-    /// The bits of their shares.
-    at_multiples: OnceLock<Vec<AtomicU64>>,
-    elsewhere: Mutex<FxHashMap<[i64; 3], f64>>,
+    /// Factors (bit patterns) at multiples of a quarter of the edge.
+    table: OnceLock<Vec<AtomicU64>>,
+    /// Factors at all other offsets.
+    cache: Mutex<FxHashMap<[i64; 3], f64>>,
 }
 
 impl CellShare {
-    /// For families of a horizon (m) and neighbours in cells of an edge (m).
+    /// Factors for a horizon (m) and cells of an edge (m).
     pub fn new(correction: VolumeCorrection, horizon: f64, edge: f64, dimension: usize) -> Self {
         let mut share = Self {
             correction,
             horizon,
             edge,
-            fineness: 1.0 / (edge * RESOLUTION),
+            per_resolution: 1.0 / (edge * RESOLUTION),
             dimension,
             reach_squared: 0.0,
             multiples: 0,
-            at_multiples: OnceLock::default(),
-            elsewhere: Mutex::default(),
+            table: OnceLock::default(),
+            cache: Mutex::default(),
         };
         share.reach_squared = share.cutoff().powi(2);
         let multiples = 4.0 * share.cutoff() / edge + 1.0;
@@ -75,7 +76,7 @@ impl CellShare {
         share
     }
 
-    /// The longest bond (m) that counts. A cell's farthest overlap with the ball is at a corner.
+    /// The longest bond (m) with a positive factor; for `exact`, the ball touches a corner of the cell.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {
@@ -85,7 +86,7 @@ impl CellShare {
         }
     }
 
-    /// The share of a cell whose centre is at an offset ξ (m); the same for ξ and −ξ.
+    /// The factor at an offset ξ (m); equal at ξ and −ξ.
     pub fn at(&self, offset: [f64; 3]) -> f64 {
         let squared = offset.iter().map(|x| x * x).sum::<f64>();
         match self.correction {
@@ -95,27 +96,24 @@ impl CellShare {
             }
             VolumeCorrection::Exact if squared > self.reach_squared => 0.0,
             VolumeCorrection::Exact => match self.multiple(offset) {
-                Some((known, place)) => {
-                    // Threads that find it at the same time find the same.
+                Some((known, steps)) => {
+                    // Relaxed: threads that race compute the same value.
                     let bits = known.load(Ordering::Relaxed);
                     if bits != UNKNOWN {
                         return f64::from_bits(bits);
                     }
-                    let share = self.overlap(place.map(|k| k * QUARTER));
+                    let share = self.overlap(steps.map(|k| k * QUARTER));
                     known.store(share.to_bits(), Ordering::Relaxed);
                     share
                 }
                 None => {
-                    let place = ordered(offset.map(|x| (x.abs() * self.fineness + 0.5) as i64));
-                    let shares = || {
-                        self.elsewhere
-                            .lock()
-                            .unwrap_or_else(PoisonError::into_inner)
-                    };
-                    let known = shares().get(&place).copied();
+                    let steps =
+                        ordered(offset.map(|x| (x.abs() * self.per_resolution + 0.5) as i64));
+                    let shares = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+                    let known = shares().get(&steps).copied();
                     known.unwrap_or_else(|| {
-                        let share = self.overlap(place);
-                        shares().insert(place, share);
+                        let share = self.overlap(steps);
+                        shares().insert(steps, share);
                         share
                     })
                 }
@@ -123,46 +121,43 @@ impl CellShare {
         }
     }
 
-    /// An offset in quarters of the edge, if it is a multiple of them, and where its share is kept.
+    /// The table entry and the quarters of the edge of an offset, if the table holds it.
     #[inline]
     fn multiple(&self, offset: [f64; 3]) -> Option<(&AtomicU64, [i64; 3])> {
-        let quarters = offset.map(|x| x.abs() * self.fineness / QUARTER as f64);
-        let place = quarters.map(|x| (x + 0.5) as i64);
+        let quarters = offset.map(|x| x.abs() * self.per_resolution / QUARTER as f64);
+        let steps = quarters.map(|x| (x + 0.5) as i64);
         let mut index = 0;
         for k in (0..self.dimension).rev() {
-            let is_multiple = (quarters[k] - place[k] as f64).abs() < 0.5 / QUARTER as f64;
-            if !is_multiple || place[k] as usize >= self.multiples {
+            let is_multiple = (quarters[k] - steps[k] as f64).abs() < 0.5 / QUARTER as f64;
+            if !is_multiple || steps[k] as usize >= self.multiples {
                 return None;
             }
-            index = index * self.multiples + place[k] as usize;
+            index = index * self.multiples + steps[k] as usize;
         }
-        Some((
-            &self.at_multiples.get_or_init(|| self.unknown())[index],
-            place,
-        ))
+        Some((&self.table.get_or_init(|| self.new_table())[index], steps))
     }
 
     #[cold]
-    fn unknown(&self) -> Vec<AtomicU64> {
+    fn new_table(&self) -> Vec<AtomicU64> {
         let count = self.multiples.pow(self.dimension as u32);
         (0..count).map(|_| AtomicU64::new(UNKNOWN)).collect()
     }
 
-    /// The share of a cell at a place in steps of [`RESOLUTION`].
-    fn overlap(&self, place: [i64; 3]) -> f64 {
-        let place = ordered(place);
+    /// The exact factor at an offset in units of [`RESOLUTION`].
+    fn overlap(&self, steps: [i64; 3]) -> f64 {
+        let steps = ordered(steps);
         let radius = self.horizon / self.edge;
-        overlap(place.map(|k| k as f64 * RESOLUTION), radius, self.dimension)
+        overlap(steps.map(|k| k as f64 * RESOLUTION), radius, self.dimension)
     }
 }
 
-/// Cells and balls look the same along all axes, so few shares are different.
-fn ordered(mut place: [i64; 3]) -> [i64; 3] {
-    place.sort_unstable_by(|a, b| b.cmp(a));
-    place
+/// Sort the components: the factor is symmetric in the axes, so fewer values are cached.
+fn ordered(mut steps: [i64; 3]) -> [i64; 3] {
+    steps.sort_unstable_by(|a, b| b.cmp(a));
+    steps
 }
 
-/// The part of a unit cell centred at `centre` within the ball of a radius around the origin.
+/// The volume of a unit cell within a ball; the ball is centred at the origin.
 fn overlap(centre: [f64; 3], radius: f64, dimension: usize) -> f64 {
     let range = |k: usize| [centre[k] - 0.5, centre[k] + 0.5];
     match dimension {
@@ -182,7 +177,7 @@ fn overlap(centre: [f64; 3], radius: f64, dimension: usize) -> f64 {
     }
 }
 
-/// The area of a rectangle within the disc of a radius around the origin.
+/// The area of a rectangle within a disc centred at the origin.
 fn rectangle_in_disc(x: [f64; 2], y: [f64; 2], radius: f64) -> f64 {
     let corner =
         |x: f64, y: f64| x.signum() * y.signum() * quadrant_in_disc(x.abs(), y.abs(), radius);
@@ -199,7 +194,7 @@ fn quadrant_in_disc(x: f64, y: f64, radius: f64) -> f64 {
     if radius == 0.0 {
         return 0.0;
     }
-    // Up to `a` the rectangle's upper edge is the lower one, from there on the circle.
+    // The upper boundary is the edge y up to `a`, and the circle beyond.
     let a = (radius * radius - y * y).max(0.0).sqrt().min(x);
     let under_circle = |u: f64| {
         let height = (radius * radius - u * u).max(0.0).sqrt();
@@ -213,7 +208,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// The sum over all offsets of a lattice, the own cell included.
+    /// The sum over all offsets of a lattice, ξ = 0 included.
     fn whole(correction: VolumeCorrection, dimension: usize, horizon: f64) -> f64 {
         let share = CellShare::new(correction, horizon, 1.0, dimension);
         let reach = horizon.ceil() as i32 + 1;
@@ -264,18 +259,18 @@ mod tests {
     }
 
     #[test]
-    fn shares_that_are_kept_are_those_of_the_place() {
+    fn cached_factors_are_those_of_their_offsets() {
         for horizon in [1.5, 3.0] {
             let share = CellShare::new(VolumeCorrection::Exact, horizon, 1.0, 3);
-            // On the grid that is refined twice, beside it, and beyond what counts; the second time it is kept.
+            // On the twice-refined grid, off it, and beyond the cutoff; the second pass reads the cache.
             for step in [0.25, 0.3, 0.25, 0.3] {
                 let axis = || (0..16).map(|k| f64::from(k) * step);
-                for place in axis().flat_map(|x| axis().map(move |y| [x, -y, 0.5])) {
-                    let mut ordered = place.map(f64::abs);
+                for offset in axis().flat_map(|x| axis().map(move |y| [x, -y, 0.5])) {
+                    let mut ordered = offset.map(f64::abs);
                     ordered.sort_by(|a, b| b.total_cmp(a));
                     let expected = overlap(ordered, horizon, 3);
-                    // Rounding: all of these places are told apart exactly.
-                    assert!((share.at(place) - expected).abs() < 1e-12, "{place:?}");
+                    // The differences are round-off: all of these offsets have entries of their own.
+                    assert!((share.at(offset) - expected).abs() < 1e-12, "{offset:?}");
                 }
             }
         }

@@ -1,15 +1,14 @@
-//! How files are created: which driver, and when metadata is written.
+//! Access properties of files: driver, metadata cache and metadata operations.
 
 use crate::comm::RawCommunicator;
 use hdf5_metno as hdf5;
 use hdf5_metno::file::{CacheDecreaseMode, CacheIncreaseMode, FileCloseDegree, FlashIncreaseMode};
 use std::path::Path;
 
-/// How much changed metadata the library may hold back before it writes some, in bytes: the most
-/// that it allows.
+/// Limit of dirty metadata in the cache, bytes: the largest that HDF5 allows.
 const HELD_METADATA_BYTES: usize = 32 << 20;
 
-/// What to do where the file to create is there already.
+/// Handling of an existing file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Creation {
     /// Fail.
@@ -18,15 +17,14 @@ pub enum Creation {
     Truncate,
 }
 
-/// Opens a file that exists, to read it.
+/// Open an existing file for reading.
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
-    // Ranks whose caches differ, as they do after reading different rows, wait for one another in
-    // vain when they read metadata together (HDF5 1.10.8). A file that is being created has all of it
-    // in memory, one that is read, or appended to, is read by each rank for itself.
+    // No collective metadata reads: ranks whose caches differ after reading different rows deadlock in
+    // them (HDF5 1.10.8). A file under creation has all of its metadata in memory.
     options(raw, false)?.open(path)
 }
 
-/// Opens a file that exists, to read it and to write to it.
+/// Open an existing file for reading and writing.
 pub(super) fn open_to_append(
     path: &Path,
     raw: Option<RawCommunicator>,
@@ -34,7 +32,7 @@ pub(super) fn open_to_append(
     options(raw, false)?.open_rw(path)
 }
 
-/// Creates a file for one process or, with a communicator, for all ranks together.
+/// Create a file, collectively if there is a raw communicator.
 pub(super) fn create(
     path: &Path,
     raw: Option<RawCommunicator>,
@@ -54,8 +52,7 @@ fn options(
     let mut builder = hdf5::File::with_options();
     let access = builder.fapl();
     access.fclose_degree(FileCloseDegree::Strong);
-    // Metadata goes out when the file is flushed and at no other time; so whenever the process is
-    // killed, the file is as the last flush left it.
+    // Metadata is written at flushes only, so a killed process leaves the file as of its last flush.
     let mut cache = hdf5::plist::FileAccess::try_new()?.mdc_config();
     cache.evictions_enabled = false;
     cache.incr_mode = CacheIncreaseMode::Off;

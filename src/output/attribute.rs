@@ -3,7 +3,7 @@
 use hdf5_metno as hdf5;
 use hdf5_metno::types::{FixedAscii, TypeDescriptor, VarLenUnicode};
 
-/// The longest [`Attribute::Ascii`], in bytes.
+/// Maximum length of [`Attribute::Ascii`], bytes.
 const ASCII_BYTES: usize = 64;
 
 /// The value of an attribute.
@@ -15,11 +15,11 @@ pub enum Attribute<'a> {
     Integers(&'a [i64]),
     /// UTF-8 text of any length, without NUL.
     Text(&'a str),
-    /// ASCII text of 1 to 64 bytes, stored with its length, as some readers insist.
+    /// ASCII text of 1 to 64 bytes with fixed length, as VTK requires.
     Ascii(&'a str),
 }
 
-/// Writes an attribute; one that exists must have the same type and length.
+/// Write an attribute; an existing one must have the same type and length.
 pub(super) fn set_attribute(
     object: &hdf5::Location,
     name: &str,

@@ -1,17 +1,17 @@
-//! Points of a result that are others from step to step.
+//! Points of a result with adaptive refinement: each step has its own points.
 
 use hdf5_metno::H5Type;
 
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
 use super::field::{FieldData, FieldDescription, create_field, write_field};
-use super::vtkhdf::{LEAST_ROWS, Piece, VTK_VERTEX};
+use super::vtkhdf::{MIN_CHUNK_ROWS, Piece, VTK_VERTEX};
 use crate::error::Result;
 
-/// What VTKHDF wants to know the number of, a row a part.
+/// VTKHDF's datasets of counts, one row per part.
 const COUNTS: [&str; 3] = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
 
-/// The datasets that hold the points of all steps one after the other.
+/// The datasets of the points of all steps, concatenated.
 pub struct ChangingPoints {
     counts: Vec<Dataset>,
     positions: Dataset,
@@ -21,7 +21,7 @@ pub struct ChangingPoints {
     fixed: Vec<Fixed>,
 }
 
-/// A field that does not change while the points are the same.
+/// A field that changes only with the points.
 struct Fixed {
     field: FieldDescription,
     kind: FieldData<'static>,
@@ -29,7 +29,7 @@ struct Fixed {
 }
 
 impl ChangingPoints {
-    /// Without points; so many are expected in a step.
+    /// Create empty datasets; `total` is the expected number of points per step.
     pub fn create(
         file: &mut CollectiveFile<'_>,
         total: u64,
@@ -37,14 +37,14 @@ impl ChangingPoints {
     ) -> Result<Self> {
         let rows = Rows::Extensible { per_append: total };
         let parts = Rows::Extensible {
-            per_append: LEAST_ROWS,
+            per_append: MIN_CHUNK_ROWS,
         };
         let counts = COUNTS
             .iter()
             .map(|name| file.create_dataset::<i64>(&format!("/VTKHDF/{name}"), parts, None));
         let counts = counts.collect::<Result<_>>()?;
         let make = |(field, data): &(FieldDescription, FieldData)| {
-            let kind = data.none();
+            let kind = data.empty();
             let dataset = create_field(file, field, &kind, rows)?;
             Ok(Fixed {
                 field: *field,
@@ -63,7 +63,7 @@ impl ChangingPoints {
         })
     }
 
-    /// Adds the points of a step, after so many points and steps.
+    /// Append the points of a step; `rows` and `steps` are the numbers of points and steps before it.
     pub fn write(
         &mut self,
         file: &mut CollectiveFile<'_>,
@@ -88,22 +88,22 @@ impl ChangingPoints {
         let own = piece.first as i64..(piece.first as usize + count) as i64;
         let own: Vec<i64> = own.collect();
         file.write_rows(&self.connectivity, first, &own)?;
-        // One row more than cells in each step: each rank writes where its cells end, the first one also
-        // where they begin.
+        // Each step has one offset more than cells: a rank writes the ends of its cells, rank 0 also the
+        // start.
         file.resize(&mut self.offsets, end + steps + 1)?;
         let begin = piece.first + u64::from(!root);
         let ends: Vec<i64> = (begin..piece.first + count as u64 + 1)
             .map(|k| k as i64)
             .collect();
         file.write_rows(&self.offsets, rows + steps + begin, &ends)?;
-        for (known, (_, data)) in self.fixed.iter_mut().zip(fixed) {
-            file.resize(&mut known.dataset, end)?;
-            write_field(file, &known.dataset, first, &known.field, data)?;
+        for (target, (_, data)) in self.fixed.iter_mut().zip(fixed) {
+            file.resize(&mut target.dataset, end)?;
+            write_field(file, &target.dataset, first, &target.field, data)?;
         }
         Ok(())
     }
 
-    /// Copies the first rows, of so many steps, of another file.
+    /// Copy the first `rows` points and `steps` steps of another file.
     pub fn copy(
         &mut self,
         old: &mut CollectiveFile<'_>,
@@ -131,7 +131,7 @@ impl ChangingPoints {
     }
 }
 
-/// Copies the first rows of the dataset of the same name in another file, each rank a share of them.
+/// Copy the first rows of the dataset of the same path in another file; each rank copies a share.
 pub fn copy<T: H5Type + bytemuck::Pod>(
     old: &mut CollectiveFile<'_>,
     file: &mut CollectiveFile<'_>,
@@ -142,8 +142,8 @@ pub fn copy<T: H5Type + bytemuck::Pod>(
         let comm = file.communicator();
         (comm.rank() as u64, comm.size() as u64)
     };
-    let share = |rank: u64| (u128::from(rows) * u128::from(rank) / u128::from(size)) as u64;
-    let (first, end) = (share(rank), share(rank + 1));
+    let start = |rank: u64| (u128::from(rows) * u128::from(rank) / u128::from(size)) as u64;
+    let (first, end) = (start(rank), start(rank + 1));
     let source = old.open_dataset(&dataset.path)?;
     let values: Vec<T> = old.read_rows(&source, first, (end - first) as usize)?;
     file.resize(dataset, rows)?;

@@ -1,7 +1,7 @@
-//! Checkpoints: two files of which one is always complete, readable on any number of ranks.
+//! Checkpoints: two alternating files, readable on any number of ranks.
 //!
-//! A checkpoint is written beside the two, sealed with a checksum, and then takes the place of the
-//! older one by a rename: a kill at any moment leaves at least one that is good.
+//! A checkpoint is written to a temporary file and sealed with a checksum. A rename then replaces the
+//! older file, so a kill at any time leaves at least one valid checkpoint.
 
 use std::path::{Path, PathBuf};
 
@@ -17,55 +17,55 @@ use super::collective::CollectiveFile;
 use super::dataset::Rows;
 use super::seal;
 
-/// The two files.
+/// Names of the two files.
 const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 
-/// What is being written.
+/// Name of the temporary file.
 const PART: &str = "checkpoint.part";
 
-/// Changes with the layout.
+/// Version of the layout.
 const VERSION: i64 = 8;
 
-/// Whether a name in a folder is in use, also by a link to a file that is missing or cannot be read.
+/// Test whether a path is in use; a link to a missing or unreadable file counts.
 pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// A checkpoint but for the state of the points.
+/// The contents of a checkpoint without the state of the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// Number of the step.
     pub number: u64,
     /// Time step, s.
     pub step: f64,
-    /// How the grids are refined, see [`crate::refine::Grids::state`].
+    /// State of the refined grids, see [`crate::refine::Grids::state`].
     pub grids: [Vec<NodeKey>; 2],
     /// Number of points over all ranks.
     pub points: u64,
-    /// A sum over the points that is the same only for the same points.
+    /// Hash of the points.
     pub fingerprint: u64,
     /// Outputs in the result file.
     pub outputs: u64,
     /// Rows in the history.
     pub rows: u64,
-    /// Energy (J) at the start and intact bonds before it, which the history refers to.
+    /// Reference values of the history: energy at the start, J, and number of intact bonds before it.
     pub start: (f64, u64),
-    /// The deck with every default filled in.
+    /// The deck with all defaults.
     pub deck: String,
 }
 
-/// The datasets of the state of the grids, which are there where it is not empty.
+/// The datasets of the state of the grids; absent if empty.
 const GRIDS: [&str; 2] = ["/refined", "/parted"];
 
 /// The two checkpoints of a folder.
 pub struct Checkpoints {
     folder: PathBuf,
-    /// Which of the two is written next.
+    /// Index of the file to write next.
     next: usize,
 }
 
 impl Checkpoints {
-    /// For a run that starts anew: earlier checkpoints in the folder will be replaced.
+    /// The checkpoints of a new run; it replaces existing files.
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -73,16 +73,16 @@ impl Checkpoints {
         }
     }
 
-    /// The files of the two in a folder.
+    /// The paths of the two files in a folder.
     pub fn paths(folder: &Path) -> impl Iterator<Item = PathBuf> {
         let folder = folder.to_owned();
         NAMES.into_iter().map(move |name| folder.join(name))
     }
 
-    /// Removes earlier checkpoints, so that none can be taken for one of a new run. For rank 0.
+    /// Remove existing checkpoints, which would belong to another run. For rank 0.
     ///
     /// # Errors
-    /// When one cannot be removed.
+    /// If a file cannot be removed.
     pub fn remove(&self) -> Result<()> {
         for name in NAMES.iter().chain([&PART]) {
             let path = self.folder.join(name);
@@ -97,10 +97,10 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Writes a checkpoint in the place of the older one. Collective.
+    /// Write a checkpoint that replaces the older one. Collective.
     ///
     /// # Errors
-    /// When the disc is full; the checkpoints that were there stay.
+    /// If the disk is full; existing checkpoints are kept.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -112,15 +112,15 @@ impl Checkpoints {
         let written = write_file(simulation, &part, order, header)
             .and_then(|()| seal::seal(comm, &part, header.number));
         if written.is_err() && comm.rank() == 0 {
-            // It only takes up space; that it cannot be removed either changes nothing.
+            // Best effort: a leftover file only takes space.
             let _ = std::fs::remove_file(&part);
         }
         written?;
-        let place = self.folder.join(NAMES[self.next]);
+        let target = self.folder.join(NAMES[self.next]);
         let moved = match comm.rank() {
-            0 => std::fs::rename(&part, &place)
+            0 => std::fs::rename(&part, &target)
                 .and_then(|()| std::fs::File::open(&self.folder)?.sync_all())
-                .map_err(|error| Error::run(format!("{}: {error}", place.display()))),
+                .map_err(|error| Error::run(format!("{}: {error}", target.display()))),
             _ => Ok(()),
         };
         agree(comm, moved)?;
@@ -128,8 +128,8 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Opens the newest checkpoint of the folder that is intact; `warn` is told of those that are
-    /// not. Collective.
+    /// Open the newest intact checkpoint of the folder; `warn` receives a message per damaged one.
+    /// Collective.
     ///
     /// # Errors
     /// When there is none, or the system does not let one be read: it may be the newest, and the next checkpoint
@@ -139,7 +139,7 @@ impl Checkpoints {
         folder: &Path,
         warn: &mut dyn FnMut(String),
     ) -> Result<(Self, PathBuf)> {
-        // Rank 0's view counts: a file system may show the others something older.
+        // Only rank 0 reads the folder: on other ranks, the file system may be out of date.
         let slots = match comm.rank() {
             0 => newest_first(folder),
             _ => Ok(Vec::new()),
@@ -164,7 +164,7 @@ impl Checkpoints {
     }
 }
 
-/// Which of the two checkpoints of a folder exist, in the order of their use.
+/// The indices of existing checkpoints in the order to try them.
 fn newest_first(folder: &Path) -> Result<Vec<u8>> {
     let mut found: Vec<(Option<u64>, u8)> = Vec::new();
     for (slot, name) in (0..).zip(NAMES) {
@@ -173,26 +173,26 @@ fn newest_first(folder: &Path) -> Result<Vec<u8>> {
             found.push((seal::number(&path)?, slot));
         }
     }
-    // One that is not even sealed may have been the newest.
+    // An unsealed file may have been the newest, so try it first to warn of it.
     found.sort_by_key(|(number, _)| (number.is_some(), std::cmp::Reverse(*number)));
     Ok(found.into_iter().map(|(_, slot)| slot).collect())
 }
 
-/// Reads a checkpoint's header. Collective.
+/// Read the header of a checkpoint. Collective.
 ///
 /// # Errors
-/// When the file is none that this version of Fissure has written.
+/// If another version of Fissure wrote the file.
 pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let mut file = CollectiveFile::open(path, comm)?;
     let numbers = file.integers_attribute("/", "numbers")?;
     let deck = file.text_attribute("/", "deck")?;
     let mut grids = [const { Vec::new() }; 2];
-    if let [VERSION, .., refined, parted] = numbers[..] {
-        for ((picks, name), count) in grids.iter_mut().zip(GRIDS).zip([refined, parted]) {
+    if let [VERSION, .., refined, suppressed] = numbers[..] {
+        for ((keys, name), count) in grids.iter_mut().zip(GRIDS).zip([refined, suppressed]) {
             if count > 0 {
                 let dataset = file.open_dataset(name)?;
                 let rows: Vec<i64> = file.read_rows(&dataset, 0, count as usize)?;
-                *picks = rows.as_chunks().0.to_vec();
+                *keys = rows.as_chunks().0.to_vec();
             }
         }
     }
@@ -228,10 +228,10 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     }
 }
 
-/// Reads the state of this rank's block of ids. Collective.
+/// Read the state of this rank's block of ids. Collective.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// If the file cannot be read.
 pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Result<Saved> {
     let mut file = CollectiveFile::open(path, comm)?;
     let lengths = file.open_dataset("/bond_bytes")?;
@@ -256,7 +256,7 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
     })
 }
 
-/// The dataset of a column of the state.
+/// Path of the dataset of a column of the state.
 fn column(k: usize) -> String {
     format!("/column_{k}")
 }
@@ -292,12 +292,12 @@ fn write_file<const D: usize>(
     let width = [simulation.saved_width() as i64];
     file.set_attribute("/", "columns", Attribute::Integers(&width))?;
     file.set_attribute("/", "deck", Attribute::Text(&header.deck))?;
-    for (picks, name) in header.grids.iter().zip(GRIDS) {
-        if !picks.is_empty() {
-            let rows = Rows::Fixed(picks.len() as u64);
+    for (keys, name) in header.grids.iter().zip(GRIDS) {
+        if !keys.is_empty() {
+            let rows = Rows::Fixed(keys.len() as u64);
             let dataset = file.create_dataset::<i64>(name, rows, Some(5))?;
             let own = if comm.rank() == 0 {
-                picks.as_flattened()
+                keys.as_flattened()
             } else {
                 &[]
             };
@@ -305,7 +305,7 @@ fn write_file<const D: usize>(
         }
     }
     let points = Rows::Fixed(header.points);
-    // One after the other, so that a checkpoint takes little memory beside the run.
+    // Column by column, to limit the buffer memory.
     for (k, values) in simulation.saved_columns(order).enumerate() {
         let dataset = file.create_dataset::<f64>(&column(k), points, None)?;
         file.write_rows(&dataset, order.first(), &values)?;

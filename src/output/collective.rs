@@ -1,4 +1,4 @@
-//! HDF5 files that all ranks write together.
+//! HDF5 files written collectively by all ranks.
 
 use super::access::{self, Creation};
 use super::attribute::{Attribute, set_attribute};
@@ -6,38 +6,37 @@ use super::dataset::{Dataset, Rows};
 use super::failure::innermost;
 use super::reserve::Reservation;
 use super::transfer::{self, Transfer};
-use crate::comm::{Communicator, agree, without_confirmation};
+use crate::comm::{Communicator, agree, without_fsync};
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::VarLenUnicode;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
-/// More than an object, its attributes and its entry in a group take, in bytes.
+/// Upper bound on the space of an object, its attributes and its group entry, bytes.
 const OBJECT_BYTES: u64 = 8192;
 
-/// An HDF5 file that all ranks write together; where one rank runs without MPI, an ordinary file.
+/// An HDF5 file written collectively; without MPI, a serial file.
 ///
-/// Every method that returns a `Result` is collective: all ranks call it alike and in the same
-/// order, and where it fails on one rank, it fails on all with that rank's message, which names
-/// the file, the object and HDF5's innermost cause.
+/// Every method that returns a `Result` is collective. If it fails on one rank, it fails on all ranks
+/// with the same message: file, object and HDF5's innermost cause.
 ///
 /// # After a failure
-/// The file is abandoned: it refuses further work and its handles are leaked on purpose, since the
-/// library cannot drop a file without writing, which would fail or hang again. What the last
-/// successful [`flush`](Self::flush) wrote stays readable. The process can go on and leave through
-/// `MPI_Finalize`, provided that [`initialise`](super::transfer::initialise) came before MPI.
+/// The file is abandoned: further calls fail. Its handles are leaked on purpose, because HDF5 writes
+/// when it drops a file, which would fail or hang again. The state of the last successful
+/// [`flush`](Self::flush) stays readable. The process can continue and call `MPI_Finalize`, provided
+/// that [`initialise`](super::transfer::initialise) was called before MPI.
 ///
-/// A full disc is found by rank 0 alone, which reserves the space that the file is going to take
-/// before the ranks write into it (see [`Reservation`]); met inside a collective write of three
-/// ranks or more it would leave some of them waiting for ever.
+/// # Full disk
+/// Rank 0 reserves the space before the ranks write (see [`Reservation`]). A full disk inside a
+/// collective write of three or more ranks would make some of them hang.
 ///
-/// A process that is killed leaves the file as the last flush did: metadata is held in memory
-/// until then. A machine that loses its power leaves at least what was written until the file was last
-/// [confirmed](Self::confirm): after that only numbers change in it, in their places, until it grows, and what
-/// makes it grow is confirmed at once.
+/// # Kill and loss of power
+/// A killed process leaves the file as of its last flush, because metadata stays in memory until then.
+/// A loss of power leaves at least the state of the last [fsync](Self::sync). After that, writes
+/// change values in place only; a flush after growth includes an fsync.
 ///
-/// Dropping a serial file closes it; a collective one must be [closed](Self::close) by all ranks.
+/// Drop closes a serial file; all ranks must [close](Self::close) a collective one.
 pub struct CollectiveFile<'a> {
     inner: ManuallyDrop<hdf5::File>,
     transfer: Transfer,
@@ -48,19 +47,19 @@ pub struct CollectiveFile<'a> {
     /// An upper bound of the file's size in bytes, as the library knows its own only until the
     /// first write.
     size: u64,
-    /// The same when the disc last confirmed it.
-    confirmed: u64,
-    /// What has been reserved on the disc, in bytes; rank 0 holds the reservation.
+    /// `size` at the last fsync.
+    synced: u64,
+    /// Reserved disk space, bytes; rank 0 holds the reservation.
     reserved: u64,
     reservation: Option<Reservation>,
 }
 
 impl<'a> CollectiveFile<'a> {
-    /// Creates a file together with the other ranks.
+    /// Create a file.
     ///
     /// # Errors
-    /// The file exists and shall not be replaced, or it cannot be created; or [`initialise`](super::transfer::initialise) was
-    /// not called in time.
+    /// If the file exists and `creation` is exclusive, it cannot be created, or
+    /// [`initialise`](super::transfer::initialise) was not called before MPI.
     pub fn create(path: &Path, comm: &'a dyn Communicator, creation: Creation) -> Result<Self> {
         let raw = comm.raw();
         if raw.is_some() && !transfer::initialised_before_mpi() {
@@ -76,22 +75,21 @@ impl<'a> CollectiveFile<'a> {
             .map_err(|error| Error::run(format!("cannot create {error}")))
     }
 
-    /// Opens a file that exists, together with the other ranks, to read it.
+    /// Open an existing file for reading.
     ///
     /// # Errors
-    /// There is no such file, it is no HDF5 file, or it may not be read.
+    /// If the file is missing, not an HDF5 file, or not readable.
     pub fn open(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
         let raw = comm.raw();
         Self::begin(path, comm, false, || access::open(path, raw))
             .map_err(|error| Error::run(format!("cannot open {error}")))
     }
 
-    /// Opens a file that exists, together with the other ranks, to read it and to write to it. Where there
-    /// are several ranks, datasets may become longer and not shorter: HDF5 1.10's come apart when they
-    /// do, and wait for one another for ever.
+    /// Open an existing file for reading and writing. With several ranks, datasets may grow but not shrink:
+    /// HDF5 1.10 deadlocks otherwise.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and where it may not be written.
+    /// As [`open`](Self::open), and if it is not writable.
     pub fn open_to_append(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
         let raw = comm.raw();
         Self::begin(path, comm, true, || access::open_to_append(path, raw))
@@ -124,7 +122,7 @@ impl<'a> CollectiveFile<'a> {
             no_collective_cause: 0,
             usable: true,
             size: length + OBJECT_BYTES,
-            confirmed: length + OBJECT_BYTES,
+            synced: length + OBJECT_BYTES,
             reserved: 0,
             reservation,
         })
@@ -135,15 +133,15 @@ impl<'a> CollectiveFile<'a> {
         self.comm
     }
 
-    /// Where the file is.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Gives the open file another name, in the place of any that has it. Collective.
+    /// Rename the open file; an existing file of that name is replaced.
     ///
     /// # Errors
-    /// When it cannot be renamed.
+    /// If it cannot be renamed.
     pub fn rename(&mut self, path: &Path) -> Result<()> {
         let renamed = match self.comm.rank() {
             0 => std::fs::rename(&self.path, path)
@@ -155,42 +153,41 @@ impl<'a> CollectiveFile<'a> {
         Ok(())
     }
 
-    /// Why writes so far were not collective: bits of HDF5's `H5D_MPIO_…` causes of any rank and
-    /// any write, 0 when all were collective. Always 0 for a serial file.
+    /// Causes of non-collective writes, as HDF5's `H5D_MPIO_…` bits over all ranks and writes; 0 if all were
+    /// collective or the file is serial.
     pub fn no_collective_cause(&self) -> u32 {
         self.no_collective_cause
     }
 
-    /// Creates a group, given its path; its parent must exist.
+    /// Create a group; its parent must exist.
     ///
     /// # Errors
-    /// There is such an object already, or no parent.
+    /// If the object exists or the parent does not.
     pub fn create_group(&mut self, path: &str) -> Result<()> {
         self.size += OBJECT_BYTES;
-        self.together(&format!("cannot create the group {path}"), |file| {
+        self.collectively(&format!("cannot create the group {path}"), |file| {
             file.inner.create_group(path).map(|_| ())
         })
     }
 
-    /// Sets an attribute of a group (`/` for the file's root); one that exists must have the same
-    /// type and length as the new value.
+    /// Set an attribute of a group (`/` for the root); an existing one must have the same type and length.
     ///
     /// # Errors
-    /// There is no such group, or the attribute cannot be written.
+    /// If the group is missing or the attribute cannot be written.
     pub fn set_attribute(&mut self, group: &str, name: &str, value: Attribute) -> Result<()> {
         if let Attribute::Text(text) = value {
             self.size += text.len() as u64;
         }
         let doing = format!("cannot write the attribute {name} of {group}");
-        self.together(&doing, |file| {
+        self.collectively(&doing, |file| {
             set_attribute(&*file.inner.group(group)?, name, value)
         })
     }
 
-    /// Sets an attribute of a dataset, as [`set_attribute`](Self::set_attribute) does of a group.
+    /// Set an attribute of a dataset, see [`set_attribute`](Self::set_attribute).
     ///
     /// # Errors
-    /// The attribute cannot be written.
+    /// If the attribute cannot be written.
     pub fn set_dataset_attribute(
         &mut self,
         dataset: &Dataset,
@@ -198,53 +195,52 @@ impl<'a> CollectiveFile<'a> {
         value: Attribute,
     ) -> Result<()> {
         let doing = format!("cannot write the attribute {name} of {}", dataset.path);
-        self.together(&doing, |_| set_attribute(&dataset.inner, name, value))
+        self.collectively(&doing, |_| set_attribute(&dataset.inner, name, value))
     }
 
-    /// Creates a dataset of shape `[rows]`, or `[rows, columns]` where `columns` is given. What is
-    /// never written holds arbitrary values.
+    /// Create a dataset of shape `[rows]` or `[rows, columns]`. Unwritten values are arbitrary.
     ///
     /// # Errors
-    /// There is such an object already, or no parent group.
+    /// If the object exists or the parent group does not.
     pub fn create_dataset<T: hdf5::H5Type>(
         &mut self,
         path: &str,
         rows: Rows,
         columns: Option<usize>,
     ) -> Result<Dataset> {
-        let dataset = self.together(&format!("cannot create the dataset {path}"), |file| {
+        let dataset = self.collectively(&format!("cannot create the dataset {path}"), |file| {
             Dataset::create::<T>(&file.inner, path, rows, columns)
         })?;
         self.size += OBJECT_BYTES + dataset.bytes(dataset.rows);
         Ok(dataset)
     }
 
-    /// Opens a dataset that exists.
+    /// Open an existing dataset.
     ///
     /// # Errors
-    /// There is no such dataset.
+    /// If the dataset is missing.
     pub fn open_dataset(&mut self, path: &str) -> Result<Dataset> {
-        self.together(&format!("cannot open the dataset {path}"), |file| {
+        self.collectively(&format!("cannot open the dataset {path}"), |file| {
             Dataset::open(&file.inner, path)
         })
     }
 
-    /// Adds rows at the end of an extensible dataset, the same number on every rank.
+    /// Append `additional` rows to an extensible dataset; all ranks pass the same number.
     ///
     /// # Errors
-    /// The dataset is not extensible or the disc is full.
+    /// If the dataset is not extensible or the disk is full.
     pub fn extend(&mut self, dataset: &mut Dataset, additional: u64) -> Result<()> {
         self.resize(dataset, dataset.rows + additional)
     }
 
-    /// Gives an extensible dataset so many rows, the same number on every rank; rows that are added
-    /// hold arbitrary values.
+    /// Resize an extensible dataset; all ranks pass the same number of rows. Values of new rows are
+    /// arbitrary.
     ///
     /// # Errors
-    /// The dataset is not extensible or the disc is full.
+    /// If the dataset is not extensible or the disk is full.
     pub fn resize(&mut self, dataset: &mut Dataset, rows: u64) -> Result<()> {
         let shape = dataset.shape(rows).iter().map(|&n| n as usize).collect();
-        self.together(&format!("cannot resize {}", dataset.path), |_| {
+        self.collectively(&format!("cannot resize {}", dataset.path), |_| {
             dataset.inner.resize::<Vec<usize>>(shape)
         })?;
         self.size += dataset
@@ -254,17 +250,17 @@ impl<'a> CollectiveFile<'a> {
         Ok(())
     }
 
-    /// Reads rows of a dataset, `count` from `first_row` on on this rank, in one collective transfer.
+    /// Read this rank's `count` rows from `first_row` on, in one collective transfer.
     ///
     /// # Errors
-    /// The dataset has no such rows or numbers of another type, or it cannot be read.
+    /// If the rows are out of range, the type differs, or the dataset cannot be read.
     pub fn read_rows<T: hdf5::H5Type + bytemuck::Pod>(
         &mut self,
         dataset: &Dataset,
         first_row: u64,
         count: usize,
     ) -> Result<Vec<T>> {
-        self.together(&format!("cannot read {}", dataset.path), |file| {
+        self.collectively(&format!("cannot read {}", dataset.path), |file| {
             if first_row + count as u64 > dataset.rows {
                 return Err("it has too few rows".into());
             }
@@ -274,12 +270,12 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// The text of an attribute of a group (`/` for the file's root).
+    /// Read a text attribute of a group (`/` for the root).
     ///
     /// # Errors
-    /// There is no such text.
+    /// If it is missing or not a text.
     pub fn text_attribute(&mut self, group: &str, name: &str) -> Result<String> {
-        self.together(
+        self.collectively(
             &format!("cannot read the attribute {name} of {group}"),
             |file| {
                 let attribute = file.inner.group(group)?.attr(name)?;
@@ -288,22 +284,22 @@ impl<'a> CollectiveFile<'a> {
         )
     }
 
-    /// The integers of an attribute of a group (`/` for the file's root).
+    /// Read an attribute of integers of a group (`/` for the root).
     ///
     /// # Errors
-    /// There are no such integers.
+    /// If it is missing or has another type.
     pub fn integers_attribute(&mut self, group: &str, name: &str) -> Result<Vec<i64>> {
-        self.together(
+        self.collectively(
             &format!("cannot read the attribute {name} of {group}"),
             |file| file.inner.group(group)?.attr(name)?.read_raw::<i64>(),
         )
     }
 
-    /// Writes this rank's rows from `first_row` on, in one collective transfer; `values` is
-    /// row-major and may be empty.
+    /// Write this rank's rows from `first_row` on, in one collective transfer; `values` is row-major and may
+    /// be empty.
     ///
     /// # Errors
-    /// The values are no whole rows within the dataset, or the disc is full.
+    /// If the values are not whole rows within the dataset, or the disk is full.
     pub fn write_rows<T: hdf5::H5Type>(
         &mut self,
         dataset: &Dataset,
@@ -313,7 +309,7 @@ impl<'a> CollectiveFile<'a> {
         self.reserve()?;
         let columns = dataset.columns.unwrap_or(1);
         let rows = (values.len() / columns) as u64;
-        let causes = self.together(&format!("cannot write {}", dataset.path), |file| {
+        let causes = self.collectively(&format!("cannot write {}", dataset.path), |file| {
             if !values.len().is_multiple_of(columns) || first_row + rows > dataset.rows {
                 let (length, path) = (values.len(), &dataset.path);
                 let rows = dataset.rows;
@@ -327,55 +323,55 @@ impl<'a> CollectiveFile<'a> {
         Ok(())
     }
 
-    /// Hands everything written so far to the file system, so that the file survives the end of
-    /// the process as it is now. Where it has grown, this confirms it: were only a part of what says where
-    /// things are on the disc when the power goes, all of the file could be lost.
+    /// Flush to the file system, so the file survives a kill of the process.
+    ///
+    /// If the file has grown, this includes an fsync: a partial write of its metadata at a loss of power
+    /// could destroy the file.
     ///
     /// # Errors
-    /// The disc is full.
+    /// If the disk is full.
     pub fn flush(&mut self) -> Result<()> {
-        if self.size > self.confirmed {
-            return self.confirm();
+        if self.size > self.synced {
+            return self.sync();
         }
-        without_confirmation(|| self.write_out())
+        without_fsync(|| self.flush_all())
     }
 
-    /// As [`flush`](Self::flush), and waits for the disc to confirm it, so that the file survives a loss of power
-    /// as well.
+    /// [Flush](Self::flush) and fsync, so the file survives a loss of power.
     ///
     /// # Errors
-    /// The disc is full or cannot be written.
-    pub fn confirm(&mut self) -> Result<()> {
-        // MPI's ranks ask for the confirmation within.
-        self.write_out()?;
+    /// If the disk is full or cannot be written.
+    pub fn sync(&mut self) -> Result<()> {
+        // With MPI, HDF5's flush calls MPI_File_sync.
+        self.flush_all()?;
         if self.comm.raw().is_none() {
             let file = std::fs::File::open(&self.path);
-            let confirmed = file.and_then(|file| file.sync_all());
-            self.usable &= confirmed.is_ok();
-            confirmed.map_err(|error| Error::run(format!("{}: {error}", self.path.display())))?;
+            let synced = file.and_then(|file| file.sync_all());
+            self.usable &= synced.is_ok();
+            synced.map_err(|error| Error::run(format!("{}: {error}", self.path.display())))?;
         }
-        self.confirmed = self.size;
+        self.synced = self.size;
         Ok(())
     }
 
-    fn write_out(&mut self) -> Result<()> {
+    fn flush_all(&mut self) -> Result<()> {
         self.reserve()?;
-        self.together("cannot write out the file", |file| file.inner.flush())?;
-        // The library cuts the file to its length here, and thereby gives space back.
+        self.collectively("cannot write out the file", |file| file.inner.flush())?;
+        // HDF5 truncates the file to its length here, which frees reserved space.
         self.reserved = 0;
         if let Some(reservation) = &mut self.reservation {
-            reservation.cut();
+            reservation.truncated();
         }
         Ok(())
     }
 
-    /// Confirms the file and closes it.
+    /// Fsync and close the file.
     ///
     /// # Errors
-    /// The disc is full, or an earlier operation failed.
+    /// If the disk is full or an earlier operation failed.
     pub fn close(mut self) -> Result<()> {
-        self.confirm()?;
-        self.together("cannot close the file", |file| {
+        self.sync()?;
+        self.collectively("cannot close the file", |file| {
             // SAFETY: the handle is not used again, as the file is no longer usable.
             let inner = unsafe { ManuallyDrop::take(&mut file.inner) };
             file.usable = false;
@@ -383,7 +379,7 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// Gets space for all that has been created and extended, before the ranks write there.
+    /// Reserve the space of all created and extended objects, before the ranks write to it.
     fn reserve(&mut self) -> Result<()> {
         if self.comm.raw().is_none() || !self.usable || self.size <= self.reserved {
             return Ok(());
@@ -399,8 +395,8 @@ impl<'a> CollectiveFile<'a> {
         agreed
     }
 
-    /// Does one operation on every rank and agrees on its outcome.
-    fn together<T>(
+    /// Run one operation on every rank and agree on the result.
+    fn collectively<T>(
         &mut self,
         doing: &str,
         work: impl FnOnce(&mut Self) -> hdf5::Result<T>,
@@ -421,7 +417,7 @@ impl<'a> CollectiveFile<'a> {
 
 impl Drop for CollectiveFile<'_> {
     fn drop(&mut self) {
-        // The other ranks of a collective file could not know that they have to close it too.
+        // Closing a collective file here would deadlock unless all ranks drop it.
         if self.usable && self.comm.raw().is_none() {
             // SAFETY: the handle is not used again.
             drop(unsafe { ManuallyDrop::take(&mut self.inner) });

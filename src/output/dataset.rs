@@ -1,4 +1,4 @@
-//! Datasets of numbers in rows, and the space they take.
+//! Datasets of numbers in rows, and their size on disk.
 
 #[cfg(doc)]
 use super::collective::CollectiveFile;
@@ -6,39 +6,39 @@ use hdf5_metno as hdf5;
 use hdf5_metno::plist::dataset_create::{AllocTime, FillTime};
 use std::mem::ManuallyDrop;
 
-/// The largest chunk of a dataset that grows, in bytes.
+/// Maximum chunk size of an extensible dataset, bytes.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// More than the index entry of a chunk takes, in bytes.
+/// Upper bound on the index entry of a chunk, bytes.
 const CHUNK_ENTRY_BYTES: u64 = 128;
 
 /// The number of rows of a dataset.
 #[derive(Debug, Clone, Copy)]
 pub enum Rows {
-    /// So many, from the start and for ever.
+    /// A fixed number.
     Fixed(u64),
-    /// None at first; [`CollectiveFile::extend`] adds some.
+    /// 0 at first; [`CollectiveFile::extend`] appends.
     Extensible {
-        /// How many are usually added at once; decides the size of the chunks.
+        /// Usual number of rows per append; sets the chunk size.
         per_append: u64,
     },
 }
 
-/// A dataset of a [`CollectiveFile`]; it stays open until the file is closed.
+/// A dataset of a [`CollectiveFile`], open until the file is closed.
 #[derive(Debug)]
 pub struct Dataset {
-    // Closed with the file: to close it alone may write, which must not happen after a failure.
+    // Not dropped: closing a dataset can write, which is not allowed after a failure.
     pub(super) inner: ManuallyDrop<hdf5::Dataset>,
     pub(super) path: String,
     pub(super) columns: Option<usize>,
     pub(super) rows: u64,
     row_bytes: u64,
-    /// 0 where it is not extensible.
+    /// 0 if not extensible.
     rows_per_chunk: u64,
 }
 
 impl Dataset {
-    /// The number of rows it has now.
+    /// Current number of rows.
     pub fn rows(&self) -> u64 {
         self.rows
     }
@@ -48,13 +48,13 @@ impl Dataset {
         &self.path
     }
 
-    /// Whether a chunk goes if it is cut to so many rows.
+    /// Test whether truncation to `rows` rows frees a chunk.
     pub fn frees_a_chunk(&self, rows: u64) -> bool {
         let chunk = self.rows_per_chunk.max(1);
         rows.div_ceil(chunk) < self.rows.div_ceil(chunk)
     }
 
-    /// The numbers of a row.
+    /// Number of columns.
     pub fn columns(&self) -> usize {
         self.columns.unwrap_or(1)
     }
@@ -75,7 +75,7 @@ impl Dataset {
             Rows::Fixed(rows) => (rows, 0),
             Rows::Extensible { per_append } => (0, chunk_rows(per_append, row_bytes)),
         };
-        // Early, so that the file's size is known before anyone writes.
+        // Early, so the file size is known before the first write.
         let mut builder = file
             .new_dataset_builder()
             .alloc_time(Some(AllocTime::Early));
@@ -102,7 +102,7 @@ impl Dataset {
         })
     }
 
-    /// Opens a dataset that exists.
+    /// Open an existing dataset.
     pub(super) fn open(file: &hdf5::File, path: &str) -> hdf5::Result<Self> {
         let inner = file.dataset(path)?;
         let shape = inner.shape();
@@ -118,7 +118,7 @@ impl Dataset {
         })
     }
 
-    /// The space its rows take, or would take if it had so many, in bytes.
+    /// Size of `rows` rows on disk, bytes.
     pub(super) fn bytes(&self, rows: u64) -> u64 {
         match self.rows_per_chunk {
             0 => rows * self.row_bytes,
@@ -127,9 +127,9 @@ impl Dataset {
     }
 }
 
-/// Rows of a chunk: one append where that is 4 kB to 4 MB, or an even part of it.
+/// Rows per chunk: one append, or an even fraction of it, of 4 kB to 4 MB.
 fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
-    let (least, most) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
-    let parts = per_append.div_ceil(most).max(1);
-    per_append.div_ceil(parts).max(least)
+    let (min, max) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
+    let parts = per_append.div_ceil(max).max(1);
+    per_append.div_ceil(parts).max(min)
 }

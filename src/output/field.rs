@@ -1,4 +1,4 @@
-//! The fields of a result file: what they are, and how they get into it.
+//! Fields of a result file: description, data and writing.
 
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
@@ -10,35 +10,40 @@ use std::borrow::Cow;
 /// The group of the fields.
 pub(super) const POINT_DATA: &str = "/VTKHDF/PointData";
 
-/// A field of a result file.
+/// Name, unit and shape of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FieldDescription {
     /// Its name.
     pub name: &'static str,
-    /// Its unit, such as `m/s`; empty if it has none.
+    /// Its unit, such as `m/s`; empty if dimensionless.
     pub unit: &'static str,
-    /// LaneTuple per point: 1, 2 (a plane vector, stored with a third component 0), 3, 6 (a
-    /// symmetric tensor: xx, yy, zz, xy, yz, xz) or 9 (a tensor, row-major).
+    /// Components per point:
+    ///
+    /// - 1: scalar;
+    /// - 2: plane vector, stored with a third component of 0;
+    /// - 3: vector;
+    /// - 6: symmetric tensor (xx, yy, zz, xy, yz, xz);
+    /// - 9: tensor, row-major.
     pub components: usize,
 }
 
 /// This rank's values of a field, row-major: [points of this rank, components].
 #[derive(Debug, Clone, Copy)]
 pub enum FieldData<'a> {
-    /// Real numbers.
+    /// 8-byte floats.
     F64(&'a [f64]),
-    /// Real numbers of half the length.
+    /// 4-byte floats.
     F32(&'a [f32]),
-    /// Large whole numbers, such as point ids.
+    /// 8-byte integers, such as point ids.
     U64(&'a [u64]),
-    /// Whole numbers.
+    /// 4-byte integers.
     U32(&'a [u32]),
-    /// Small whole numbers and flags.
+    /// 1-byte integers and flags.
     U8(&'a [u8]),
 }
 
 impl FieldData<'_> {
-    /// The type of its numbers.
+    /// The number type.
     pub(super) fn number(&self) -> Number {
         match self {
             FieldData::F64(_) => Number::F64,
@@ -49,8 +54,8 @@ impl FieldData<'_> {
         }
     }
 
-    /// No values of the same kind.
-    pub(super) fn none(&self) -> FieldData<'static> {
+    /// Empty data of the same number type.
+    pub(super) fn empty(&self) -> FieldData<'static> {
         match self {
             FieldData::F64(_) => FieldData::F64(&[]),
             FieldData::F32(_) => FieldData::F32(&[]),
@@ -71,7 +76,7 @@ impl FieldData<'_> {
     }
 }
 
-/// Complains where a field's values do not match the points or its components.
+/// Check the number of values of a field against its points and components.
 pub(super) fn check(field: &FieldDescription, data: &FieldData, points: usize) -> Result<()> {
     let (name, components, length) = (field.name, field.components, data.len());
     if !matches!(components, 1 | 2 | 3 | 6 | 9) {
@@ -119,16 +124,16 @@ pub(super) fn write_field(
 ) -> Result<()> {
     let plane = field.components == 2;
     match data {
-        FieldData::F64(values) => file.write_rows(dataset, row, &in_space(values, plane)),
-        FieldData::F32(values) => file.write_rows(dataset, row, &in_space(values, plane)),
-        FieldData::U64(values) => file.write_rows(dataset, row, &in_space(values, plane)),
-        FieldData::U32(values) => file.write_rows(dataset, row, &in_space(values, plane)),
-        FieldData::U8(values) => file.write_rows(dataset, row, &in_space(values, plane)),
+        FieldData::F64(values) => file.write_rows(dataset, row, &padded(values, plane)),
+        FieldData::F32(values) => file.write_rows(dataset, row, &padded(values, plane)),
+        FieldData::U64(values) => file.write_rows(dataset, row, &padded(values, plane)),
+        FieldData::U32(values) => file.write_rows(dataset, row, &padded(values, plane)),
+        FieldData::U8(values) => file.write_rows(dataset, row, &padded(values, plane)),
     }
 }
 
-/// Plane vectors with a third component, which viewers need to warp by them.
-fn in_space<T: Copy + Default>(values: &[T], plane: bool) -> Cow<'_, [T]> {
+/// Pad plane vectors with a third component, as viewers require vectors of three.
+fn padded<T: Copy + Default>(values: &[T], plane: bool) -> Cow<'_, [T]> {
     if !plane {
         return Cow::Borrowed(values);
     }

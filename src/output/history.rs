@@ -1,10 +1,10 @@
-//! The history: numbers of the whole body (energies, reactions, probes) over time, as a table in the
-//! result file and as a CSV file beside it.
+//! The history: global quantities (energies, reactions, probes) over time, as a table in the result file
+//! and as a CSV file.
 
 use super::attribute::Attribute;
 use super::collective::CollectiveFile;
 use super::dataset::{Dataset, Rows};
-use super::vtkhdf::LEAST_ROWS;
+use super::vtkhdf::MIN_CHUNK_ROWS;
 use crate::comm::agree;
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
@@ -12,22 +12,24 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// The table: a row for each moment.
+/// Path of the table; it has one row per sample.
 pub(super) const HISTORY: &str = "/history";
 
-/// Its attributes, with the names and the units of the columns, and what is between them there.
+/// Attribute with the names of the columns.
 pub(super) const COLUMNS: &str = "columns";
+/// Attribute with the units of the columns.
 pub(super) const UNITS: &str = "units";
+/// Separator in these attributes.
 pub(super) const SEPARATOR: &str = ",";
 
-/// What a history holds from the start.
+/// Description of a history.
 #[derive(Debug, Clone, Copy)]
 pub struct HistoryContents<'a> {
     /// Name and unit of each column.
     pub columns: &'a [(String, &'static str)],
-    /// Where the CSV file goes.
+    /// Path of the CSV file.
     pub csv: &'a Path,
-    /// Number of rows that are expected; there may be more.
+    /// Expected number of rows; there may be more.
     pub rows: u64,
 }
 
@@ -35,20 +37,21 @@ pub struct HistoryContents<'a> {
 pub struct History {
     table: Dataset,
     csv: PathBuf,
-    /// On rank 0 only.
+    /// The CSV file; on rank 0 only.
     writer: Option<File>,
 }
 
 impl History {
-    /// Collective. Makes the table `/history`, and the CSV file with a header such as
-    /// `time [s],step,kinetic_energy [J]`; an older one is replaced.
+    /// Create the table `/history` and the CSV file, which replaces an existing one. Collective.
+    ///
+    /// The header of the CSV file is like `time [s],step,kinetic_energy [J]`.
     ///
     /// # Errors
-    /// There is a history already, or the files cannot be written.
+    /// If the table exists or a file cannot be written.
     pub fn create(file: &mut CollectiveFile<'_>, contents: &HistoryContents) -> Result<Self> {
         let HistoryContents { columns, csv, rows } = *contents;
         let rows = Rows::Extensible {
-            per_append: rows.max(LEAST_ROWS),
+            per_append: rows.max(MIN_CHUNK_ROWS),
         };
         let table = file.create_dataset::<f64>(HISTORY, rows, Some(columns.len()))?;
         let names: Vec<&str> = columns.iter().map(|(name, _)| &name[..]).collect();
@@ -59,11 +62,12 @@ impl History {
         Self::with(file, table, csv, || create_csv(csv, &header(columns)))
     }
 
-    /// Collective. Goes on after the rows of the history in a file, which are given. The CSV file is written anew,
-    /// beside its place, so that the old one is there until the new one is whole.
+    /// Continue the history of a file, whose rows are `past`. Collective.
+    ///
+    /// The CSV file is rewritten to a temporary file, which then replaces it by a rename.
     ///
     /// # Errors
-    /// The table is missing, or the files cannot be written.
+    /// If the table is missing or a file cannot be written.
     pub fn resume(
         file: &mut CollectiveFile<'_>,
         contents: &HistoryContents,
@@ -80,7 +84,7 @@ impl History {
         Self::with(file, table, csv, rewritten)
     }
 
-    /// With the CSV file that rank 0 begins.
+    /// Create the CSV file on rank 0 with `begin`.
     fn with(
         file: &CollectiveFile<'_>,
         table: Dataset,
@@ -100,10 +104,10 @@ impl History {
         })
     }
 
-    /// Collective. The first `count` rows of the history in a file, the same on all ranks.
+    /// Read the first `count` rows of the history of a file, on all ranks. Collective.
     ///
     /// # Errors
-    /// The table is missing or too short.
+    /// If the table is missing or too short.
     pub fn read(file: &mut CollectiveFile<'_>, count: u64) -> Result<Vec<Vec<f64>>> {
         let table = file.open_dataset(HISTORY)?;
         let values: Vec<f64> = file.read_rows(&table, 0, count as usize)?;
@@ -118,10 +122,10 @@ impl History {
         self.table.rows()
     }
 
-    /// Collective. Adds rows to both files; all ranks pass the same, rank 0 writes them.
+    /// Append rows to both files; all ranks pass the same rows. Collective.
     ///
     /// # Errors
-    /// A row has not one number per column, or the disc is full.
+    /// If the length of a row differs from the number of columns, or the disk is full.
     pub fn append(&mut self, file: &mut CollectiveFile<'_>, rows: &[Vec<f64>]) -> Result<()> {
         agree(file.communicator(), self.append_csv(rows))?;
         let first = self.table.rows();
@@ -175,7 +179,7 @@ fn header(columns: &[(String, &str)]) -> String {
     text + "\n"
 }
 
-/// The lines of some rows.
+/// Format rows as CSV.
 fn lines(rows: &[Vec<f64>]) -> String {
     let mut text = String::new();
     for row in rows {
@@ -186,7 +190,7 @@ fn lines(rows: &[Vec<f64>]) -> String {
     text
 }
 
-/// The shortest text that reads back as the same number; whole numbers without a point.
+/// Format the shortest text that parses to the same number; integers without a decimal point.
 fn shortest(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         format!("{value}")
@@ -200,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_back_as_they_were() {
+    fn formatted_numbers_parse_to_the_same_value() {
         for value in [0.0, -3.0, 0.1, 1.0 / 3.0, 6.02e23, 5e-324, f64::INFINITY] {
             assert_eq!(shortest(value).parse(), Ok(value));
         }

@@ -1,5 +1,6 @@
-//! Result files: HDF5 in VTKHDF layout, written by all ranks together, with a history and a
-//! side-car for older viewers. The only folder that names HDF5.
+//! Result files and checkpoints in HDF5, written collectively. No other folder calls HDF5.
+//!
+//! A result has the VTKHDF layout, with a history, and an XDMF side-car for older viewers.
 
 mod access;
 mod attribute;

@@ -1,4 +1,4 @@
-//! Reading result files, by one process.
+//! Serial reader of result files.
 
 use super::failure::{innermost, system_error};
 use super::field::POINT_DATA;
@@ -10,18 +10,18 @@ use hdf5_metno::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 use std::io::ErrorKind::{NotFound, WouldBlock};
 use std::path::{Path, PathBuf};
 
-/// The type of a field's numbers.
+/// The number type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Number {
-    /// 8-byte real numbers.
+    /// 8-byte float.
     F64,
-    /// 4-byte real numbers.
+    /// 4-byte float.
     F32,
-    /// 8-byte whole numbers.
+    /// 8-byte unsigned integer.
     U64,
-    /// 4-byte whole numbers.
+    /// 4-byte unsigned integer.
     U32,
-    /// 1-byte whole numbers.
+    /// 1-byte unsigned integer.
     U8,
 }
 
@@ -30,13 +30,13 @@ pub enum Number {
 pub struct StoredField {
     /// Its name.
     pub name: String,
-    /// Its unit; empty if it has none.
+    /// Its unit; empty if dimensionless.
     pub unit: String,
-    /// LaneTuple per point: 1, 3, 6 or 9.
+    /// Components per point: 1, 3, 6 or 9.
     pub components: usize,
-    /// The type of its numbers.
+    /// Its number type.
     pub number: Number,
-    /// Whether it changes with time.
+    /// It changes with time.
     pub dynamic: bool,
 }
 
@@ -45,7 +45,7 @@ pub struct StoredField {
 pub struct StoredColumn {
     /// Its name.
     pub name: String,
-    /// Its unit; empty if it has none.
+    /// Its unit; empty if dimensionless.
     pub unit: String,
     /// One number per row.
     pub values: Vec<f64>,
@@ -53,23 +53,22 @@ pub struct StoredColumn {
 
 /// A result file open for reading.
 ///
-/// Errors are of the kind [`Input`](crate::error::ErrorKind::Input) where the file is missing, damaged or no result,
-/// and of the kind [`Run`](crate::error::ErrorKind::Run) where the system does not let it be read.
+/// Errors are of kind [`Input`](crate::error::ErrorKind::Input) if the file is missing, damaged or not
+/// a result, and of kind [`Run`](crate::error::ErrorKind::Run) if the system fails to read it.
 #[derive(Debug)]
 pub struct ResultReader {
     file: hdf5::File,
     path: PathBuf,
-    /// Number of points: one for all steps, or one for each.
+    /// Number of points: one entry for all steps, or one per step.
     counts: Vec<usize>,
     steps: usize,
 }
 
 impl ResultReader {
-    /// Opens a result file.
+    /// Open a result file.
     ///
     /// # Errors
-    /// There is no such file, it is no HDF5 file, or not a result of Fissure; another program has locked it, or the
-    /// system does not let it be read.
+    /// If the file is missing, not a result of Fissure, locked by another program, or unreadable.
     pub fn open(path: &Path) -> Result<Self> {
         let problem = |text: &str| Err(Error::input(format!("{}: {text}", path.display())));
         if let Err(error) = std::fs::metadata(path) {
@@ -108,7 +107,7 @@ impl ResultReader {
                 return problem(text);
             }
         };
-        // A loss of power may have left any of the three numbers as it was before.
+        // After a loss of power, any of the three lengths may be out of date; the smallest is valid.
         let mut complete = steps;
         for name in ["Values", "Step"] {
             let rows = match file.dataset(&format!("{STEPS}/{name}")) {
@@ -139,21 +138,21 @@ impl ResultReader {
         })
     }
 
-    /// The number of points at one of the [times](Self::times).
+    /// Number of points at one of the [times](Self::times).
     pub fn points(&self, time_index: usize) -> usize {
         self.counts[time_index.min(self.counts.len() - 1)]
     }
 
-    /// Whether each step has its own points.
+    /// Each step has its own points.
     pub fn is_changing(&self) -> bool {
         let id = self.file.dataset(&format!("{POINT_DATA}/id"));
         id.is_ok_and(|dataset| dataset.is_resizable())
     }
 
-    /// The times of the complete steps, in s.
+    /// Times of the complete steps, s.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// If the file is damaged.
     pub fn times(&self) -> Result<Vec<f64>> {
         self.table(&format!("{STEPS}/Values"))
     }
@@ -161,22 +160,22 @@ impl ResultReader {
     /// The numbers of the complete steps.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// If the file is damaged.
     pub fn steps(&self) -> Result<Vec<u64>> {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// The rows of point data that are those of a time.
+    /// The rows of point data of a step.
     fn rows(&self, offsets: &str, time_index: usize) -> Result<std::ops::Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);
         Ok(first..first + self.points(time_index))
     }
 
-    /// The reference positions at one of the [times](Self::times), in m.
+    /// Reference positions at one of the [times](Self::times), m.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// If the file is damaged.
     pub fn positions(&self, time_index: usize) -> Result<Vec<[f64; 3]>> {
         let path = "/VTKHDF/Points";
         let rows = self.rows(&format!("{STEPS}/PointOffsets"), time_index)?;
@@ -188,10 +187,10 @@ impl ResultReader {
         Ok(values.as_chunks::<3>().0.to_vec())
     }
 
-    /// The points' global ids at one of the [times](Self::times), in the order of all other point data.
+    /// Global ids of the points at one of the [times](Self::times), in the order of all point data.
     ///
     /// # Errors
-    /// The file is damaged or has no ids.
+    /// If the file is damaged or has no ids.
     pub fn ids(&self, time_index: usize) -> Result<Vec<u64>> {
         let path = format!("{POINT_DATA}/id");
         let rows = self.rows(&format!("{STEPS}/PointDataOffsets/id"), time_index)?;
@@ -205,7 +204,7 @@ impl ResultReader {
     /// The fields, by name.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// If the file is damaged.
     pub fn fields(&self) -> Result<Vec<StoredField>> {
         let names = self
             .file
@@ -218,11 +217,11 @@ impl ResultReader {
             .collect()
     }
 
-    /// One field's values at one of the [times](Self::times), row-major: [points, components];
-    /// whole numbers are converted.
+    /// Values of a field at one of the [times](Self::times), [points, components] row-major; integers are
+    /// converted.
     ///
     /// # Errors
-    /// There is no such field or time, or the file is damaged.
+    /// If the field or time is missing, or the file is damaged.
     pub fn field(&self, name: &str, time_index: usize) -> Result<Vec<f64>> {
         let path = format!("{POINT_DATA}/{name}");
         if !self.file.link_exists(&path) {
@@ -252,10 +251,10 @@ impl ResultReader {
         read.map_err(|error| self.damaged(&path, &error))
     }
 
-    /// The columns of the history in the order they were made; none where there is no history.
+    /// The columns of the history in their order; empty without a history.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// If the file is damaged.
     pub fn history(&self) -> Result<Vec<StoredColumn>> {
         if !self.file.link_exists(HISTORY) {
             return Ok(Vec::new());
@@ -281,10 +280,10 @@ impl ResultReader {
         read().map_err(|error| self.damaged(HISTORY, &error))
     }
 
-    /// The file's own attributes (deck, version, command line, …), by name.
+    /// The attributes of the file (deck, version, command line, …), by name.
     ///
     /// # Errors
-    /// The file is damaged.
+    /// If the file is damaged.
     pub fn attributes(&self) -> Result<Vec<(String, String)>> {
         let read = || -> hdf5::Result<Vec<_>> {
             let names = self.file.attr_names()?.into_iter();
@@ -318,7 +317,7 @@ impl ResultReader {
         read().map_err(|error| self.damaged(&path, &error))
     }
 
-    /// One number per complete step.
+    /// Read a table with one number per complete step.
     fn table<T: hdf5::H5Type>(&self, path: &str) -> Result<Vec<T>> {
         let read = self
             .file
@@ -333,10 +332,10 @@ impl ResultReader {
         Ok(values)
     }
 
-    /// Reads all points and values of the first steps.
+    /// Check that all points and values of the first `steps` steps are readable.
     ///
     /// # Errors
-    /// The file is damaged or has fewer steps.
+    /// If the file is damaged or has fewer steps.
     pub fn check(&self, steps: usize) -> Result<()> {
         let fields = self.fields()?;
         self.history()?;
@@ -360,7 +359,7 @@ impl ResultReader {
     }
 }
 
-/// The error for a file that the system does not let be read.
+/// The error for a file that the system cannot read.
 fn cannot_read(path: &Path, cause: &std::io::Error) -> Error {
     let path = path.display();
     Error::run(match cause.kind() {

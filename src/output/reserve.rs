@@ -1,8 +1,8 @@
-//! Space on the disc, asked for before it is needed.
+//! Reservation of disk space before collective writes.
 //!
-//! When a disc fills up inside a collective write, most of Open MPI's writers (of version 4.1:
-//! `vulcan`, the default, `dynamic_gen2`, `two_phase`, ROMIO) leave some ranks waiting for ever.
-//! A single rank that asks for the space beforehand gets an ordinary error.
+//! If the disk fills up inside a collective write, most of Open MPI 4.1's writers (`vulcan`, the
+//! default, `dynamic_gen2`, `two_phase`, ROMIO) hang on some ranks. A reservation by one rank fails with
+//! an ordinary error instead.
 
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
@@ -10,7 +10,7 @@ use std::io;
 use std::os::fd::AsRawFd as _;
 use std::path::{Path, PathBuf};
 
-/// The space that a growing file has been promised.
+/// The disk space reserved for a growing file.
 #[derive(Debug)]
 pub struct Reservation {
     file: File,
@@ -19,10 +19,10 @@ pub struct Reservation {
 }
 
 impl Reservation {
-    /// Prepares to reserve space for a file that exists.
+    /// Open an existing file for reservations.
     ///
     /// # Errors
-    /// The file cannot be opened for writing.
+    /// If the file cannot be opened for writing.
     pub fn new(path: &Path) -> Result<Self> {
         let file = OpenOptions::new().write(true).open(path);
         Ok(Self {
@@ -32,13 +32,13 @@ impl Reservation {
         })
     }
 
-    /// Makes sure that the file can grow to `bytes`; its length stays as it is.
+    /// Reserve space up to `bytes` without a change of the file's length.
     ///
-    /// Where the file system cannot promise space, the free space is compared instead; others may
-    /// still take it, and quotas go unseen.
+    /// On file systems without preallocation, only the free space is checked. Other processes can still
+    /// take it, and quotas are ignored.
     ///
     /// # Errors
-    /// The disc or the quota is full.
+    /// If the disk or the quota is full.
     pub fn grow(&mut self, bytes: u64) -> Result<()> {
         let additional = bytes.saturating_sub(self.bytes);
         if additional == 0 {
@@ -47,7 +47,7 @@ impl Reservation {
         let reserved = match allocate(&self.file, self.bytes, additional) {
             Err(error) if error.raw_os_error() == Some(libc::EOPNOTSUPP) => {
                 let taken = self.file.metadata().map_or(0, |metadata| metadata.len());
-                compare(&self.file, bytes.saturating_sub(taken.max(self.bytes)))
+                check_free_space(&self.file, bytes.saturating_sub(taken.max(self.bytes)))
             }
             other => other,
         };
@@ -56,8 +56,8 @@ impl Reservation {
         Ok(())
     }
 
-    /// Takes note that the file was cut to its present length, which gives back what lies beyond.
-    pub fn cut(&mut self) {
+    /// Update the reservation after a truncation of the file to its length, which frees the space beyond.
+    pub fn truncated(&mut self) {
         let length = self.file.metadata().map_or(0, |metadata| metadata.len());
         self.bytes = self.bytes.min(length);
     }
@@ -79,7 +79,7 @@ fn allocate(file: &File, from: u64, length: u64) -> io::Result<()> {
     }
 }
 
-/// Elsewhere no call promises space and leaves the length as it is.
+/// Other systems have no preallocation that keeps the file's length.
 #[cfg(not(target_os = "linux"))]
 fn allocate(_: &File, _: u64, _: u64) -> io::Result<()> {
     Err(io::Error::from_raw_os_error(libc::EOPNOTSUPP))
@@ -87,16 +87,16 @@ fn allocate(_: &File, _: u64, _: u64) -> io::Result<()> {
 
 #[allow(
     clippy::unnecessary_cast,
-    reason = "the numbers are narrower on other systems"
+    reason = "the fields are narrower on other systems"
 )]
-fn compare(file: &File, additional: u64) -> io::Result<()> {
+fn check_free_space(file: &File, additional: u64) -> io::Result<()> {
     // SAFETY: the structure is plain numbers, for which zeros are valid.
-    let mut disc: libc::statvfs = unsafe { std::mem::zeroed() };
+    let mut disk: libc::statvfs = unsafe { std::mem::zeroed() };
     // SAFETY: the descriptor is open, and the structure lives through the call.
-    if unsafe { libc::fstatvfs(file.as_raw_fd(), &mut disc) } != 0 {
+    if unsafe { libc::fstatvfs(file.as_raw_fd(), &mut disk) } != 0 {
         return Err(io::Error::last_os_error());
     }
-    if (disc.f_bavail as u64).saturating_mul(disc.f_frsize as u64) < additional {
+    if (disk.f_bavail as u64).saturating_mul(disk.f_frsize as u64) < additional {
         return Err(io::Error::from_raw_os_error(libc::ENOSPC));
     }
     Ok(())
@@ -114,13 +114,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_disc_can_hold_is_refused_and_the_length_stays() {
+    fn an_excessive_reservation_fails_and_keeps_the_length() {
         let path = std::env::temp_dir().join(format!("fissure-reserve-{}", std::process::id()));
         std::fs::write(&path, "abc").unwrap();
         let mut reservation = Reservation::new(&path).unwrap();
         reservation.grow(100_000).unwrap();
         assert_eq!(std::fs::metadata(&path).unwrap().len(), 3);
-        assert!(compare(&reservation.file, u64::MAX).is_err());
+        assert!(check_free_space(&reservation.file, u64::MAX).is_err());
         let error = reservation.grow(1 << 60).unwrap_err();
         assert!(
             error.message.contains("bytes more on the disc"),

@@ -1,8 +1,7 @@
-//! A checksum at the end of a file, so that a truncated or altered one is recognised before anybody
-//! trusts it.
+//! A seal: a checksum appended to a file, to detect truncation and corruption.
 //!
-//! Readers of HDF5 ignore what follows the last object of a file. All ranks check a share of the
-//! bytes each; the sum over 8-byte words mixed with their place does not depend on the shares.
+//! HDF5 ignores bytes after the last object of a file. Each rank reads a share of the bytes. The
+//! checksum is a sum over 8-byte words, each mixed with its index, so it does not depend on the shares.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -14,17 +13,16 @@ use crate::error::{Error, Result};
 /// Marks a seal; also guards against other trailing bytes.
 const MAGIC: u64 = u64::from_le_bytes(*b"FISSSEAL");
 
-/// Magic, length of the sealed bytes, their checksum, and a number of the writer's choice.
+/// Magic, length of the sealed bytes, their checksum, and the caller's number.
 const SEAL_BYTES: u64 = 32;
 
-/// Bytes read at once.
+/// Size of the read buffer, bytes.
 const BUFFER: usize = 1 << 20;
 
-/// Appends the seal with a number of the caller's choice to a closed file, and makes the file safe on
-/// the disc. Collective.
+/// Append a seal with the caller's number to a closed file, and fsync it. Collective.
 ///
 /// # Errors
-/// When the file cannot be read or written.
+/// If the file cannot be read or written.
 pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     let length = from_root(comm, path, || Ok([length(path)?]))?[0];
     let sum = checksum(comm, path, length)?;
@@ -41,19 +39,19 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// The number in the seal of a file, without a check of the other bytes; `None` where there is no seal.
+/// Read the number of a file's seal without a check of the file; `None` without a seal.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// If the file cannot be read.
 pub fn number(path: &Path) -> Result<Option<u64>> {
     let seal = read_seal(path).map_err(|error| failure(path, &error))?;
     Ok(seal.map(|seal| seal.number))
 }
 
-/// Whether a file has the bytes that were sealed. Collective.
+/// Check the bytes of a file against its seal. Collective.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// If the file cannot be read.
 pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
     let words = from_root(comm, path, || {
         let seal = read_seal(path)?;
@@ -65,7 +63,7 @@ pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
     Ok(checksum(comm, path, length)? ^ mix(number) == sum)
 }
 
-/// What a seal holds beside its mark.
+/// The contents of a seal after the magic.
 struct Seal {
     /// Number of sealed bytes.
     length: u64,
@@ -74,7 +72,7 @@ struct Seal {
     number: u64,
 }
 
-/// The seal at the end of a file, if there is one.
+/// Read the seal at the end of a file, if present.
 fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     let mut file = File::open(path)?;
     let Some(sealed) = length(path)?.checked_sub(SEAL_BYTES) else {
@@ -93,7 +91,8 @@ fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     Ok((magic == MAGIC && length == sealed).then_some(seal))
 }
 
-/// What rank 0 reads of a file, on all ranks: others may see an older state of it. Collective.
+/// Read words on rank 0 and broadcast them: on other ranks, the file system may be out of date.
+/// Collective.
 fn from_root<const N: usize>(
     comm: &dyn Communicator,
     path: &Path,
@@ -103,7 +102,7 @@ fn from_root<const N: usize>(
         0 => read().map_err(|error| failure(path, &error)),
         _ => Ok([0; N]),
     };
-    // Ranks other than 0 have zeros, so that the sum is what rank 0 read.
+    // The other ranks contribute zeros, so the sum is a broadcast.
     let mut words = agree(comm, words)?;
     comm.sum(&mut words);
     Ok(words)
@@ -113,38 +112,38 @@ fn length(path: &Path) -> std::io::Result<u64> {
     Ok(std::fs::metadata(path)?.len())
 }
 
-/// The checksum of the first `length` bytes. Collective.
+/// Compute the checksum of the first `length` bytes. Collective.
 fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
     let words = length.div_ceil(8);
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
-    let share = |rank: u64| (u128::from(words) * u128::from(rank) / u128::from(size)) as u64;
-    let own = sum_words(path, share(rank), share(rank + 1), length);
+    let start = |rank: u64| (u128::from(words) * u128::from(rank) / u128::from(size)) as u64;
+    let own = sum_words(path, start(rank), start(rank + 1), length);
     let own = agree(comm, own.map_err(|error| failure(path, &error)))?;
     Ok(crate::comm::total(comm, own))
 }
 
-/// Sums the words from `first` up to `end`; the last one of the file is filled up with zeros.
+/// Sum the words `first` to `end` − 1; the last word of the file is padded with zeros.
 fn sum_words(path: &Path, first: u64, end: u64, length: u64) -> std::io::Result<u64> {
     let mut file = File::open(path)?;
     file.seek(SeekFrom::Start(8 * first))?;
-    let mut left = (8 * end).min(length).saturating_sub(8 * first);
+    let mut remaining = (8 * end).min(length).saturating_sub(8 * first);
     let mut buffer = vec![0; BUFFER];
-    let (mut sum, mut place) = (0_u64, first);
-    while left > 0 {
-        let take = (left as usize).min(BUFFER);
+    let (mut sum, mut index) = (0_u64, first);
+    while remaining > 0 {
+        let take = (remaining as usize).min(BUFFER);
         file.read_exact(&mut buffer[..take])?;
         buffer[take..take.next_multiple_of(8)].fill(0);
         for word in buffer[..take.next_multiple_of(8)].chunks_exact(8) {
             let word = u64::from_le_bytes(word.try_into().expect("a chunk has 8 bytes"));
-            sum = sum.wrapping_add(mix(word ^ mix(place)));
-            place += 1;
+            sum = sum.wrapping_add(mix(word ^ mix(index)));
+            index += 1;
         }
-        left -= take as u64;
+        remaining -= take as u64;
     }
     Ok(sum)
 }
 
-/// Spreads every bit over the whole word (the finisher of SplitMix64).
+/// Hash a word (the finaliser of SplitMix64).
 pub fn mix(word: u64) -> u64 {
     let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let word = (word ^ word >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -165,7 +164,7 @@ mod tests {
     use crate::comm::threads;
 
     #[test]
-    fn any_flipped_bit_and_any_cut_is_seen() {
+    fn flipped_bits_and_truncation_are_detected() {
         let path = std::env::temp_dir().join(format!("fissure-seal-{}", std::process::id()));
         let bytes: Vec<u8> = (0..1003).map(|k| (k * 7) as u8).collect();
         std::fs::write(&path, &bytes).unwrap();
@@ -184,7 +183,7 @@ mod tests {
             std::fs::write(&path, &sealed[..length]).unwrap();
             assert_eq!(intact(1), [false], "cut to {length}");
         }
-        // A file that cannot be read is not a damaged one: this link points to itself.
+        // An unreadable file (a link to itself) is an error, not a damaged file.
         std::fs::remove_file(&path).unwrap();
         std::os::unix::fs::symlink(&path, &path).unwrap();
         assert!(number(&path).is_err());

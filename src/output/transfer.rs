@@ -1,7 +1,6 @@
-//! Collective transfers of rows: the only file that calls HDF5's C interface.
+//! Collective transfers of rows. No other file calls HDF5's C interface.
 //!
-//! The safe wrappers write with default transfer properties, which on a parallel file means each
-//! rank for itself; and so the rows of datasets are written by hand here.
+//! The safe wrappers use default transfer properties, which are independent on a parallel file.
 
 use crate::comm;
 use hdf5_metno as hdf5;
@@ -15,25 +14,24 @@ unsafe extern "C" {
     fn H5Pget_mpio_no_collective_cause(list: hid_t, local: *mut u32, global: *mut u32) -> i32;
 }
 
-/// Whether the library was initialised before MPI.
+/// HDF5 was initialised before MPI.
 static BEFORE_MPI: AtomicBool = AtomicBool::new(false);
 
-/// Initialises the HDF5 library; to be called before MPI is initialised, by every program that
-/// opens collective files.
+/// Initialise HDF5. Every program that opens collective files must call this before MPI starts.
 ///
-/// A library that finds MPI running hooks itself into `MPI_Finalize`, where it flushes and closes
-/// whatever is still open: for a file that was abandoned on a full disc that hangs or crashes.
+/// If MPI is already running, HDF5 registers itself with `MPI_Finalize`. There it flushes open files,
+/// which hangs or crashes for a file that was abandoned on a full disk.
 pub fn initialise() {
     sync(|| ());
     BEFORE_MPI.fetch_or(!comm::mpi::is_running(), Ordering::Relaxed);
 }
 
-/// Whether [`initialise`] was called before MPI was initialised.
+/// [`initialise`] was called before MPI started.
 pub(super) fn initialised_before_mpi() -> bool {
     BEFORE_MPI.load(Ordering::Relaxed)
 }
 
-/// How rows get into a file: each process for itself or all ranks together.
+/// Transfer properties: independent or collective.
 #[derive(Debug)]
 pub(super) struct Transfer {
     list: ManuallyDrop<hdf5::PropertyList>,
@@ -42,7 +40,7 @@ pub(super) struct Transfer {
 
 impl Transfer {
     pub(super) fn new(collective: bool) -> hdf5::Result<Self> {
-        // SAFETY: the class is one of the library's own, and the new handle is owned here alone.
+        // SAFETY: the class is a constant of the library, and the new handle has no other owner.
         let list: hdf5::PropertyList = sync(|| unsafe {
             hdf5::from_id(hdf5::h5check(h5p::H5Pcreate(*h5p::H5P_CLS_DATASET_XFER))?)
         })?;
@@ -57,8 +55,8 @@ impl Transfer {
         })
     }
 
-    /// Writes the rows from `first_row` on, none where there are no values; `values` are whole rows
-    /// within the dataset. Returns the causes that kept the transfer from being collective.
+    /// Write rows from `first_row` on; `values` are whole rows within the dataset and may be empty. Return
+    /// the causes of a non-collective transfer.
     pub(super) fn write<T: hdf5::H5Type>(
         &self,
         dataset: &hdf5::Dataset,
@@ -68,7 +66,7 @@ impl Transfer {
         let selection = Selection::new(dataset, first_row, values.len())?;
         let number = hdf5::Datatype::from_type::<T>()?;
         sync(|| {
-            // SAFETY: all handles are alive, and the selection has no more elements than `values`.
+            // SAFETY: all handles are valid, and the selection has no more elements than `values`.
             unsafe {
                 hdf5::h5check(h5d::H5Dwrite(
                     dataset.id(),
@@ -83,8 +81,8 @@ impl Transfer {
         })
     }
 
-    /// Reads whole rows from `first_row` on into `values`, none where that is empty. Returns the
-    /// causes that kept the transfer from being collective.
+    /// Read whole rows from `first_row` on into `values`, which may be empty. Return the causes of a
+    /// non-collective transfer.
     pub(super) fn read<T: hdf5::H5Type + bytemuck::Pod>(
         &self,
         dataset: &hdf5::Dataset,
@@ -94,8 +92,8 @@ impl Transfer {
         let selection = Selection::new(dataset, first_row, values.len())?;
         let number = hdf5::Datatype::from_type::<T>()?;
         sync(|| {
-            // SAFETY: all handles are alive, the selection has no more elements than `values`, and
-            // these may hold any bits.
+            // SAFETY: all handles are valid, the selection has no more elements than `values`, and any
+            // bits are valid values of `T`.
             unsafe {
                 hdf5::h5check(h5d::H5Dread(
                     dataset.id(),
@@ -110,7 +108,7 @@ impl Transfer {
         })
     }
 
-    /// Why the last transfer was not collective, on any rank; 0 if it was.
+    /// Causes of a non-collective last transfer, over all ranks; 0 if it was collective.
     fn causes(&self) -> hdf5::Result<u32> {
         let (mut local, mut global) = (0, 0);
         if self.collective {
@@ -124,14 +122,14 @@ impl Transfer {
     }
 }
 
-/// Consecutive rows of a dataset, and their place in memory.
+/// Consecutive rows of a dataset, and the matching buffer.
 struct Selection {
     memory: hdf5::Dataspace,
     file: hdf5::Dataspace,
 }
 
 impl Selection {
-    /// The rows from `first_row` on that hold `numbers` numbers; nothing if that is 0.
+    /// Select the rows from `first_row` on with `numbers` values in total.
     fn new(dataset: &hdf5::Dataset, first_row: u64, numbers: usize) -> hdf5::Result<Self> {
         let mut count: Vec<u64> = dataset.shape().iter().map(|&n| n as u64).collect();
         let mut start = vec![0; count.len()];
@@ -143,7 +141,7 @@ impl Selection {
             file: dataset.space()?,
         };
         sync(|| {
-            // SAFETY: the handles are alive, the slices as long as the spaces have dimensions.
+            // SAFETY: the handles are valid, and the slices have one entry per dimension.
             unsafe {
                 if count[0] == 0 {
                     hdf5::h5check(h5s::H5Sselect_none(selection.memory.id()))?;

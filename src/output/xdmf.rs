@@ -1,4 +1,4 @@
-//! The side-car that lets ParaView before 5.12 open a result file: XDMF 3, pointing into it.
+//! The XDMF 3 side-car, with which ParaView before 5.12 opens a result file.
 
 use super::field::FieldDescription;
 use super::read::{Number, StoredField};
@@ -8,16 +8,16 @@ use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A side-car is written again when so many times the time that it took has gone by.
-const LEISURE: u32 = 100;
+/// Minimum interval between writes, as a multiple of the last write's duration.
+const MIN_INTERVAL: u32 = 100;
 
-/// The components of a symmetric tensor in the order they are stored.
+/// Component names of a symmetric tensor in storage order.
 const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
-/// Renders the side-car of a result file.
+/// Render the side-car of a result file.
 ///
 /// `file_name` is the result's name without its folder, `points` the number of points at each of the
-/// steps' `times` (s); where they are `changing`, each step has its own.
+/// `times` (s). If `changing`, each step has its own points.
 pub fn render(
     file_name: &str,
     (points, changing): (&[usize], bool),
@@ -30,24 +30,25 @@ pub fn render(
     text
 }
 
-/// The side-car of a result that grows: written with the first step, and again as the result grows, so
-/// that it is there however the process ends. For one process.
+/// The side-car of a growing result. It is written with the first step and updated as the result grows,
+/// so it exists even if the process is killed. For one process.
 pub struct SideCar {
     path: PathBuf,
     file_name: String,
-    /// Whether each step has its own points.
+    /// Each step has its own points.
     changing: bool,
     fields: Vec<StoredField>,
-    /// Of the steps so far, s, and how many points they have.
+    /// Times of the steps, s.
     times: Vec<f64>,
+    /// Numbers of points of the steps.
     points: Vec<usize>,
-    /// When it was written last, and how long that took.
+    /// Time and duration of the last write.
     written: Option<(Instant, Duration)>,
 }
 
 impl SideCar {
-    /// The side-car of a result, `name.xdmf` for `name.vtkhdf`, that has steps so far at these times (s) with
-    /// so many points.
+    /// The side-car `name.xdmf` of a result `name.vtkhdf`; `past` are times (s) and numbers of points of
+    /// existing steps.
     pub fn new(result: &Path, contents: &Contents, past: &[(f64, usize)]) -> Self {
         let stored = |field: &FieldDescription, number, dynamic| StoredField {
             name: field.name.to_owned(),
@@ -82,24 +83,24 @@ impl SideCar {
         }
     }
 
-    /// Takes note of one step more, at a time (s) with so many points, and writes the side-car if that is cheap.
+    /// Add a step at a time (s) with a number of points, and write the side-car if [`MIN_INTERVAL`] allows.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// If it cannot be written.
     pub fn add(&mut self, time: f64, points: u64) -> Result<()> {
         self.times.push(time);
         self.points.push(points as usize);
-        let is_cheap = |(when, cost): &(Instant, Duration)| when.elapsed() >= *cost * LEISURE;
+        let is_cheap = |(when, cost): &(Instant, Duration)| when.elapsed() >= *cost * MIN_INTERVAL;
         if self.written.as_ref().is_none_or(is_cheap) {
             self.write()?;
         }
         Ok(())
     }
 
-    /// Writes the side-car for the last time.
+    /// Write the final side-car.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// If it cannot be written.
     pub fn finish(mut self) -> Result<()> {
         self.write()
     }
@@ -114,13 +115,13 @@ impl SideCar {
     }
 }
 
-/// Writes a text file in one piece: first beside its place, then moved there.
+/// Write a text file atomically: to a temporary file that is then renamed.
 fn write(path: &Path, text: &str) -> Result<()> {
     let temporary = path.with_extension("xdmf.part");
     std::fs::write(&temporary, text)
         .and_then(|()| std::fs::rename(&temporary, path))
         .map_err(|error| {
-            // What is left of it is of no use; that it cannot be removed either changes nothing.
+            // Best effort: a leftover file only takes space.
             let _ = std::fs::remove_file(&temporary);
             Error::run(format!(
                 "{}: cannot write the file: {error}",
@@ -157,7 +158,7 @@ fn write_document(
         let kind = r#"TopologyType="Polyvertex" NodesPerElement="1""#;
         writeln!(text, r#"<Topology {kind} NumberOfElements="{points}"/>"#)?;
         writeln!(text, r#"<Geometry GeometryType="XYZ">"#)?;
-        let place = format!("{file}:/VTKHDF/Points");
+        let dataset = format!("{file}:/VTKHDF/Points");
         if changing {
             writeln!(
                 text,
@@ -168,10 +169,10 @@ fn write_document(
                 text,
                 r#"<DataItem Dimensions="3 2" Format="XML">{slab}</DataItem>"#
             )?;
-            write_item(text, Number::F64, &format!("{all} 3"), &place)?;
+            write_item(text, Number::F64, &format!("{all} 3"), &dataset)?;
             writeln!(text, "</DataItem>")?;
         } else {
-            write_item(text, Number::F64, &format!("{points} 3"), &place)?;
+            write_item(text, Number::F64, &format!("{points} 3"), &dataset)?;
         }
         writeln!(text, "</Geometry>")?;
         for field in fields {
@@ -183,7 +184,7 @@ fn write_document(
     writeln!(text, "</Grid>\n</Domain>\n</Xdmf>")
 }
 
-/// Where the rows of a step lie in what all steps have.
+/// The rows of a step: first row, number of points, and total number of rows.
 #[derive(Clone, Copy)]
 struct StepRows {
     first: usize,
@@ -191,8 +192,8 @@ struct StepRows {
     all: usize,
 }
 
-/// Writes one field of one step. Symmetric tensors become six scalars: XDMF orders their components
-/// in its own way, and readers differ.
+/// Write one field of one step. A symmetric tensor becomes six scalars, because readers disagree on
+/// XDMF's component order.
 fn write_attribute(
     text: &mut String,
     file: &str,
@@ -200,7 +201,7 @@ fn write_attribute(
     StepRows { first, points, all }: StepRows,
 ) -> fmt::Result {
     let (name, components) = (escaped(&field.name), field.components);
-    let place = format!("{file}:/VTKHDF/PointData/{name}");
+    let dataset = format!("{file}:/VTKHDF/PointData/{name}");
     let (first, rows) = if field.dynamic {
         (first, all)
     } else {
@@ -233,7 +234,7 @@ fn write_attribute(
             text,
             r#"<DataItem Dimensions="3 {axes}" Format="XML">{slab}</DataItem>"#
         )?;
-        write_item(text, field.number, &shape(rows, components), &place)?;
+        write_item(text, field.number, &shape(rows, components), &dataset)?;
         writeln!(text, "</DataItem>\n</Attribute>")?;
     }
     Ok(())
@@ -246,8 +247,8 @@ fn shape(rows: usize, columns: usize) -> String {
     }
 }
 
-fn write_item(text: &mut String, number: Number, dimensions: &str, place: &str) -> fmt::Result {
-    // XDMF has no 8-byte unsigned numbers.
+fn write_item(text: &mut String, number: Number, dimensions: &str, dataset: &str) -> fmt::Result {
+    // XDMF has no 8-byte unsigned integers.
     let (kind, precision) = match number {
         Number::F64 => ("Float", 8),
         Number::F32 => ("Float", 4),
@@ -258,7 +259,7 @@ fn write_item(text: &mut String, number: Number, dimensions: &str, place: &str) 
     let kind = format!(r#"NumberType="{kind}" Precision="{precision}""#);
     writeln!(
         text,
-        r#"<DataItem {kind} Dimensions="{dimensions}" Format="HDF">{place}</DataItem>"#
+        r#"<DataItem {kind} Dimensions="{dimensions}" Format="HDF">{dataset}</DataItem>"#
     )
 }
 
@@ -301,7 +302,7 @@ mod tests {
         );
         assert!(text.contains(r#"NumberType="Int" Precision="8" Dimensions="7" Format="HDF""#));
         assert!(text.contains(r#"<Time Value="1e-6"/>"#));
-        // That of the velocity: the points are there once.
+        // Only the velocity matches: static points are not selected per step.
         assert_eq!(text.matches(">7 0 1 1 7 3</DataItem>").count(), 1);
         let text = render("a.h5", (&[7, 9], true), &fields[1..2], &[0.0, 1e-6]);
         assert_eq!(text.matches(">7 0 1 1 9 3</DataItem>").count(), 2);

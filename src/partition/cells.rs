@@ -1,51 +1,53 @@
-//! The cells that are dealt out to ranks: boxes of an edge of one horizon or some.
+//! The cells that are partitioned between ranks, with edges of one or a few horizons.
 
 use crate::comm::{self, Communicator};
 use crate::points::Point;
 use crate::points::bins::boxes;
 
-/// Up to so many cells need no thought.
-const FEW: usize = 100_000;
+/// Number of cells that any rank count may use.
+const ALWAYS_ALLOWED: usize = 100_000;
 
-/// More cells for each rank make its border no smoother.
-const ENOUGH_A_RANK: usize = 2000;
+/// Cells per rank beyond which borders get no smoother.
+const SUFFICIENT_PER_RANK: usize = 2000;
 
-/// Every rank knows the owner of every cell, and one rank deals them out alone: from this many cells
-/// on, ranks get fewer.
-const MANY: usize = 4_000_000;
+/// Number of cells above which ranks get fewer: one rank partitions all cells, and every rank stores
+/// all owners.
+const LARGE_TOTAL: usize = 4_000_000;
 
-/// The fewest cells of a rank that still can be dealt out evenly.
-const FEWEST_A_RANK: usize = 64;
+/// Cells per rank needed for an even partition.
+const MIN_PER_RANK: usize = 64;
 
-/// The largest number of cells for so many ranks.
-pub fn most_cells(ranks: usize) -> usize {
-    FEW.max(ENOUGH_A_RANK * ranks)
-        .min(MANY.max(FEWEST_A_RANK * ranks))
+/// The largest number of cells for a number of ranks.
+pub fn max_cells(ranks: usize) -> usize {
+    ALWAYS_ALLOWED
+        .max(SUFFICIENT_PER_RANK * ranks)
+        .min(LARGE_TOTAL.max(MIN_PER_RANK * ranks))
 }
 
-/// A grid of cells over all points, the same on all ranks. Points within the cut-off of one another
-/// lie in the same cell or in adjacent ones.
+/// A grid of cells over all points, equal on all ranks. Points closer than the cutoff lie in the same
+/// cell or in adjacent cells.
 #[derive(Debug, Clone)]
 pub struct Cells {
     lower: [f64; 3],
     upper: [f64; 3],
-    /// Edge of a box, about the cut-off, m.
+    /// Edge of a box, about the cutoff, m.
     edge: f64,
-    /// Number of boxes along the edge of a cell.
+    /// Boxes per cell edge.
     boxes: usize,
+    /// Cells per direction.
     counts: [usize; 3],
 }
 
-/// What cells are before they are dealt out anew.
-pub struct Present {
-    /// Time that their points take, ns.
+/// The state of the cells before rebalancing.
+pub struct CellLoads {
+    /// Measured time of the points of each cell, ns.
     pub costs: Vec<u64>,
-    /// A rank that has points of each, −1 where there are none.
+    /// A rank that owns points of each cell, −1 without points.
     pub ranks: Vec<f64>,
 }
 
 impl Cells {
-    /// The grid for all points of all ranks and a cut-off in m, with so many cells at `most`.
+    /// Build the grid for the points of all ranks and a cutoff (m), with at most `most` cells. Collective.
     pub fn new(
         comm: &dyn Communicator,
         points: &[Point],
@@ -76,7 +78,7 @@ impl Cells {
         }
     }
 
-    /// How far the points are apart at most, by direction, m.
+    /// Extent of the points per direction, m.
     pub fn extent(&self) -> [f64; 3] {
         std::array::from_fn(|k| (self.upper[k] - self.lower[k]).max(0.0))
     }
@@ -86,8 +88,8 @@ impl Cells {
         self.counts.iter().product()
     }
 
-    /// The box of a position (m) by direction, within the cells.
-    fn place(&self, position: [f64; 3]) -> [usize; 3] {
+    /// The box of a position (m), clamped to the grid.
+    fn box_of(&self, position: [f64; 3]) -> [usize; 3] {
         std::array::from_fn(|k| {
             let offset = ((position[k] - self.lower[k]) / self.edge) as usize;
             offset.min(self.counts[k] * self.boxes - 1)
@@ -96,41 +98,39 @@ impl Cells {
 
     /// The cell that holds a position (m).
     pub fn of(&self, position: [f64; 3]) -> usize {
-        let [x, y, z] = self.place(position).map(|at| at / self.boxes);
+        let [x, y, z] = self.box_of(position).map(|at| at / self.boxes);
         x + self.counts[0] * (y + self.counts[1] * z)
     }
 
-    /// A number that puts positions (m) in the order of cells, and those of a cell in that of its
-    /// boxes, so that what is near lies near in memory.
+    /// Sort key of a position (m) by cell, then by box, so points close in space are close in memory.
     pub fn order(&self, position: [f64; 3]) -> u64 {
-        let [x, y, z] = self.place(position).map(|at| at % self.boxes);
+        let [x, y, z] = self.box_of(position).map(|at| at % self.boxes);
         let within = x + self.boxes * (y + self.boxes * z);
         (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
-    /// The adjacent cells, across corners and edges too, with whether each is displaced in each
-    /// direction.
+    /// The adjacent cells across faces, edges and corners, and the directions in which each is displaced.
     pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
-        let here = [cell % nx, cell / nx % ny, cell / nx / ny];
+        let position = [cell % nx, cell / nx % ny, cell / nx / ny];
         let counts = [nx, ny, nz];
         (0..27).filter_map(move |code| {
             let offset = [code % 3, code / 3 % 3, code / 9];
             let displaced = offset.map(|steps| steps != 1);
-            let mut there = [0; 3];
+            let mut other = [0; 3];
             for k in 0..3 {
                 // Offsets 0, 1, 2 mean −1, 0, +1.
-                there[k] = (here[k] + offset[k]).checked_sub(1)?;
-                if there[k] >= counts[k] {
+                other[k] = (position[k] + offset[k]).checked_sub(1)?;
+                if other[k] >= counts[k] {
                     return None;
                 }
             }
-            let index = there[0] + nx * (there[1] + ny * there[2]);
+            let index = other[0] + nx * (other[1] + ny * other[2]);
             displaced.contains(&true).then_some((index, displaced))
         })
     }
 
-    /// Number of points in each cell, over all ranks.
+    /// Number of points of all ranks in each cell. Collective.
     pub fn occupation(&self, comm: &dyn Communicator, points: &[Point]) -> Vec<u64> {
         let mut occupation = vec![0; self.count()];
         for point in points {
@@ -140,9 +140,9 @@ impl Cells {
         occupation
     }
 
-    /// Costs of the cells and where they are now, from this rank's points and what each of them costs.
+    /// Costs and current owners of the cells; `each` is the cost of each point of this rank, ns.
     /// Collective.
-    pub fn present(&self, comm: &dyn Communicator, points: &[Point], each: u64) -> Present {
+    pub fn loads(&self, comm: &dyn Communicator, points: &[Point], each: u64) -> CellLoads {
         let mut costs = vec![0; self.count()];
         let mut ranks = vec![-1.0; self.count()];
         for point in points {
@@ -152,7 +152,7 @@ impl Cells {
         }
         comm.sum(&mut costs);
         comm.max(&mut ranks);
-        Present { costs, ranks }
+        CellLoads { costs, ranks }
     }
 }
 
@@ -161,10 +161,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_for_few_and_for_many_ranks() {
-        assert_eq!(most_cells(1), 100_000);
-        assert_eq!(most_cells(1000), 2_000_000);
-        assert_eq!(most_cells(20_000), 4_000_000);
-        assert_eq!(most_cells(100_000), 6_400_000);
+    fn the_largest_number_of_cells() {
+        assert_eq!(max_cells(1), 100_000);
+        assert_eq!(max_cells(1000), 2_000_000);
+        assert_eq!(max_cells(20_000), 4_000_000);
+        assert_eq!(max_cells(100_000), 6_400_000);
     }
 }

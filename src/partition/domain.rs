@@ -1,11 +1,13 @@
-//! The points of one rank: owned ones first, then the ghosts, and the halo plan between ranks.
+//! The local points of a rank, owned points before ghosts, and the halo plan.
 
 use crate::comm::Halo;
 use crate::points::Point;
 
-/// The points that a rank works with. Local index order: interior points (no bond leads to a ghost),
-/// border points, then ghosts grouped by owner and sorted by id. Both kinds of owned points are
-/// sorted by cell, by box within it, then by id.
+/// The local points of a rank, in the order of local indices:
+///
+/// 1. interior points, which have no bonds to ghosts, sorted by cell, box and id;
+/// 2. border points, sorted likewise;
+/// 3. ghosts, grouped by owner and sorted by id.
 #[derive(Debug, Default)]
 pub struct Domain {
     /// All local points.
@@ -16,27 +18,27 @@ pub struct Domain {
     pub owned: usize,
     /// Number of points over all ranks.
     pub total: u64,
-    /// How far the points of all ranks are apart at most, by direction, m.
+    /// Extent of the points of all ranks per direction, m.
     pub extent: [f64; 3],
     /// The halo plan.
     pub halo: Halo,
 }
 
 impl Domain {
-    /// Puts the owned points into another order, of which the first `interior` are interior points;
-    /// `order` has the present local index of each.
+    /// Permute the owned points: `order[new]` is the old local index. The first `interior` are interior
+    /// points.
     pub fn reorder(&mut self, order: &[u32], interior: usize) {
-        let mut place = vec![0; order.len()];
+        let mut new_index = vec![0; order.len()];
         for (new, old) in (0..).zip(order) {
-            place[*old as usize] = new;
+            new_index[*old as usize] = new;
         }
-        self.halo.renumber(&place);
-        // In place: a copy of all points would be the most that is ever alive.
-        for k in 0..place.len() {
-            while place[k] as usize != k {
-                let other = place[k] as usize;
+        self.halo.renumber(&new_index);
+        // In new_index: a copy of all points would raise the peak memory.
+        for k in 0..new_index.len() {
+            while new_index[k] as usize != k {
+                let other = new_index[k] as usize;
                 self.points.swap(k, other);
-                place.swap(k, other);
+                new_index.swap(k, other);
             }
         }
         self.interior = interior;

@@ -1,7 +1,7 @@
-//! Which points of other ranks a rank needs, and the order of its own.
+//! The ghosts and the halo plan of a rank.
 //!
-//! Ranks first swap the points of cells that touch one another's, then each asks for those that lie
-//! within the cut-off of one of its own.
+//! Ranks exchange the points of cells adjacent to each other's cells. Each then requests the points
+//! within the cutoff of one of its own.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -13,13 +13,13 @@ use crate::points::bins::Bins;
 
 use super::cells::Cells;
 use super::domain::Domain;
-use super::graph::NOBODY;
+use super::graph::NO_OWNER;
 use super::received;
 
-/// The widest message: three components a point.
+/// Most components per point in a halo exchange.
 const HALO_WIDTH: usize = 3;
 
-/// Finds the ghosts, orders the owned points and makes the halo plan.
+/// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
 /// `owned` are this rank's points after migration, `owner` the rank of each cell, `cutoff` (m) the
 /// longest bond.
@@ -39,8 +39,8 @@ pub fn domain(
     let bins = Bins::new(&positions, cutoff);
     let mut border = vec![false; owned.len()];
     let mut ghosts = Vec::new();
-    // The ids of the ghosts of each rank, and where they will lie.
-    let mut wanted = Vec::new();
+    // For each rank: the ids of its points that are ghosts, and their local indices.
+    let mut requests = Vec::new();
     for bytes in offered {
         let mut candidates: Vec<Point> = received(&bytes).collect();
         candidates.retain(|candidate| {
@@ -54,18 +54,18 @@ pub fn domain(
         candidates.sort_unstable_by_key(|ghost| ghost.id);
         let first = owned.len() + ghosts.len();
         let ids: Vec<u64> = candidates.iter().map(|ghost| ghost.id).collect();
-        wanted.push((ids, first..first + candidates.len()));
+        requests.push((ids, first..first + candidates.len()));
         ghosts.extend(candidates);
     }
 
-    // Interior points, then those on the border, each part in the order that it had.
-    let mut on_border = border.iter();
-    let last: Vec<Point> = owned
-        .extract_if(.., |_| *on_border.next().expect("one for each point"))
+    // A stable partition into interior and border points.
+    let mut is_border = border.iter();
+    let border_points: Vec<Point> = owned
+        .extract_if(.., |_| *is_border.next().expect("one for each point"))
         .collect();
     let interior = owned.len();
-    let halo = halo(comm, wanted, &last, interior);
-    owned.extend(last);
+    let halo = halo(comm, requests, &border_points, interior);
+    owned.extend(border_points);
     let count = owned.len();
     owned.extend(ghosts);
     Domain {
@@ -78,8 +78,8 @@ pub fn domain(
     }
 }
 
-/// For each rank the points of the cells that touch one of its own, and the indices of all points
-/// that are offered to any: no others can have ghosts for neighbours. Points lie cell by cell.
+/// For each rank, the points in cells adjacent to its cells; and the indices of all points offered to
+/// some rank, the only ones that can have ghosts as neighbours. `owned` is sorted by cell.
 fn offers(
     comm: &dyn Communicator,
     cells: &Cells,
@@ -92,17 +92,17 @@ fn offers(
     let cell = |point: &Point| cells.of(point.position);
     for points in owned.chunk_by(|a, b| cell(a) == cell(b)) {
         let adjacent = cells.adjacent(cell(&points[0]));
-        let touching: BTreeSet<usize> = adjacent
+        let adjacent_ranks: BTreeSet<usize> = adjacent
             .map(|(other, _)| owner[other])
-            .filter(|other| *other != NOBODY)
+            .filter(|other| *other != NO_OWNER)
             .map(|other| other as usize)
             .filter(|other| *other != comm.rank())
             .collect();
-        for other in &touching {
+        for other in &adjacent_ranks {
             offers[*other].extend_from_slice(bytemuck::cast_slice(points));
         }
         let end = first + points.len() as u32;
-        if !touching.is_empty() {
+        if !adjacent_ranks.is_empty() {
             edge.extend(first..end);
         }
         first = end;
@@ -110,11 +110,13 @@ fn offers(
     (offers, edge)
 }
 
-/// The halo plan: what this rank wants of each rank, by id, and where that lies; `border` are the
-/// points that others can want, the first of which has the local index `interior`. Collective.
+/// Build the halo plan. Collective.
+///
+/// `requests` are the ids and local indices of the ghosts from each rank. `border` are the border
+/// points; the first has the local index `interior`.
 fn halo(
     comm: &dyn Communicator,
-    wanted: Vec<(Vec<u64>, Range<usize>)>,
+    requests: Vec<(Vec<u64>, Range<usize>)>,
     border: &[Point],
     interior: usize,
 ) -> Halo {
@@ -124,11 +126,11 @@ fn halo(
         .map(|(point, index)| (point.id, index))
         .collect();
     by_id.sort_unstable();
-    let requests = wanted
+    let outgoing = requests
         .iter()
         .map(|(ids, _)| bytemuck::cast_slice(ids).to_vec());
-    let requested = comm.all_to_all(requests.collect());
-    let neighbours = requested.iter().zip(wanted).enumerate();
+    let incoming = comm.all_to_all(outgoing.collect());
+    let neighbours = incoming.iter().zip(requests).enumerate();
     let neighbours = neighbours.map(|(rank, (bytes, (_, receive)))| {
         let index = |id: u64| {
             let found = by_id.binary_search_by_key(&id, |(id, _)| *id);
@@ -141,6 +143,7 @@ fn halo(
             receive,
         }
     });
-    let talks = |neighbour: &Neighbour| !neighbour.send.is_empty() || !neighbour.receive.is_empty();
-    Halo::new(neighbours.filter(talks).collect(), HALO_WIDTH)
+    let is_used =
+        |neighbour: &Neighbour| !neighbour.send.is_empty() || !neighbour.receive.is_empty();
+    Halo::new(neighbours.filter(is_used).collect(), HALO_WIDTH)
 }

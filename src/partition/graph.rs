@@ -1,41 +1,42 @@
-//! Dealing out cells to ranks with METIS. The only file that names `metis`.
+//! Graph partitioning of the cells with METIS. No other file uses `metis`.
 
 use std::collections::HashMap;
 
 use crate::error::{Error, Result};
 
-use super::cells::{Cells, Present};
+use super::cells::{CellLoads, Cells};
 
-/// METIS adds up weights in 32 bits.
+/// Largest total weight; METIS sums weights in 32 bits.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
-/// What cutting bonds along x counts more than cutting others: points that are adjacent along x are
-/// worked on together.
+/// Extra edge weight of bonds along x, because lane groups lie along x.
 const ALONG_X: f64 = 1.5;
 
-/// The rank of cells without points.
-pub const NOBODY: u32 = u32::MAX;
+/// Owner of cells without points.
+pub const NO_OWNER: u32 = u32::MAX;
 
-/// Below this many cells a part recursive bisection is used: the k-way method leaves parts empty.
+/// Below this many cells per part, recursive bisection is used: the k-way method leaves parts empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// The rank of each cell, [`NOBODY`] where there is no point, given the number of points in each. A cell's
-/// weight is the bonds of its points, an edge's weight the bonds across. Where it is known what the cells
-/// cost, their weights are corrected by that, and parts are numbered so that most points stay on their
-/// ranks.
+/// Partition the cells: the rank of each cell, or [`NO_OWNER`] without points.
+///
+/// - `occupation` is the number of points in each cell.
+/// - The weight of a cell is the number of its points' bonds; the weight of an edge, the bonds across.
+/// - Given measured loads, cell weights are scaled by the cost per point, and parts are numbered so
+///   that few points migrate.
 ///
 /// # Errors
-/// When METIS fails.
+/// If METIS fails.
 pub fn partition(
     cells: &Cells,
     occupation: &[u64],
-    present: Option<&Present>,
+    loads: Option<&CellLoads>,
     ranks: usize,
 ) -> Result<Vec<u32>> {
     let occupied: Vec<usize> = (0..cells.count())
         .filter(|cell| occupation[*cell] > 0)
         .collect();
-    let mut owner = vec![NOBODY; cells.count()];
+    let mut owner = vec![NO_OWNER; cells.count()];
     if occupied.len() <= ranks {
         for (rank, cell) in occupied.iter().enumerate() {
             owner[*cell] = rank as u32;
@@ -51,21 +52,20 @@ pub fn partition(
     let mut bonds_across = Vec::new();
     let mut bonds = Vec::with_capacity(occupied.len());
     for cell in &occupied {
-        let here = occupation[*cell] as f64;
-        let mut sum = here * here;
+        let count = occupation[*cell] as f64;
+        let mut sum = count * count;
         for (other, displaced) in cells.adjacent(*cell) {
             if occupation[other] == 0 {
                 continue;
             }
-            // A random pair of points in adjacent cells is bonded the more rarely, the more
-            // directions lie between them.
+            // The fraction of bonded pairs falls with the number of directions of displacement.
             let directions = displaced.iter().filter(|displaced| **displaced).count();
-            let across = here * occupation[other] as f64 * 0.4_f64.powi(directions as i32);
+            let across = count * occupation[other] as f64 * 0.4_f64.powi(directions as i32);
             sum += across;
             neighbours.push(vertex[other] as metis::Idx);
             bonds_across.push(across * if displaced[0] { ALONG_X } else { 1.0 });
         }
-        let cost = present.map_or(1.0, |known| known.costs[*cell] as f64 / here);
+        let cost = loads.map_or(1.0, |loads| loads.costs[*cell] as f64 / count);
         bonds.push(sum * cost);
         starts.push(neighbours.len() as metis::Idx);
     }
@@ -85,9 +85,9 @@ pub fn partition(
     };
     cut.map_err(|error| failed(&error))?;
     fill_empty_parts(&mut part, ranks);
-    if let Some(present) = present {
-        let now = |k: usize| (present.ranks[occupied[k]] as usize, occupation[occupied[k]]);
-        renumber(&mut part, ranks, now);
+    if let Some(loads) = loads {
+        let current = |k: usize| (loads.ranks[occupied[k]] as usize, occupation[occupied[k]]);
+        renumber(&mut part, ranks, current);
     }
     for (cell, rank) in occupied.iter().zip(part) {
         owner[*cell] = rank as u32;
@@ -95,11 +95,11 @@ pub fn partition(
     Ok(owner)
 }
 
-/// LaneTuple parts so that much stays where it is: `now` has the rank and the number of points of each cell.
-fn renumber(part: &mut [metis::Idx], ranks: usize, now: impl Fn(usize) -> (usize, u64)) {
+/// Renumber parts so that few points migrate: `current(cell)` is the rank and number of points.
+fn renumber(part: &mut [metis::Idx], ranks: usize, current: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {
-        let (rank, points) = now(k);
+        let (rank, points) = current(k);
         *shared.entry((*part as usize, rank)).or_default() += points;
     }
     let mut largest: Vec<(u64, usize, usize)> = shared
@@ -128,7 +128,7 @@ fn renumber(part: &mut [metis::Idx], ranks: usize, now: impl Fn(usize) -> (usize
     }
 }
 
-/// Weights as positive integers whose sum METIS can hold.
+/// Convert weights to positive integers whose sum is at most [`LARGEST_TOTAL`].
 fn to_integers(weights: &[f64]) -> Vec<metis::Idx> {
     let total: f64 = weights.iter().sum();
     let room = LARGEST_TOTAL - weights.len() as f64;
@@ -139,7 +139,7 @@ fn to_integers(weights: &[f64]) -> Vec<metis::Idx> {
         .collect()
 }
 
-/// Gives each empty part a cell of the part that has most.
+/// Give each empty part a cell of the largest part.
 fn fill_empty_parts(part: &mut [metis::Idx], ranks: usize) {
     let mut sizes = vec![0_usize; ranks];
     for rank in part.iter() {
@@ -166,7 +166,7 @@ mod tests {
     use crate::comm::threads;
     use crate::points::Point;
 
-    /// 100 × 40 points and their cells, of one rank.
+    /// 100 × 40 points on one rank, and their cells.
     struct Plate {
         points: Vec<Point>,
         cells: Cells,
@@ -187,8 +187,8 @@ mod tests {
             }
         }
 
-        fn deal(&self, present: Option<&Present>, ranks: usize) -> Vec<u32> {
-            partition(&self.cells, &self.occupation, present, ranks).unwrap()
+        fn partition(&self, loads: Option<&CellLoads>, ranks: usize) -> Vec<u32> {
+            partition(&self.cells, &self.occupation, loads, ranks).unwrap()
         }
 
         /// Number of points by rank.
@@ -205,7 +205,7 @@ mod tests {
     fn parts_are_balanced_and_none_is_empty() {
         let plate = Plate::new();
         for ranks in [2, 3, 4, 7, 64] {
-            let sizes = plate.sizes(&plate.deal(None, ranks), ranks);
+            let sizes = plate.sizes(&plate.partition(None, ranks), ranks);
             let largest = *sizes.iter().max().unwrap() as usize;
             assert!(sizes.iter().all(|size| *size > 0), "{ranks}: {sizes:?}");
             assert!(largest <= 3 * 4000 / ranks / 2 + 20, "{ranks}: {sizes:?}");
@@ -213,23 +213,23 @@ mod tests {
     }
 
     #[test]
-    fn cells_that_cost_more_are_fewer_and_most_stay() {
+    fn a_rank_with_costly_cells_gets_fewer_and_few_cells_move() {
         let plate = Plate::new();
-        let mut present = plate.cells.present(&threads::alone(), &plate.points, 10);
-        let first = plate.deal(None, 2);
-        for (rank, owner) in present.ranks.iter_mut().zip(&first) {
-            // Those of the other part.
+        let mut loads = plate.cells.loads(&threads::alone(), &plate.points, 10);
+        let first = plate.partition(None, 2);
+        for (rank, owner) in loads.ranks.iter_mut().zip(&first) {
+            // Swap the owners.
             *rank = f64::from(1 - *owner);
         }
-        let same = plate.deal(Some(&present), 2);
+        let same = plate.partition(Some(&loads), 2);
         let pairs = first.iter().zip(&same);
         let moved = pairs.filter(|(a, b)| **a != 1 - **b).count();
         let all = plate.cells.count();
         assert!(moved < all / 5, "{moved} of {all} cells");
-        for (cost, rank) in present.costs.iter_mut().zip(&present.ranks) {
+        for (cost, rank) in loads.costs.iter_mut().zip(&loads.ranks) {
             *cost *= if *rank == 0.0 { 3 } else { 1 };
         }
-        let sizes = plate.sizes(&plate.deal(Some(&present), 2), 2);
+        let sizes = plate.sizes(&plate.partition(Some(&loads), 2), 2);
         let ratio = f64::from(sizes[1]) / f64::from(sizes[0]);
         assert!((1.5..3.5).contains(&ratio), "{sizes:?}");
     }

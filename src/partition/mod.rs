@@ -1,4 +1,4 @@
-//! Dealing out points to ranks: cells, METIS, migration, ghosts.
+//! Domain decomposition: cells, METIS, migration, ghosts.
 
 mod cells;
 mod domain;
@@ -11,14 +11,14 @@ use crate::comm::{Communicator, agree};
 use crate::error::Result;
 use crate::points::Point;
 
-use cells::{Cells, Present, most_cells};
+use cells::{CellLoads, Cells, max_cells};
 
-/// Moves the pieces that the ranks made to the ranks that will own them, and finds the ghosts.
+/// Partition the points, migrate them to their owners and find the ghosts. Collective.
 ///
-/// `total` counts the points of all ranks, `cutoff` (m) is the length of the longest bond.
+/// `total` is the number of points of all ranks, `cutoff` (m) the longest bond.
 ///
 /// # Errors
-/// When METIS fails; the same on all ranks.
+/// If METIS fails; equal on all ranks.
 pub fn distribute(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
@@ -28,8 +28,8 @@ pub fn distribute(
     distribute_by_cost(comm, pieces, total, cutoff, None)
 }
 
-/// As [`distribute`]. Where the ranks know what their points cost, cells are weighted by that, and as many
-/// points as possible stay where they are.
+/// As [`distribute`], with the measured cost of this rank's points: cells are weighted by it, and few
+/// points migrate.
 ///
 /// # Errors
 /// As [`distribute`].
@@ -40,19 +40,19 @@ pub fn distribute_by_cost(
     cutoff: f64,
     cost: Option<Cost>,
 ) -> Result<Domain> {
-    let most = most_cells(comm.size());
+    let most = max_cells(comm.size());
     distribute_by_cells(comm, pieces, total, cutoff, most, cost)
 }
 
-/// What the points of a rank cost.
+/// The cost of a rank's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cost {
-    /// Of each of them, ns.
+    /// Time per point, ns.
     each: u64,
 }
 
 impl Cost {
-    /// So many points that took so much time, ns.
+    /// The cost of points that took `time`, ns.
     pub fn of(time: u64, points: usize) -> Self {
         Self {
             each: (time / points.max(1) as u64).max(1),
@@ -60,7 +60,7 @@ impl Cost {
     }
 }
 
-/// As [`distribute_by_cost`], with so many cells at most.
+/// As [`distribute_by_cost`], with at most `most` cells.
 fn distribute_by_cells(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
@@ -71,27 +71,27 @@ fn distribute_by_cells(
 ) -> Result<Domain> {
     let cells = Cells::new(comm, &pieces, total, cutoff, most);
     let occupation = cells.occupation(comm, &pieces);
-    let known = cost.filter(|_| comm.size() > 1);
-    let known = known.map(|cost| cells.present(comm, &pieces, cost.each));
-    let owner = owners(comm, &cells, &occupation, known.as_ref())?;
-    drop(known);
+    let cost = cost.filter(|_| comm.size() > 1);
+    let loads = cost.map(|cost| cells.loads(comm, &pieces, cost.each));
+    let owner = owners(comm, &cells, &occupation, loads.as_ref())?;
+    drop(loads);
     drop(occupation);
     let owned = migrate(comm, &cells, &owner, pieces);
     Ok(ghosts::domain(comm, &cells, &owner, owned, total, cutoff))
 }
 
-/// The rank of each cell, from rank 0 to all: 4 bytes a cell.
+/// The owner of each cell, computed by rank 0 and broadcast.
 fn owners(
     comm: &dyn Communicator,
     cells: &Cells,
     occupation: &[u64],
-    present: Option<&Present>,
+    loads: Option<&CellLoads>,
 ) -> Result<Vec<u32>> {
     if comm.size() == 1 {
         return Ok(vec![0; cells.count()]);
     }
     let found = match comm.rank() {
-        0 => graph::partition(cells, occupation, present, comm.size()),
+        0 => graph::partition(cells, occupation, loads, comm.size()),
         _ => Ok(Vec::new()),
     };
     let mut bytes = bytemuck::cast_slice(&agree(comm, found)?).to_vec();
@@ -124,7 +124,7 @@ fn migrate(
     owned
 }
 
-/// The points in a message.
+/// Decode the points of a message.
 fn received(bytes: &[u8]) -> impl Iterator<Item = Point> {
     let records = bytes.chunks_exact(size_of::<Point>());
     records.map(bytemuck::pod_read_unaligned)
@@ -147,18 +147,18 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
-        fn every_point_has_one_owner_and_sees_all_its_neighbours(
+        fn every_point_has_one_owner_and_all_its_neighbours(
             seed in prop::collection::vec(prop::array::uniform3(0.0..4.0_f64), 1..120),
             ranks in 1_usize..5,
             most in 1_usize..100,
         ) {
             let all = cloud(&seed);
             let domains = threads::run(ranks, |comm| {
-                let share = |rank: usize| all.len() * rank / ranks;
-                let piece = all[share(comm.rank())..share(comm.rank() + 1)].to_vec();
+                let start = |rank: usize| all.len() * rank / ranks;
+                let piece = all[start(comm.rank())..start(comm.rank() + 1)].to_vec();
                 let total = all.len() as u64;
                 let mut domain = distribute_by_cells(comm, piece, total, 1.0, most, None).unwrap();
-                // The halo must bring each ghost its own id.
+                // The exchange must set each ghost's entry to its id.
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);
                 domain.halo.pack([&ids[..]].into_iter());
@@ -173,12 +173,12 @@ mod tests {
                     prop_assert_eq!(point.id as f64, *id);
                     prop_assert_eq!(*point, all[point.id as usize]);
                 }
-                for (index, here) in domain.points[..domain.owned].iter().enumerate() {
-                    for there in &all {
-                        if distance_squared(here.position, there.position) <= 1.0 {
-                            let place = domain.points.iter().position(|p| p.id == there.id);
-                            prop_assert!(place.is_some());
-                            prop_assert!(index >= domain.interior || place < Some(domain.owned));
+                for (index, i) in domain.points[..domain.owned].iter().enumerate() {
+                    for j in &all {
+                        if distance_squared(i.position, j.position) <= 1.0 {
+                            let local = domain.points.iter().position(|p| p.id == j.id);
+                            prop_assert!(local.is_some());
+                            prop_assert!(index >= domain.interior || local < Some(domain.owned));
                         }
                     }
                 }

@@ -1,21 +1,21 @@
-//! Points sorted into boxes, to find those near a position.
+//! Points binned into boxes for neighbour searches.
 
 use super::distance_squared;
 
-/// Boxes over a cloud of positions, at least half as wide as the search radius: smaller ones hold less that is
-/// not looked for.
+/// Boxes over a cloud of positions, with an edge of at least half the search radius. Compared with
+/// boxes of the full radius, a search reads fewer points that are out of range.
 pub struct Bins {
     lower: [f64; 3],
     inverse_edge: f64,
     counts: [usize; 3],
     radius_squared: f64,
     starts: Vec<u32>,
-    /// Index and position of each point, box by box, ascending in the index within a box.
+    /// Index and position of each point, sorted by box, then by index.
     entries: Vec<(u32, [f64; 3])>,
 }
 
 impl Bins {
-    /// Sorts positions (m) for searches mostly up to `radius` (m).
+    /// Bin positions (m); `radius` (m) is the usual search radius.
     pub fn new(positions: &[[f64; 3]], radius: f64) -> Self {
         let mut lower = [f64::INFINITY; 3];
         let mut upper = [f64::NEG_INFINITY; 3];
@@ -62,42 +62,42 @@ impl Bins {
         clamped[0] + self.counts[0] * (clamped[1] + self.counts[1] * clamped[2])
     }
 
-    /// Calls `found` with the index and the squared distance (m²) of every point within the radius
-    /// of a position, itself included if it is one of them.
-    pub fn within(&self, position: [f64; 3], mut found: impl FnMut(u32, f64)) {
+    /// Call `visit` with the index and the squared distance (m²) of every point within the radius of a
+    /// position, points at the position included.
+    pub fn within(&self, position: [f64; 3], mut visit: impl FnMut(u32, f64)) {
         let square = self.radius_squared;
         self.for_each_run(position, square, |entries| {
             for (index, other) in entries {
                 let squared = distance_squared(position, *other);
                 if squared <= square {
-                    found(*index, squared);
+                    visit(*index, squared);
                 }
             }
         });
     }
 
-    /// Appends the index of every point whose distance from a position is above 0 and has at most this square (m²),
-    /// and returns how many there are at the position itself.
+    /// Append to `found` the index of every point with 0 < distance² ≤ `square` (m²) from a position;
+    /// return the number of points at the position itself.
     pub fn collect(&self, position: [f64; 3], square: f64, found: &mut Vec<u32>) -> usize {
-        let mut here = 0;
+        let mut coincident = 0;
         self.for_each_run(position, square, |entries| {
-            let known = found.len();
-            found.resize(known + entries.len(), 0);
-            let mut end = known;
-            // Without a branch that the processor would have to guess.
+            let start = found.len();
+            found.resize(start + entries.len(), 0);
+            let mut end = start;
+            // Branch-free: the comparison is hard to predict.
             for (index, other) in entries {
                 let squared = distance_squared(position, *other);
                 found[end] = *index;
                 end += usize::from(squared <= square && squared > 0.0);
-                here += usize::from(squared == 0.0);
+                coincident += usize::from(squared == 0.0);
             }
             found.truncate(end);
         });
-        here
+        coincident
     }
 
-    /// Calls `run` with points, one after the other in memory, among which are all whose distance from a position
-    /// has at most this square (m²).
+    /// Call `run` with contiguous ranges of points that together include all points with distance² ≤
+    /// `square` (m²) from a position.
     fn for_each_run(
         &self,
         position: [f64; 3],
@@ -107,13 +107,13 @@ impl Bins {
         if self.entries.is_empty() {
             return;
         }
-        // In units of a box. Beside a point exactly at the radius rounding must not matter.
+        // In box edges. The tolerance keeps points exactly at the radius despite round-off.
         let radius_squared = square * (self.inverse_edge * self.inverse_edge);
         let radius_squared = radius_squared * (1.0 + 1e-6);
         let centre: [f64; 3] =
             std::array::from_fn(|k| (position[k] - self.lower[k]) * self.inverse_edge);
-        // What of the radius is left across a layer of boxes, squared.
-        let left = |radius_squared: f64, k: usize, layer: isize| {
+        // Squared radius left in the other directions, after the gap to a layer of boxes.
+        let remaining = |radius_squared: f64, k: usize, layer: isize| {
             let [below, above] = [layer as f64 - centre[k], centre[k] - (layer + 1) as f64];
             let gap = below.max(above).max(0.0);
             radius_squared - gap * gap
@@ -125,9 +125,9 @@ impl Bins {
             first.max(0)..=end.min(last)
         };
         for z in range(radius_squared, 2) {
-            let in_layer = left(radius_squared, 2, z);
+            let in_layer = remaining(radius_squared, 2, z);
             for y in range(in_layer, 1) {
-                let xs = range(left(in_layer, 1, y), 0);
+                let xs = range(remaining(in_layer, 1, y), 0);
                 if xs.is_empty() {
                     continue;
                 }
@@ -140,9 +140,10 @@ impl Bins {
     }
 }
 
-/// Edge (m) and number of boxes by direction, at least so wide (m) and not many more boxes than points.
-pub fn boxes(lower: [f64; 3], upper: [f64; 3], least: f64, points: usize) -> (f64, [usize; 3]) {
-    let mut edge = least * (1.0 + 1e-6);
+/// Edge (m) of boxes, at least `min_edge` (m), and their number per direction, of the order of `points`
+/// in total.
+pub fn boxes(lower: [f64; 3], upper: [f64; 3], min_edge: f64, points: usize) -> (f64, [usize; 3]) {
+    let mut edge = min_edge * (1.0 + 1e-6);
     loop {
         let counts: [f64; 3] =
             std::array::from_fn(|k| ((upper[k] - lower[k]).max(0.0) / edge).floor() + 1.0);
@@ -168,20 +169,20 @@ mod tests {
             let positions: Vec<[f64; 3]> =
                 flat.iter().map(|p| [p[0] * stretch, p[1], p[2]]).collect();
             let bins = Bins::new(&positions, radius);
-            for here in &positions {
+            for centre in &positions {
                 let mut found = Vec::new();
-                bins.within(*here, |index, _| found.push(index as usize));
+                bins.within(*centre, |index, _| found.push(index as usize));
                 found.sort_unstable();
                 let expected: Vec<usize> = (0..positions.len())
-                    .filter(|k| distance_squared(*here, positions[*k]) <= radius * radius)
+                    .filter(|k| distance_squared(*centre, positions[*k]) <= radius * radius)
                     .collect();
                 prop_assert_eq!(&found, &expected);
-                // With another radius, and without what lies at the position.
+                // With another radius, and without points at the position.
                 let square = (0.3 * radius).powi(2);
                 let mut found = Vec::new();
-                let at_position = bins.collect(*here, square, &mut found);
+                let at_position = bins.collect(*centre, square, &mut found);
                 found.sort_unstable();
-                let near = |k: &u32| distance_squared(*here, positions[*k as usize]);
+                let near = |k: &u32| distance_squared(*centre, positions[*k as usize]);
                 let all = 0..positions.len() as u32;
                 let expected: Vec<u32> =
                     all.clone().filter(|k| near(k) > 0.0 && near(k) <= square).collect();

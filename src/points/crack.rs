@@ -1,4 +1,4 @@
-//! Which bonds cross a pre-crack.
+//! Intersection of bonds with pre-cracks.
 
 use std::array;
 
@@ -8,14 +8,14 @@ use crate::problem::Crack;
 
 type Vector = Vector3<f64>;
 
-/// Slack at the rim of a crack, as a share of its size, so that a bond through the rim does not
-/// depend on rounding: it counts as cut.
+/// Relative tolerance at the rim of a crack: a bond through the rim is cut, despite round-off.
 const RIM: f64 = 1e-9;
 
-/// Whether the bond between two positions (m) crosses the crack. A point that lies in the plane of a
-/// crack without width counts to its positive side; one with width cuts all bonds that touch what lies
-/// between its faces, those of points there as well. Both ends must ask in the same order (lower id
-/// first), so that they come to the same answer to the bit.
+/// Test whether the bond between two positions (m) crosses the crack.
+///
+/// - Without width, a point in the plane of the crack counts to its positive side.
+/// - With width, every bond that touches the slot between the faces crosses it.
+/// - Pass the end with the lower id first, so both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     let bond = [from, to].map(Vector::from);
     match crack {
@@ -23,7 +23,7 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
             let start = Vector::from(*from);
             let edge = Vector::from(*to) - start;
             let normal = Vector::new(-edge.y, edge.x, 0.0);
-            let along = |place: Vector| (place - start).dot(&edge) / edge.dot(&edge);
+            let along = |x: Vector| (x - start).dot(&edge) / edge.dot(&edge);
             let part = between_faces(start, normal, *width, bond);
             part.and_then(|part| within(part, along, [0.0, 1.0]))
                 .is_some()
@@ -37,13 +37,13 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
             let [corner, a, b] = [*corner, *edge_a, *edge_b].map(Vector::from);
             let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
             let determinant = aa * bb - ab * ab;
-            let products = |place: Vector| ((place - corner).dot(&a), (place - corner).dot(&b));
-            let along_a = |place: Vector| {
-                let (oa, ob) = products(place);
+            let products = |x: Vector| ((x - corner).dot(&a), (x - corner).dot(&b));
+            let along_a = |x: Vector| {
+                let (oa, ob) = products(x);
                 (oa * bb - ob * ab) / determinant
             };
-            let along_b = |place: Vector| {
-                let (oa, ob) = products(place);
+            let along_b = |x: Vector| {
+                let (oa, ob) = products(x);
                 (ob * aa - oa * ab) / determinant
             };
             let part = between_faces(corner, a.cross(&b), *width, bond);
@@ -59,8 +59,8 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
         } => {
             let (centre, normal) = (Vector::from(*centre), Vector::from(*normal));
             between_faces(centre, normal, *width, bond).is_some_and(|part| {
-                let [from, to] = part.map(|place| {
-                    let offset = place - centre;
+                let [from, to] = part.map(|x| {
+                    let offset = x - centre;
                     offset - offset.dot(&normal) * normal
                 });
                 let nearest = nearest_to_origin(from, to);
@@ -70,7 +70,7 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     }
 }
 
-/// Whether a bond of a length (m) from a position (m) could cross the crack; many that could do not.
+/// Test with bounding boxes whether a bond of a length (m) from a position (m) can cross the crack; false positives occur.
 pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     let (corners, width) = match crack {
         Crack::Segment { from, to, width } => ([*from, *to, *from, *to], width),
@@ -102,8 +102,8 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     })
 }
 
-/// The part of a bond between the faces of a crack, in the plane through `origin`, with a width (m); of
-/// one without width the place where the bond goes through it.
+/// The part of a bond between the faces of a crack with mid-plane through `origin`. Without width, the
+/// point where the bond crosses the plane, twice.
 fn between_faces(
     origin: Vector,
     normal: Vector,
@@ -111,15 +111,14 @@ fn between_faces(
     bond: [Vector; 2],
 ) -> Option<[Vector; 2]> {
     if width == 0.0 {
-        return piercing(origin, normal, bond).map(|hit| [hit, hit]);
+        return plane_crossing(origin, normal, bond).map(|x| [x, x]);
     }
     let scale = 1.0 / (width * normal.norm());
-    let height = |place: Vector| scale * (place - origin).dot(&normal);
+    let height = |x: Vector| scale * (x - origin).dot(&normal);
     within(bond, height, [-0.5, 0.5])
 }
 
-/// The part of a segment on which a coordinate, linear in the place, is within limits; the limits are
-/// 1 apart.
+/// The part of a segment on which a linear coordinate is in [low, high], where high − low = 1.
 fn within(
     [from, to]: [Vector; 2],
     coordinate: impl Fn(Vector) -> f64,
@@ -139,29 +138,29 @@ fn within(
             end = end.min(first / (first - last));
         }
     }
-    let at = |share: f64| from + share * (to - from);
+    let at = |fraction: f64| from + fraction * (to - from);
     (start <= end).then(|| [at(start), at(end)])
 }
 
-/// The place of a segment that is nearest to the origin.
+/// The point of a segment nearest to the origin.
 fn nearest_to_origin(from: Vector, to: Vector) -> Vector {
-    let way = to - from;
-    let square = way.dot(&way);
+    let edge = to - from;
+    let square = edge.dot(&edge);
     if square == 0.0 {
         return from;
     }
-    from + (-from.dot(&way) / square).clamp(0.0, 1.0) * way
+    from + (-from.dot(&edge) / square).clamp(0.0, 1.0) * edge
 }
 
-/// Where the segment between two positions goes through a plane, if its ends lie on different sides.
-fn piercing(origin: Vector, normal: Vector, [from, to]: [Vector; 2]) -> Option<Vector> {
+/// The point where a segment crosses a plane, if its ends lie on different sides.
+fn plane_crossing(origin: Vector, normal: Vector, [from, to]: [Vector; 2]) -> Option<Vector> {
     let height_from = (from - origin).dot(&normal);
     let height_to = (to - origin).dot(&normal);
     if (height_from >= 0.0) == (height_to >= 0.0) {
         return None;
     }
-    let share = height_from / (height_from - height_to);
-    Some(from + share * (to - from))
+    let fraction = height_from / (height_from - height_to);
+    Some(from + fraction * (to - from))
 }
 
 #[cfg(test)]
@@ -170,7 +169,7 @@ mod tests {
     use proptest::{array, prelude::*};
 
     #[test]
-    fn a_segment_cuts_what_crosses_it_and_no_more() {
+    fn a_segment_cuts_the_bonds_that_cross_it_only() {
         let notch = Crack::Segment {
             from: [0.0; 3],
             to: [1.0, 0.0, 0.0],
@@ -213,19 +212,19 @@ mod tests {
     }
 
     #[test]
-    fn a_band_cuts_all_that_touches_it() {
+    fn a_slot_cuts_every_bond_that_touches_it() {
         // From (1, 1) towards (4, 5), 5 long and 0.8 wide.
         let band = Crack::Segment {
             from: [1.0, 1.0, 0.0],
             to: [4.0, 5.0, 0.0],
             width: 0.8,
         };
-        let place = |along: f64, beside: f64| {
+        let position = |along: f64, beside: f64| {
             let [x, y] = [0.6 * along - 0.8 * beside, 0.8 * along + 0.6 * beside];
             [1.0 + x, 1.0 + y, 0.0]
         };
         let cut = |from: (f64, f64), to: (f64, f64)| {
-            let [a, b] = [place(from.0, from.1), place(to.0, to.1)];
+            let [a, b] = [position(from.0, from.1), position(to.0, to.1)];
             assert_eq!(crosses(&band, a, b), crosses(&band, b, a));
             crosses(&band, a, b)
         };

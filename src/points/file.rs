@@ -1,8 +1,7 @@
-//! Points from a text file, read in pieces by all ranks.
+//! Points from a text file; each rank reads its share of the bytes.
 //!
-//! Each row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Empty rows and
-//! rows that start with `#` are skipped, and so is the first other row if it names the columns: if no
-//! entry of it is a number.
+//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Skipped are empty
+//! rows, rows that start with `#`, and a heading: a first row without any number.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -14,7 +13,7 @@ use crate::problem::{PointSource, Problem};
 
 use super::Point;
 
-/// The bodies that take rows of a file: their index and the block number they ask for.
+/// The bodies that use a file: their index and the block number they select.
 pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
     problem
         .bodies
@@ -27,39 +26,40 @@ pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
         .collect()
 }
 
-/// The most bytes of a row.
+/// Maximum length of a row, bytes.
 const LONGEST_ROW: u64 = 1 << 16;
 
-/// Bytes of a piece of a long file, and the number of pieces that are read to estimate the points of all.
+/// Length of a sample of a long file, bytes.
 const PIECE: u64 = 1 << 16;
+/// Number of samples of a long file.
 const SAMPLED: u64 = 256;
 
-/// The largest size of a coordinate, m: squares of distances stay far from overflow.
+/// Largest absolute coordinate, m; squared distances stay far from overflow.
 const FARTHEST: f64 = 1e30;
 
-/// What a file may begin with to say that it is UTF-8.
+/// Optional first bytes of a UTF-8 file.
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-/// What is wrong with a row: its line within the share, from 0, and the message.
-type Mistake = (u64, String);
+/// An invalid row: its line within the share, from 0, and the message.
+type RowError = (u64, String);
 
-/// What one rank found in its share of the file.
+/// The parsed share of one rank.
 #[derive(Default)]
 struct Share {
     points: Vec<Point>,
     lines: u64,
-    /// Whether there is a row at all.
+    /// The share has at least one row.
     has_rows: bool,
-    /// The first row if it holds no number, which is a mistake unless it is the first of the file.
-    heading: Option<Mistake>,
-    /// The first wrong row after that.
-    mistake: Option<Mistake>,
+    /// The first row, if it has no number; an error unless it is the first row of the file.
+    heading: Option<RowError>,
+    /// The first invalid row after that.
+    error: Option<RowError>,
 }
 
-/// This rank's piece of a file's points, for all bodies that use it.
+/// Read this rank's share of a file's points, for all bodies that use it. Collective.
 ///
 /// # Errors
-/// When the file cannot be read or a row is wrong; names the file and the line.
+/// If the file cannot be read or a row is invalid; the message gives file and line.
 pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Vec<Point>> {
     let users = users(problem, path);
     let share = read_share(problem, path, &users, comm.rank(), comm.size()).map_err(|error| {
@@ -73,7 +73,7 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     let (lines_before, _) = scan(comm, share.lines);
     let (ranks_before, _) = scan(comm, u64::from(share.has_rows));
     let heading = share.heading.filter(|_| ranks_before > 0);
-    let checked = match heading.or(share.mistake) {
+    let checked = match heading.or(share.error) {
         None => Ok(share.points),
         Some((line, message)) => {
             let line = lines_before + line + 1;
@@ -86,8 +86,10 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     agree(comm, checked)
 }
 
-/// Points of a file, and the number of points that each of them stands for: 1 unless the file is long, of which evenly
-/// spaced pieces are read. Wrong rows are left out. `None` if the file cannot be read.
+/// Sample the points of a file; return them and the number of points that each represents.
+///
+/// Of a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot
+/// be read.
 pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     let users = users(problem, path);
     let length = std::fs::metadata(path).ok()?.len();
@@ -108,7 +110,7 @@ pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     Some((points, pieces as f64 / SAMPLED as f64))
 }
 
-/// Reads the rows that start within this rank's share of the file's bytes.
+/// Read the rows that start within a rank's share of the file's bytes.
 fn read_share(
     problem: &Problem,
     path: &Path,
@@ -116,7 +118,7 @@ fn read_share(
     rank: usize,
     size: usize,
 ) -> std::io::Result<Share> {
-    // Opening a pipe would wait for its other end.
+    // Opening a pipe would block until its other end is opened.
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::other("it is not a regular file"));
     }
@@ -130,12 +132,12 @@ fn read_share(
     let mut reader = if start == 0 {
         BufReader::new(file)
     } else {
-        // The row that is under way at `start` belongs to the share before.
+        // A row that spans `start` belongs to the previous share.
         file.seek(SeekFrom::Start(start - 1))?;
         let mut reader = BufReader::new(file);
         let skipped = (&mut reader).take(LONGEST_ROW + 1).skip_until(b'\n')? as u64;
         if skipped > LONGEST_ROW {
-            // The share in which this row starts has the error.
+            // The share with the start of this row reports the error.
             return Ok(share);
         }
         at = start - 1 + skipped;
@@ -156,7 +158,7 @@ fn read_share(
         at += read;
         if read == LONGEST_ROW && !bytes.ends_with(b"\n") {
             let message = format!("is longer than {LONGEST_ROW} bytes; is this a point file?");
-            share.mistake.get_or_insert((share.lines, message));
+            share.error.get_or_insert((share.lines, message));
             break;
         }
         share.read_row(problem, users, bytes);
@@ -166,7 +168,7 @@ fn read_share(
 }
 
 impl Share {
-    /// Takes the point of the next row, if it has one.
+    /// Parse the next row and append its point.
     fn read_row(&mut self, problem: &Problem, users: &[(usize, Option<u32>)], row: &[u8]) {
         let entries = match std::str::from_utf8(row) {
             Ok(row) if row.trim_start().starts_with('#') => return,
@@ -177,19 +179,20 @@ impl Share {
             return;
         }
         let is_first = !std::mem::replace(&mut self.has_rows, true);
-        let names_columns = |entries: &Vec<&str>| !entries.iter().any(|entry| has_number(entry));
+        let names_columns =
+            |entries: &Vec<&str>| !entries.iter().any(|entry| resembles_number(entry));
         let is_heading = is_first && entries.as_ref().is_ok_and(names_columns);
         match entries.and_then(|entries| point(problem, users, &entries)) {
             Ok(point) => self.points.push(point),
             Err(message) if is_heading => self.heading = Some((self.lines, message)),
             Err(message) => {
-                self.mistake.get_or_insert((self.lines, message));
+                self.error.get_or_insert((self.lines, message));
             }
         }
     }
 }
 
-/// The entries of a row.
+/// Split a row into entries.
 fn entries(row: &str) -> std::result::Result<Vec<&str>, String> {
     let row = row.trim();
     let mut entries = Vec::new();
@@ -203,14 +206,14 @@ fn entries(row: &str) -> std::result::Result<Vec<&str>, String> {
     Ok(entries)
 }
 
-/// Whether an entry is a number, or one with a slip in it or in quotes.
-fn has_number(entry: &str) -> bool {
+/// Test whether an entry is a number, possibly mistyped or in quotes.
+fn resembles_number(entry: &str) -> bool {
     let bare = entry.trim_matches(['"', '\'']);
     let digits = bare.trim_start_matches(['+', '-', '.']);
     bare.parse::<f64>().is_ok() || digits.starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// The point of a row.
+/// Parse the point of a row.
 fn point(
     problem: &Problem,
     users: &[(usize, Option<u32>)],
@@ -255,7 +258,7 @@ fn point(
     })?;
     let body = users
         .iter()
-        .find(|(_, wanted)| wanted.is_none_or(|wanted| wanted == block));
+        .find(|(_, selected)| selected.is_none_or(|selected| selected == block));
     let Some((body, _)) = body else {
         return Err(format!(
             "block {block} belongs to no body; add a body with `points = {{ file = …, block = \
@@ -273,8 +276,8 @@ mod tests {
     use crate::elastic::Isotropic;
     use crate::problem::{Law, Material, Shape};
 
-    /// The x of all points of a file in the plane, in the order of their ids, or the error, which must
-    /// be the same on any number of ranks.
+    /// Read a 2-D file; return the x of its points by id, or the error. Asserts that the result is equal on
+    /// any number of ranks.
     fn read(name: &str, text: &[u8]) -> std::result::Result<Vec<f64>, String> {
         let folder = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
@@ -318,11 +321,11 @@ mod tests {
             };
             pieces.map(xs).map_err(shorten)
         };
-        let alone = on(1);
+        let single = on(1);
         for ranks in 2..7 {
-            assert_eq!(on(ranks), alone, "{ranks} ranks");
+            assert_eq!(on(ranks), single, "{ranks} ranks");
         }
-        alone
+        single
     }
 
     #[test]
@@ -347,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn no_row_is_taken_for_a_heading_or_for_another() {
+    fn invalid_rows_are_not_taken_for_headings_or_points() {
         let rows = "1,0,1,1\n2,0,1,1\n";
         for (row, message) in [
             ("O.0,0,1,1", "x must be a number, is `O.0`"),
@@ -384,7 +387,7 @@ mod tests {
         let long = [b"0 0 1 1\n".to_vec(), vec![b'0'; 1 << 17]].concat();
         let expected = "points.csv:2: is longer than 65536 bytes; is this a point file?";
         assert_eq!(read("long", &long), Err(expected.to_owned()));
-        // The longest row, with shares that start within it.
+        // A row of maximum length; shares start within it.
         let spaces = |count: usize| [&b"0 0 1 1"[..], &vec![b' '; count], b"\n1 0 1 1\n"].concat();
         assert_eq!(read("longest", &spaces(65_528)), Ok(vec![0.0, 1.0]));
         let expected = "points.csv:1: is longer than 65536 bytes; is this a point file?";
@@ -392,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pipe_is_no_point_file() {
+    fn a_pipe_is_rejected() {
         let folder = std::env::temp_dir().join(format!("fissure-pipe-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let made = std::process::Command::new("mkfifo")

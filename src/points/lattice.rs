@@ -1,31 +1,30 @@
-//! Points in lattice cells, made in pieces: one at the centre of each, or at the places of the Gauss
-//! rule, ±√3/3 of half the edge by direction (Emmrich & Weckner 2006, §4).
+//! Points of lattice bodies: one at the centre of each cell, or one at each Gauss point of the cell,
+//! ±√3/3 of half the edge per direction (Emmrich & Weckner 2006, §4).
 
 use crate::comm::Communicator;
 use crate::error::{Error, Result};
 use crate::problem::{Body, PointSource, Problem, Quadrature, Shape};
 
 use super::region::{Region, TOLERANCE};
-use super::{MOST_A_RANK, Point, distance_squared, shape};
+use super::{MAX_PER_RANK, Point, distance_squared, shape};
 
-/// Binary logarithm of the cells that one rank goes through; some minutes' worth.
-const CELLS_A_RANK: u32 = 33;
+/// Binary logarithm of the maximum number of cells per rank, which take some minutes.
+const LOG2_CELLS_PER_RANK: u32 = 33;
 
-/// Cells looked at to estimate how many of a region belong to a body.
+/// Number of cells sampled to estimate the fraction of a region within a body.
 const SAMPLES: u64 = 1 << 17;
 
-/// Consecutive multiples of this share of 1, less whole numbers, fill it evenly: the golden ratio.
-const EVENLY: f64 = 0.618_033_988_749_894_9;
+/// Step of a low-discrepancy sequence in [0, 1): the golden ratio.
+const EVEN_STEP: f64 = 0.618_033_988_749_894_9;
 
-/// The same for places in a cube: powers of the root of x⁴ = x + 1 (Roberts 2018).
-const EVENLY_IN: [f64; 3] = [
+/// Step of a low-discrepancy sequence in [0, 1)³: powers of the root of x⁴ = x + 1 (Roberts 2018).
+const EVEN_STEP_3D: [f64; 3] = [
     0.819_172_513_396_164_4,
     0.671_043_606_703_789_2,
     0.549_700_477_901_970_2,
 ];
 
-/// A body made of lattice cells. A cell belongs to it if its centre lies within its shape; one that also
-/// lies in a later lattice body is left to that one.
+/// A body of lattice cells. A cell belongs to the last body whose shape contains its centre.
 pub struct LatticeBody<'a> {
     shape: &'a Shape,
     later: Vec<&'a Shape>,
@@ -34,17 +33,17 @@ pub struct LatticeBody<'a> {
     dimension: usize,
     tolerance: f64,
     region: Region,
-    /// All cells that the shape can touch.
-    around: Region,
+    /// All cells that the shape can overlap.
+    overlap: Region,
     quadrature: Quadrature,
     out_of_plane_measure: f64,
 }
 
 impl<'a> LatticeBody<'a> {
-    /// A body of a problem, by index; `None` if it has its points from a file.
+    /// The lattice of a body, by index; `None` if its points come from a file.
     ///
     /// # Errors
-    /// When its cells are too far away to be numbered.
+    /// If its cells are too far from the origin to be numbered.
     pub fn new(problem: &'a Problem, body: usize) -> Result<Option<Self>> {
         let lattice = |body: &'a Body| match &body.points {
             PointSource::Lattice {
@@ -59,7 +58,7 @@ impl<'a> LatticeBody<'a> {
         };
         let dimension = problem.dimension.count();
         let region = |margin| Region::new(shape, spacing, origin, dimension, margin);
-        let (Some(region), Some(around)) = (region(0.0), region(0.5)) else {
+        let (Some(region), Some(overlap)) = (region(0.0), region(0.5)) else {
             return Err(too_many(problem, body));
         };
         let later = problem.bodies[body + 1..].iter().filter_map(lattice);
@@ -72,51 +71,51 @@ impl<'a> LatticeBody<'a> {
             dimension,
             tolerance: TOLERANCE * edges.fold(f64::INFINITY, f64::min),
             region,
-            around,
+            overlap,
             quadrature: problem.quadrature,
             out_of_plane_measure: problem.dimension.out_of_plane_measure(),
         }))
     }
 
-    /// Number of cells whose centres can lie within the shape, at most the largest number there is.
+    /// Number of candidate cells, whose centres can lie within the shape; saturates at `u64::MAX`.
     pub fn cells(&self) -> u64 {
         self.region.total()
     }
 
-    /// The centre (m) of one of these cells, if it belongs to the body.
+    /// The centre (m) of a candidate cell, by index, if it belongs to the body.
     pub fn centre(&self, index: u64) -> Option<[f64; 3]> {
         self.centre_of(self.region.cell(index))
     }
 
     /// The centre (m) of a cell, if it belongs to the body.
     fn centre_of(&self, cell: [i64; 3]) -> Option<[f64; 3]> {
-        let centre = self.place(cell.map(|x| x as f64));
+        let centre = self.position(cell.map(|x| x as f64));
         self.contains(centre).then_some(centre)
     }
 
-    /// Whether a cell belongs to the body.
+    /// Test whether a cell belongs to the body.
     pub fn has_cell(&self, cell: [i64; 3]) -> bool {
         self.centre_of(cell).is_some()
     }
 
-    /// The cell whose centre is at a place (m).
-    pub fn cell_at(&self, place: [f64; 3]) -> [i64; 3] {
-        self.place_at(place, 1.0)
+    /// The cell whose centre is nearest to a position, m.
+    pub fn cell_at(&self, position: [f64; 3]) -> [i64; 3] {
+        self.index_at(position, 1.0)
     }
 
-    /// A place (m) in steps, so many an edge, from the centre of cell 0.
-    pub fn place_at(&self, place: [f64; 3], steps: f64) -> [i64; 3] {
+    /// The grid index of a position (m), in steps of 1/`steps` of an edge from the centre of cell 0.
+    pub fn index_at(&self, position: [f64; 3], steps: f64) -> [i64; 3] {
         std::array::from_fn(|k| {
             if k < self.dimension {
-                (steps * ((place[k] - self.origin[k]) / self.spacing[k] - 0.5)).round() as i64
+                (steps * ((position[k] - self.origin[k]) / self.spacing[k] - 0.5)).round() as i64
             } else {
                 0
             }
         })
     }
 
-    /// The place (m) that lies so many edges from the centre of cell 0.
-    pub fn place(&self, edges: [f64; 3]) -> [f64; 3] {
+    /// The position (m) at an offset, in edges, from the centre of cell 0.
+    pub fn position(&self, edges: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| {
             if k < self.dimension {
                 self.origin[k] + (edges[k] + 0.5) * self.spacing[k]
@@ -126,9 +125,9 @@ impl<'a> LatticeBody<'a> {
         })
     }
 
-    /// Whether a place (m) is within the shape and in no later body.
-    fn contains(&self, place: [f64; 3]) -> bool {
-        let within = |shape: &Shape| shape::contains(shape, place, self.tolerance);
+    /// Test whether a position (m) is within the shape and in no later body.
+    fn contains(&self, position: [f64; 3]) -> bool {
+        let within = |shape: &Shape| shape::contains(shape, position, self.tolerance);
         within(self.shape) && !self.later.iter().any(|shape| within(shape))
     }
 
@@ -137,31 +136,31 @@ impl<'a> LatticeBody<'a> {
         self.spacing[..self.dimension].iter().product::<f64>() * self.out_of_plane_measure
     }
 
-    /// Number of points of a cell.
+    /// Number of points per cell.
     pub fn points_of_cell(&self) -> u64 {
         u64::from(self.quadrature.points(self.dimension))
     }
 
-    /// Number of points; of a large region an estimate from some of its cells.
+    /// Number of points; estimated from sampled cells for a large region.
     pub fn points(&self) -> f64 {
         let belongs = |index: &u64| self.centre(*index).is_some();
         let (cells, all) = (self.cells(), self.cells() as f64);
-        let share = if cells <= SAMPLES {
+        let fraction = if cells <= SAMPLES {
             (0..cells).filter(belongs).count() as f64 / all.max(1.0)
         } else {
-            let found = evenly(SAMPLES, cells).filter(belongs).count();
+            let found = even_samples(SAMPLES, cells).filter(belongs).count();
             found as f64 / SAMPLES as f64
         };
-        share * all * self.points_of_cell() as f64
+        fraction * all * self.points_of_cell() as f64
     }
 
-    /// The centres (m) of about so many of the body's cells, spread evenly.
+    /// The centres (m) of at most `count` sampled cells of the body.
     pub fn some_centres(&self, count: u64) -> Vec<[f64; 3]> {
-        let centres = evenly(SAMPLES, self.cells()).filter_map(|index| self.centre(index));
+        let centres = even_samples(SAMPLES, self.cells()).filter_map(|index| self.centre(index));
         centres.take(count as usize).collect()
     }
 
-    /// Number of cells that are at most a distance (m) from a place, about.
+    /// Upper bound on the number of cells within a distance (m) of a position.
     pub fn cells_within(&self, distance: f64) -> f64 {
         let width = |k: usize| {
             let all = self.region.range(k).count() as f64;
@@ -170,24 +169,25 @@ impl<'a> LatticeBody<'a> {
         (0..self.dimension).map(width).product()
     }
 
-    /// Number of the body's points in cells whose centres are at most a distance (m) from a place (m).
-    pub fn count_near(&self, place: [f64; 3], distance: f64) -> u64 {
+    /// Number of the body's points in cells whose centres lie within a distance (m) of a position (m).
+    pub fn count_near(&self, position: [f64; 3], distance: f64) -> u64 {
         let range = |k: usize| {
             let all = self.region.range(k);
             if k >= self.dimension {
                 return all;
             }
             let cell = |x: f64| (x - self.origin[k]) / self.spacing[k] - 0.5;
-            let first = cell(place[k] - distance).ceil() as i64;
-            let last = cell(place[k] + distance).floor() as i64;
+            let first = cell(position[k] - distance).ceil() as i64;
+            let last = cell(position[k] + distance).floor() as i64;
             first.max(*all.start())..=last.min(*all.end())
         };
         let mut count = 0;
         for z in range(2) {
             for y in range(1) {
                 for x in range(0) {
-                    let near =
-                        |centre: &[f64; 3]| distance_squared(*centre, place) <= distance * distance;
+                    let near = |centre: &[f64; 3]| {
+                        distance_squared(*centre, position) <= distance * distance
+                    };
                     let centre = self.centre_of([x, y, z]);
                     count += u64::from(centre.as_ref().is_some_and(near));
                 }
@@ -196,52 +196,52 @@ impl<'a> LatticeBody<'a> {
         count * self.points_of_cell()
     }
 
-    /// The volume (m³) of the shape less that of later bodies, from places that fill it evenly.
+    /// Estimate the volume (m³) of the shape without later bodies from evenly distributed positions.
     pub fn shape_volume(&self) -> f64 {
-        let (region, all) = (&self.around, self.around.total() as f64);
+        let (region, all) = (&self.overlap, self.overlap.total() as f64);
         let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);
         let mut within = 0;
         for k in 0..samples {
-            // The same number of places in each cell, or in each of some cells.
+            // Of few cells, sample each equally often; of many, sample some once.
             let index = if region.total() <= SAMPLES {
                 k % region.total()
             } else {
-                ((k as f64 * EVENLY).fract() * all) as u64
+                ((k as f64 * EVEN_STEP).fract() * all) as u64
             };
             let cell = region.cell(index);
-            let mut place = [0.0; 3];
+            let mut position = [0.0; 3];
             for d in 0..self.dimension {
-                let share = (k as f64 * EVENLY_IN[d]).fract();
-                place[d] = self.origin[d] + (cell[d] as f64 + share) * self.spacing[d];
+                let fraction = (k as f64 * EVEN_STEP_3D[d]).fract();
+                position[d] = self.origin[d] + (cell[d] as f64 + fraction) * self.spacing[d];
             }
-            within += u64::from(self.contains(place));
+            within += u64::from(self.contains(position));
         }
         within as f64 / samples.max(1) as f64 * all * self.cell_volume()
     }
 }
 
-/// So many of the numbers below a count, spread evenly.
-fn evenly(samples: u64, count: u64) -> impl Iterator<Item = u64> {
-    let at = move |k: u64| ((k as f64 * EVENLY).fract() * count as f64) as u64;
+/// `samples` evenly distributed integers below `count`.
+fn even_samples(samples: u64, count: u64) -> impl Iterator<Item = u64> {
+    let at = move |k: u64| ((k as f64 * EVEN_STEP).fract() * count as f64) as u64;
     (0..if count == 0 { 0 } else { samples }).map(at)
 }
 
-/// This rank's piece of a body's points; ids count from 0 within the piece. Cells are numbered with
-/// x fastest, and ranks take consecutive ranges of them.
+/// Generate this rank's piece of a body's points, with ids of 0. Cells are ordered with x fastest;
+/// each rank takes a consecutive range.
 ///
 /// # Errors
-/// When cells are too far away to be numbered.
+/// If cells are too far from the origin to be numbered.
 pub(super) fn piece(problem: &Problem, body: usize, comm: &dyn Communicator) -> Result<Vec<Point>> {
     let Some(lattice) = LatticeBody::new(problem, body)? else {
         return Ok(Vec::new());
     };
     let total = lattice.cells();
     let (rank, size) = (comm.rank() as u64, comm.size() as u64);
-    let share = |rank: u64| (u128::from(total) * u128::from(rank) / u128::from(size)) as u64;
+    let start = |rank: u64| (u128::from(total) * u128::from(rank) / u128::from(size)) as u64;
     let count = lattice.points_of_cell();
     let volume = lattice.cell_volume();
     let mut points = Vec::new();
-    for index in share(rank)..share(rank + 1) {
+    for index in start(rank)..start(rank + 1) {
         let Some(centre) = lattice.centre(index) else {
             continue;
         };
@@ -250,31 +250,30 @@ pub(super) fn piece(problem: &Problem, body: usize, comm: &dyn Communicator) -> 
             continue;
         }
         for corner in 0..count {
-            let mut place = centre;
+            let mut position = centre;
             for k in 0..lattice.dimension {
                 let shift = lattice.spacing[k] / 12.0_f64.sqrt();
-                place[k] += if corner >> k & 1 == 1 { shift } else { -shift };
+                position[k] += if corner >> k & 1 == 1 { shift } else { -shift };
             }
-            points.push(Point::new(0, place, volume / count as f64, body));
+            points.push(Point::new(0, position, volume / count as f64, body));
         }
     }
     Ok(points)
 }
 
-/// Whether so many ranks can go through a body's cells and hold its points, as far as both are known
-/// beforehand.
+/// Check the number of cells and points of a body against the limits per rank.
 ///
 /// # Errors
-/// Names the body; the same on all ranks.
+/// Names the body; equal on all ranks.
 pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
     let Some(lattice) = LatticeBody::new(problem, body)? else {
         return Ok(());
     };
-    if lattice.cells() > (ranks as u64) << CELLS_A_RANK {
+    if lattice.cells() > (ranks as u64) << LOG2_CELLS_PER_RANK {
         return Err(too_many(problem, body));
     }
-    let most = MOST_A_RANK * ranks as f64;
-    if lattice.cells() as f64 > most && lattice.points() > most {
+    let limit = MAX_PER_RANK * ranks as f64;
+    if lattice.cells() as f64 > limit && lattice.points() > limit {
         let message = format!(
             "[body.{}]: about {:.1e} points are too many for {ranks} rank(s), of 2³¹ each at most; \
              use more ranks, or is the spacing not in m?",
@@ -314,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_counted_without_being_made() {
+    fn the_estimated_number_of_points() {
         let ball = Shape::Ball {
             centre: [0.0; 3],
             radius: 1.0,

@@ -1,6 +1,6 @@
-//! Points: where they come from, and the geometry that picks them.
+//! Generation of points, and the geometry of shapes, sets and pre-cracks.
 //!
-//! Every rank makes or reads its own piece; no rank ever holds all points.
+//! Each rank generates or reads its own piece of the points; no rank holds all of them.
 
 pub mod bins;
 pub mod crack;
@@ -21,27 +21,27 @@ use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::problem::{PointSource, Problem, Selector};
 
-/// The most points of a rank.
-pub const MOST_A_RANK: f64 = 2_147_483_647.0;
+/// Maximum number of points per rank.
+pub const MAX_PER_RANK: f64 = 2_147_483_647.0;
 
-/// A point as it travels between ranks.
+/// A point, as sent between ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Point {
-    /// Global id, from 0 without gaps, the same on any number of ranks.
+    /// Global id, from 0 without gaps; equal on any number of ranks.
     pub id: u64,
     /// Reference position, m; components beyond the dimension are 0.
     pub position: [f64; 3],
     /// Volume, m³.
     pub volume: f64,
-    /// Index of its body.
+    /// Index of its block; that of its body before refinement.
     pub block: u32,
-    /// Keeps the record free of padding bytes.
+    /// Explicit padding, as `Pod` requires.
     pub unused: u32,
 }
 
 impl Point {
-    /// A point; see the fields.
+    /// A point with the given fields.
     pub fn new(id: u64, position: [f64; 3], volume: f64, block: usize) -> Self {
         Self {
             id,
@@ -59,11 +59,13 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     difference.dot(&difference)
 }
 
-/// This rank's piece of the points: a contiguous range of ids, and the total over all ranks.
+/// Generate this rank's piece of the points; return it with the number of points of all ranks.
+///
+/// The ids of a piece are contiguous per body. Collective.
 ///
 /// # Errors
-/// A body without points, an unreadable or wrong point file, a set with an id that no point has, more
-/// points than a rank can number; the same on all ranks.
+/// A body without points, an unreadable or invalid point file, a set with an unknown id, too many
+/// points on a rank; equal on all ranks.
 pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
@@ -81,7 +83,7 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
         for (point, id) in piece.iter_mut().zip(total + before..) {
             point.id = id;
         }
-        // Appending would copy the first piece, which most often is the only one.
+        // Appending would copy the first piece, which is usually the only one.
         if points.is_empty() {
             points = piece
         } else {
@@ -89,9 +91,9 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
         }
         total += all;
     }
-    no_empty_body(problem, comm, &points)?;
-    ids_are_those_of_points(problem, total)?;
-    let fits = if (points.len() as f64) < MOST_A_RANK {
+    check_no_empty_body(problem, comm, &points)?;
+    check_set_ids(problem, total)?;
+    let fits = if (points.len() as f64) < MAX_PER_RANK {
         Ok(())
     } else {
         Err(Error::run(
@@ -102,7 +104,7 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     Ok((points, total))
 }
 
-fn ids_are_those_of_points(problem: &Problem, total: u64) -> Result<()> {
+fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
     for set in &problem.sets {
         if let Selector::Ids { ids, largest } = &set.selector
             && let Some(id) = ids.last().filter(|id| **id >= total)
@@ -118,7 +120,7 @@ fn ids_are_those_of_points(problem: &Problem, total: u64) -> Result<()> {
     Ok(())
 }
 
-fn no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
+fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
     let mut counts = vec![0; problem.bodies.len()];
     for point in points {
         counts[point.block as usize] += 1;

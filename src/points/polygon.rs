@@ -1,40 +1,40 @@
-//! Polygons with an index of their edges, so that a test of a position reads few of them.
+//! Polygons with an index of their edges by strip, so a containment test reads few edges.
 
 use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-/// Entries of the index for each edge, at most, beside one.
+/// Upper limit on the additional index entries per edge.
 const MOST_ENTRIES: f64 = 8.0;
 
-/// Rounding of the distance to an edge, as a share of the polygon's width and height.
+/// Round-off of the distance to an edge, as a fraction of the polygon's extent.
 const SLACK: f64 = 1e-12;
 
-/// A closed polygon in the plane, lengths in m. It may be concave and may cross itself.
+/// A closed polygon in the plane, m. It may be concave and may intersect itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
     vertices: Vec<[f64; 2]>,
     lower: [f64; 2],
     upper: [f64; 2],
-    /// The direction that is divided into strips.
+    /// The axis that is divided into strips.
     axis: usize,
     /// Strips per m.
     strips_per_length: f64,
-    /// Where the edges of each strip start in `edges`, and where those of the last strip end.
+    /// Start of each strip in `edges`, then the end of the last.
     starts: Vec<u32>,
-    /// Edges that touch a strip, strip by strip; edge k starts at vertex k.
+    /// The edges that touch each strip; edge k starts at vertex k.
     edges: Vec<u32>,
 }
 
 impl Polygon {
-    /// The polygon with these corners in order; the last one is joined to the first.
+    /// The polygon with these vertices in order; the last is joined to the first.
     pub fn new(vertices: Vec<[f64; 2]>) -> Self {
-        let extreme = |k: usize, pick: fn(f64, f64) -> f64| {
+        let extreme = |k: usize, select: fn(f64, f64) -> f64| {
             let entries = vertices.iter().map(|vertex| vertex[k]);
-            entries.reduce(pick).unwrap_or(0.0)
+            entries.reduce(select).unwrap_or(0.0)
         };
         let [lower, upper] = [f64::min as fn(f64, f64) -> f64, f64::max]
-            .map(|pick| [extreme(0, pick), extreme(1, pick)]);
+            .map(|select| [extreme(0, select), extreme(1, select)]);
         let mut polygon = Self {
             vertices,
             lower,
@@ -48,10 +48,10 @@ impl Polygon {
         polygon
     }
 
-    /// Fill the index: strips across the direction in which the edges are shorter.
+    /// Build the index along the axis with the smaller total length of edges.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
-        // How many times all edges together are as long as the polygon, by direction.
+        // Total length of all edges over the extent of the polygon, per axis.
         let turns = [0, 1].map(|k| {
             let all: f64 = (0..count)
                 .map(|edge| {
@@ -59,7 +59,7 @@ impl Polygon {
                     (b[k] - a[k]).abs()
                 })
                 .sum();
-            // A line has no extent in one direction.
+            // max also replaces the NaN of a polygon without extent along an axis.
             (all / (self.upper[k] - self.lower[k])).max(1.0)
         });
         self.axis = usize::from(turns[1] <= turns[0]);
@@ -90,8 +90,8 @@ impl Polygon {
         (self.lower, self.upper)
     }
 
-    /// Whether a position is within by the even-odd rule. Positions closer to an edge than |tolerance| are within for
-    /// a positive tolerance and outside for a negative one.
+    /// Test a position by the even-odd rule. Positions closer to an edge than |tolerance| (m) are inside
+    /// for a positive tolerance and outside for a negative one.
     pub fn contains(&self, position: [f64; 2], tolerance: f64) -> bool {
         let (along, across) = (self.axis, 1 - self.axis);
         let at = position[along];
@@ -105,12 +105,12 @@ impl Polygon {
         if near.any(|strip| self.edges_of(strip).iter().any(is_near)) {
             return tolerance > 0.0;
         }
-        // An edge that a line across passes through is in the strip of the line.
+        // Every edge that crosses the line through the position is in the line's strip.
         let crossings = self.edges_of(self.strip(at)).iter().filter(|edge| {
             let [a, b] = self.edge(**edge as usize);
             let spans = (a[along] > at) != (b[along] > at);
-            let share = (at - a[along]) / (b[along] - a[along]);
-            spans && position[across] < a[across] + share * (b[across] - a[across])
+            let fraction = (at - a[along]) / (b[along] - a[along]);
+            spans && position[across] < a[across] + fraction * (b[across] - a[across])
         });
         crossings.count() % 2 == 1
     }
@@ -124,9 +124,9 @@ impl Polygon {
         [self.vertices[index], self.vertices[next]]
     }
 
-    /// The strip at a place (m) along the axis; the first or the last strip outside of all.
-    fn strip(&self, place: f64) -> usize {
-        let strip = (place - self.lower[self.axis]) * self.strips_per_length;
+    /// The strip at a coordinate (m) along the axis, clamped to the first and last strip.
+    fn strip(&self, coordinate: f64) -> usize {
+        let strip = (coordinate - self.lower[self.axis]) * self.strips_per_length;
         (strip as usize).min(self.starts.len() - 2)
     }
 
@@ -144,7 +144,7 @@ fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
     let [a, b, p] = [a, b, p].map(Vector2::from);
     let (edge, offset) = (b - a, p - a);
     let along = edge.dot(&offset) / edge.dot(&edge);
-    // A repeated corner has no length: its distance is that to the corner.
+    // A repeated vertex makes an edge of zero length: use the distance to the vertex.
     let along = if along.is_nan() {
         0.0
     } else {
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The same test with all edges.
+    /// The containment test with all edges.
     fn by_all_edges(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool {
         let edges = || {
             let next = vertices.iter().cycle().skip(1);
@@ -178,10 +178,10 @@ mod tests {
             == 1
     }
 
-    /// Asserts that the index changes nothing at positions on a grid of half lengths, which has those on corners and
-    /// edges.
+    /// Assert that the index gives the result of all edges at positions of a half-unit grid, which includes
+    /// vertices and positions on edges.
     #[track_caller]
-    fn same(vertices: &[[f64; 2]], tolerance: f64) {
+    fn assert_same(vertices: &[[f64; 2]], tolerance: f64) {
         let polygon = Polygon::new(vertices.to_vec());
         for [x, y] in (-2..=26).flat_map(|x| (-2..=26).map(move |y| [x, y])) {
             let position = [0.5 * f64::from(x), 0.5 * f64::from(y)];
@@ -195,29 +195,29 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_index_changes_nothing(
+        fn the_index_does_not_change_the_result(
             corners in prop::collection::vec(prop::array::uniform2(0..=12_i32), 3..40),
             tolerance in prop::sample::select(&[1e-9, -1e-9, 0.3, -0.3, 1.2][..]),
         ) {
             let vertices: Vec<[f64; 2]> =
                 corners.iter().map(|corner| corner.map(f64::from)).collect();
-            same(&vertices, tolerance);
+            assert_same(&vertices, tolerance);
         }
     }
 
     #[test]
     fn polygons_without_width_or_with_repeated_corners() {
         let line = [[1.0, 3.0], [5.0, 3.0], [9.0, 3.0]];
-        same(&line, 1e-9);
-        same(&line.map(|[x, y]| [y, x]), 1e-9);
-        same(&[[4.0, 4.0]; 3], 1e-9);
-        same(
+        assert_same(&line, 1e-9);
+        assert_same(&line.map(|[x, y]| [y, x]), 1e-9);
+        assert_same(&[[4.0, 4.0]; 3], 1e-9);
+        assert_same(
             &[[2.0, 2.0], [2.0, 2.0], [8.0, 2.0], [8.0, 8.0], [8.0, 8.0]],
             -1e-9,
         );
     }
 
-    /// Edges that are read for a position, at most.
+    /// The largest number of edges read for a position.
     fn most_read(polygon: &Polygon) -> usize {
         let strips = 0..polygon.starts.len() - 1;
         strips

@@ -1,7 +1,7 @@
-//! The cells of a lattice whose centres can lie within a shape, in the order of their points: x fastest,
-//! then y, z.
+//! The candidate cells of a lattice, whose centres can lie within a shape, ordered with x fastest, then y
+//! and z.
 //!
-//! Where the parts of a union are far apart, the cells between them are left out.
+//! The cells between distant parts of a union are excluded.
 
 use std::ops::RangeInclusive;
 
@@ -9,44 +9,45 @@ use crate::problem::Shape;
 
 use super::shape;
 
-/// The share of a cell's edge by which a point may lie outside a shape and still count as within.
+/// Tolerance of containment, as a fraction of the cell edge.
 pub(super) const TOLERANCE: f64 = 1e-9;
 
-/// Cells are numbered by direction with integers that a float holds exactly.
+/// Largest cell number per direction; an `f64` represents it exactly.
 const FARTHEST: f64 = 1e15;
 
-/// More parts than this are not cut apart where they overlap: that would give too many pieces.
+/// Above this number of parts, overlapping parts are merged per direction, to bound the number of spans.
 const MANY_PARTS: usize = 32;
 
 /// The cells whose centres can lie within a shape.
 pub struct Region {
-    layers: Vec<Stretch>,
+    layers: Vec<Span>,
     total: u64,
-    /// The first cell by direction, and one more than the last.
+    /// The bounding box of all candidate cells.
     hull: CellBox,
 }
 
-/// The cells from `first` to `end` − 1 by direction.
+/// The cells `first` to `end` − 1 per direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct CellBox {
     first: [i64; 3],
     end: [i64; 3],
 }
 
-/// Steps along one direction, each with the same cells in the directions before it.
+/// A range of layers along one direction, with equal cells in the lower directions.
 #[derive(Debug)]
-struct Stretch {
+struct Span {
     first: i64,
-    /// Cells of each step.
+    /// Cells per layer.
     each: u64,
-    /// Cells of all steps.
+    /// Cells of all layers.
     all: u64,
-    within: Vec<Stretch>,
+    /// Spans of each layer in the next lower direction.
+    within: Vec<Span>,
 }
 
 impl Region {
-    /// The cells of a lattice that has a corner of a cell at `origin` (m), and those whose centres lie up
-    /// to `margin` edges outside; `None` if some lie too far away to be numbered.
+    /// The candidate cells of a lattice with a cell corner at `origin` (m), enlarged by `margin` edges;
+    /// `None` if some are too far from the origin to be numbered.
     pub fn new(
         shape: &Shape,
         spacing: [f64; 3],
@@ -60,52 +61,52 @@ impl Region {
             .collect::<Option<Vec<CellBox>>>()?;
         let has_cells = |cells: &&CellBox| (0..3).all(|k| cells.first[k] < cells.end[k]);
         let boxes: Vec<&CellBox> = boxes.iter().filter(has_cells).collect();
-        let layers = stretches(&boxes, 2);
-        let most = |pick: fn(i64, i64) -> i64, of: fn(&CellBox) -> [i64; 3]| {
+        let layers = spans_along(&boxes, 2);
+        let extreme = |select: fn(i64, i64) -> i64, of: fn(&CellBox) -> [i64; 3]| {
             let all = boxes.iter().map(|cells| of(cells));
-            all.reduce(|a, b| std::array::from_fn(|k| pick(a[k], b[k])))
+            all.reduce(|a, b| std::array::from_fn(|k| select(a[k], b[k])))
         };
         Some(Self {
             total: sum(&layers),
             layers,
             hull: CellBox {
-                first: most(i64::min, |cells| cells.first).unwrap_or_default(),
-                end: most(i64::max, |cells| cells.end).unwrap_or_default(),
+                first: extreme(i64::min, |cells| cells.first).unwrap_or_default(),
+                end: extreme(i64::max, |cells| cells.end).unwrap_or_default(),
             },
         })
     }
 
-    /// The first and the last of all cells in a direction.
+    /// The first and last cell in a direction.
     pub fn range(&self, direction: usize) -> RangeInclusive<i64> {
         self.hull.first[direction]..=self.hull.end[direction] - 1
     }
 
-    /// Number of cells, at most the largest number there is.
+    /// Number of cells; saturates at `u64::MAX`.
     pub fn total(&self) -> u64 {
         self.total
     }
 
-    /// The cell with this number, from 0.
+    /// The cell with a given index, from 0.
     pub fn cell(&self, index: u64) -> [i64; 3] {
         let mut rest = index;
-        let mut stretches = &self.layers;
+        let mut spans = &self.layers;
         let mut cell = [0; 3];
         for entry in cell.iter_mut().rev() {
             let mut at = 0;
-            while rest >= stretches[at].all {
-                rest -= stretches[at].all;
+            while rest >= spans[at].all {
+                rest -= spans[at].all;
                 at += 1;
             }
-            let stretch = &stretches[at];
-            *entry = stretch.first + (rest / stretch.each) as i64;
-            rest %= stretch.each;
-            stretches = &stretch.within;
+            let span = &spans[at];
+            *entry = span.first + (rest / span.each) as i64;
+            rest %= span.each;
+            spans = &span.within;
         }
         cell
     }
 }
 
-/// Shapes that together hold all of a shape.
+/// Shapes whose union contains the shape.
 fn parts(shape: &Shape) -> Vec<&Shape> {
     match shape {
         Shape::Union(shapes) => shapes.iter().flat_map(parts).collect(),
@@ -114,7 +115,7 @@ fn parts(shape: &Shape) -> Vec<&Shape> {
     }
 }
 
-/// The cells whose centres can lie within a box (m), or so many edges outside.
+/// The cells whose centres can lie within a box (m), enlarged by `margin` edges.
 fn cells(
     (lower, upper): ([f64; 3], [f64; 3]),
     spacing: [f64; 3],
@@ -132,7 +133,7 @@ fn cells(
         if largest > FARTHEST || largest.is_nan() {
             return None;
         }
-        // Twice what counts as within, and what rounding makes of large numbers.
+        // Twice the tolerance of containment, and the round-off of large coordinates.
         let slack = margin + 2.0 * TOLERANCE + 4.0 * f64::EPSILON * largest;
         cells.first[k] = (low - 0.5 - slack).ceil() as i64;
         cells.end[k] = (high - 0.5 + slack).floor() as i64 + 1;
@@ -140,8 +141,8 @@ fn cells(
     Some(cells)
 }
 
-/// The union of some boxes along a direction and those before it.
-fn stretches(boxes: &[&CellBox], direction: usize) -> Vec<Stretch> {
+/// The union of boxes, in the given and the lower directions.
+fn spans_along(boxes: &[&CellBox], direction: usize) -> Vec<Span> {
     let span = |cells: &CellBox| [cells.first[direction], cells.end[direction]];
     let mut spans: Vec<[i64; 2]> = boxes.iter().map(|cells| span(cells)).collect();
     spans.sort_unstable();
@@ -156,13 +157,13 @@ fn stretches(boxes: &[&CellBox], direction: usize) -> Vec<Stretch> {
             let [first, end] = span(cells);
             first < pair[1] && end > pair[0]
         };
-        let here: Vec<&CellBox> = boxes.iter().filter(touches).copied().collect();
+        let touching: Vec<&CellBox> = boxes.iter().filter(touches).copied().collect();
         let within = match direction {
             0 => Vec::new(),
-            _ => stretches(&here, direction - 1),
+            _ => spans_along(&touching, direction - 1),
         };
         let each = if direction == 0 { 1 } else { sum(&within) };
-        (!here.is_empty()).then_some(Stretch {
+        (!touching.is_empty()).then_some(Span {
             first: pair[0],
             each,
             all: each.saturating_mul((pair[1] - pair[0]) as u64),
@@ -172,7 +173,7 @@ fn stretches(boxes: &[&CellBox], direction: usize) -> Vec<Stretch> {
     between.collect()
 }
 
-/// Sorted spans, with those that overlap or touch made one.
+/// Merge sorted spans that overlap or touch.
 fn merged(spans: &[[i64; 2]]) -> Vec<[i64; 2]> {
     let mut merged: Vec<[i64; 2]> = Vec::new();
     for [first, end] in spans {
@@ -184,8 +185,8 @@ fn merged(spans: &[[i64; 2]]) -> Vec<[i64; 2]> {
     merged
 }
 
-fn sum(stretches: &[Stretch]) -> u64 {
-    let all = stretches.iter().map(|stretch| stretch.all);
+fn sum(spans: &[Span]) -> u64 {
+    let all = spans.iter().map(|span| span.all);
     all.fold(0, u64::saturating_add)
 }
 
@@ -206,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_between_the_parts_of_a_union_is_left_out() {
+    fn cells_between_distant_parts_are_excluded() {
         let apart = Shape::Union(vec![cube([0.0; 3], 2.0), cube([1e6, 1e6, 1.0], 2.0)]);
         let region = Region::new(&apart, [1.0; 3], [0.0; 3], 3, 0.0).unwrap();
         assert_eq!(region.total(), 16);
@@ -235,7 +236,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_cell_of_every_part_comes_once_and_in_order(
+        fn every_cell_is_listed_once_and_in_order(
             parts in prop::collection::vec(
                 (prop::array::uniform3(-9..9_i32), 1..5_i32), 1..45,
             ),

@@ -1,13 +1,13 @@
-//! Which points belong to a named set.
+//! Membership of points in named sets.
 
 use crate::problem::{Selector, Set};
 
 use super::shape;
 
-/// The share of the horizon by which a point may lie outside a set's shape and still belong to it.
+/// Tolerance of membership in a shape, as a fraction of the horizon.
 const TOLERANCE: f64 = 1e-9;
 
-/// Whether a point with this id, reference position (m) and body, by index, belongs to the set.
+/// Test whether a point belongs to a set, by its id, reference position (m) and index of body.
 pub fn contains(set: &Set, horizon: f64, id: u64, position: [f64; 3], body: usize) -> bool {
     match &set.selector {
         Selector::All => true,

@@ -1,10 +1,10 @@
-//! Which positions lie within a shape.
+//! Bounding boxes of shapes, and containment of positions.
 
 use nalgebra::Vector3;
 
 use crate::problem::Shape;
 
-/// A box that holds the shape: its lower and upper corner, m. Unbounded directions give ±∞.
+/// The lower and upper corner of a box that contains the shape, m; ±∞ in unbounded directions.
 pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
     match shape {
         Shape::Box { lower, upper } => (*lower, *upper),
@@ -30,8 +30,8 @@ pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
     }
 }
 
-/// Whether a position lies within the shape or less than `tolerance` (m) outside; the tolerance
-/// keeps points on the border from depending on rounding.
+/// Test whether a position lies within the shape or at most `tolerance` (m) outside. The tolerance keeps
+/// points on the boundary despite round-off.
 pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     match shape {
         Shape::Box { lower, upper } => (0..3)
@@ -55,7 +55,7 @@ pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
                 && base.contains([position[0], position[1]], tolerance)
         }
         Shape::Union(parts) => parts.iter().any(|part| contains(part, position, tolerance)),
-        // What is cut away is cut without its border, so that the rest keeps points on the border.
+        // A subtracted shape excludes its own boundary, so the difference keeps points on it.
         Shape::Difference(parts) => {
             contains(&parts[0], position, tolerance)
                 && !parts[1..]
@@ -71,7 +71,7 @@ mod tests {
     use crate::points::Polygon;
 
     #[test]
-    fn borders_belong_to_a_shape_and_to_what_remains_of_it() {
+    fn the_boundary_belongs_to_a_shape_and_to_a_difference() {
         let square = Shape::Box {
             lower: [0.0; 3],
             upper: [1.0, 1.0, 0.0],
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cylinder_ends_at_its_ends() {
+    fn a_cylinder_is_bounded_by_its_ends_and_radius() {
         let cylinder = Shape::Cylinder {
             from: [0.0; 3],
             to: [0.0, 0.0, 2.0],

@@ -1,4 +1,4 @@
-//! The refined grids of a run's bodies, and their points.
+//! The refined grids of all bodies, and their points.
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use crate::points::{LatticeBody, Point, crack};
 use crate::problem::{Kind, PreCrack, Problem, Refinement};
 
 use super::at_coarser::AtCoarser;
+use super::grid_index::{GridIndex, canonical, numbered, parents};
+use super::grid_index_set::GridIndexSet;
 use super::pattern::{Node, Pattern};
-use super::place::{Place, canonical, numbered, parents};
-use super::place_set::PlaceSet;
 
-/// The grids of all bodies, by body; the same on all ranks.
+/// The grids of all bodies; equal on all ranks.
 #[derive(Clone)]
 pub struct Grids<'a> {
     problem: &'a Problem,
@@ -25,27 +25,27 @@ pub struct Grids<'a> {
     bodies: Vec<Option<BodyGrid<'a>>>,
 }
 
-/// The grid of a body that is given as a shape.
+/// The grid of a body defined by a shape.
 #[derive(Clone)]
 struct BodyGrid<'a> {
     cells: Arc<LatticeBody<'a>>,
     pattern: Pattern,
 }
 
-/// A node that is to be refined: body, level, and place in steps of the level.
+/// A node as body, level and grid index.
 pub type NodeKey = [i64; 5];
 
-/// An order of nodes in which finer ones come first.
+/// Sort key of nodes, finer levels first.
 fn finest_first([body, level, x, y, z]: &NodeKey) -> NodeKey {
     [-level, *body, *z, *y, *x]
 }
 
 impl<'a> Grids<'a> {
-    /// Grids in which nothing is refined, of a problem with so many points of level 0 over all ranks; without
-    /// refinement there is none.
+    /// Unrefined grids, or none for a problem without refinement; `coarsest` is the number of level-0 points
+    /// of all ranks.
     ///
     /// # Errors
-    /// When the cells of a body are too far away to be numbered.
+    /// If the cells of a body are too far from the origin to be numbered.
     pub fn new(problem: &'a Problem, coarsest: u64) -> Result<Self> {
         let finest = problem.refinement.as_ref().map_or(0, |r| r.levels);
         let dimension = problem.dimension.count();
@@ -70,22 +70,22 @@ impl<'a> Grids<'a> {
         })
     }
 
-    /// Number of points of level 0 over all ranks; those of finer levels have ids from this on.
+    /// Number of level-0 points of all ranks, the lower bound of the ids of finer points.
     pub fn coarsest(&self) -> u64 {
         self.coarsest
     }
 
-    /// Refines what the problem wants from the start, but for nodes between places that a pre-crack parts;
-    /// `coarse` are this rank's points of level 0. Collective.
+    /// Refine the regions of the problem permanently, and suppress nodes whose parents a pre-crack
+    /// separates. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
-    /// When there is no point in a region; the same on all ranks.
+    /// If a region has no point; equal on all ranks.
     pub fn refine_regions(&mut self, comm: &dyn Communicator, coarse: &[Point]) -> Result<()> {
         let problem = self.problem;
         let Some(refinement) = &problem.refinement else {
             return Ok(());
         };
-        let whole = self.clone();
+        let unrefined = self.clone();
         for region in &refinement.regions {
             for level in 0..region.level {
                 let mut keys: Vec<NodeKey> = Vec::new();
@@ -93,9 +93,9 @@ impl<'a> Grids<'a> {
                     let Some(grid) = &self.bodies[point.block as usize] else {
                         continue;
                     };
-                    grid.for_each_node(point.position, level, &mut |place, position| {
+                    grid.for_each_node(point.position, level, &mut |index, position| {
                         if region.condition.is_true(position, 0.0) {
-                            let [x, y, z] = place;
+                            let [x, y, z] = index;
                             keys.push([i64::from(point.block), i64::from(level), x, y, z]);
                         }
                     });
@@ -113,16 +113,16 @@ impl<'a> Grids<'a> {
             }
         }
         let crosses = |crack: &PreCrack, a, b| crack::crosses(&crack.surface, a, b);
-        self.part(&whole, &|a, b| {
+        self.suppress_separated(&unrefined, &|a, b| {
             problem.cracks.iter().any(|crack| crosses(crack, a, b))
         });
         for grid in self.bodies.iter_mut().flatten() {
-            grid.pattern.make_last();
+            grid.pattern.make_permanent();
         }
         Ok(())
     }
 
-    /// Refines nodes, and what must be refined with them. Returns whether any were not yet.
+    /// Refine nodes and their ancestors. Return true if any was not refined before.
     pub fn refine(&mut self, keys: &[NodeKey]) -> bool {
         let mut changed = false;
         for [body, level, x, y, z] in keys {
@@ -134,42 +134,46 @@ impl<'a> Grids<'a> {
         changed
     }
 
-    /// Makes refined nodes coarse again, but for those that are refined from the start or are needed by finer ones.
-    /// Returns the nodes that are no longer there: body, level of their birth, and place in steps of the
-    /// finest level, the finest level first, each once.
+    /// Coarsen nodes, except permanent ones and parents of refined nodes.
+    ///
+    /// Return the removed nodes once each, finest level first: body, canonical level and index of the
+    /// finest level.
     pub fn coarsen(&mut self, keys: &[NodeKey]) -> Vec<NodeKey> {
         let mut coarse: Vec<NodeKey> = keys.to_vec();
-        // Finer nodes first, for they need the coarser ones.
+        // Finer nodes first, because they block the coarsening of their parents.
         coarse.sort_unstable_by_key(finest_first);
         coarse.retain(|[body, level, x, y, z]| {
             let grid = self.bodies[*body as usize].as_mut();
             grid.is_some_and(|grid| grid.pattern.coarsen(*level as u32, [*x, *y, *z]))
         });
-        let mut left: Vec<NodeKey> = Vec::new();
+        let mut removed: Vec<NodeKey> = Vec::new();
         for [number, level, x, y, z] in coarse {
             let Some(BodyGrid { cells, pattern }) = &self.bodies[number as usize] else {
                 continue;
             };
             let body = |cell| cells.has_cell(cell);
-            let gone = pattern.removed(&body, level as u32, [x, y, z]);
-            left.extend(gone.map(|[x, y, z]| [number, level + 1, x, y, z]));
+            let indices = pattern.removed(&body, level as u32, [x, y, z]);
+            removed.extend(indices.map(|[x, y, z]| [number, level + 1, x, y, z]));
         }
-        left.sort_unstable_by_key(finest_first);
-        left.dedup();
-        left
+        removed.sort_unstable_by_key(finest_first);
+        removed.dedup();
+        removed
     }
 
-    /// What making the refined point of a body at a position (m) coarse means; none if it is not refined, or was
-    /// from the start.
+    /// The node to coarsen for the point of a body at a position (m), if it is refined and not permanent.
     pub fn coarsening(&self, body: usize, position: [f64; 3]) -> Option<NodeKey> {
-        let place = self.place_at(body, position)?;
-        let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(place)?;
+        let index = self.index_at(body, position)?;
+        let (level, [x, y, z]) = self.bodies.get(body)?.as_ref()?.pattern.refined_at(index)?;
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// Of the nodes that have come since an earlier state, takes back those that lie between places (m) which
-    /// are `parted`, and leaves their places without nodes.
-    pub fn part(&mut self, earlier: &Self, parted: &impl Fn([f64; 3], [f64; 3]) -> bool) {
+    /// Suppress the nodes created since `earlier` that have two parents, at positions in m, for which
+    /// `separated` holds.
+    pub fn suppress_separated(
+        &mut self,
+        earlier: &Self,
+        separated: &impl Fn([f64; 3], [f64; 3]) -> bool,
+    ) {
         for (grid, earlier) in self.bodies.iter_mut().zip(&earlier.bodies) {
             let (Some(grid), Some(earlier)) = (grid, earlier) else {
                 continue;
@@ -177,99 +181,99 @@ impl<'a> Grids<'a> {
             for level in 1..=self.finest {
                 let cells = &grid.cells;
                 let body = |cell| cells.has_cell(cell);
-                for place in grid.pattern.born_since(&earlier.pattern, &body, level) {
-                    let parents = parents(place).map(|parent| grid.position(level - 1, parent));
+                for index in grid.pattern.created_since(&earlier.pattern, &body, level) {
+                    let parents = parents(index).map(|parent| grid.position(level - 1, parent));
                     let parents: Vec<[f64; 3]> = parents.collect();
                     let mut pairs = (1..parents.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-                    if pairs.any(|(a, b)| parted(parents[a], parents[b])) {
-                        grid.pattern.part(level, place);
+                    if pairs.any(|(a, b)| separated(parents[a], parents[b])) {
+                        grid.pattern.suppress(level, index);
                     }
                 }
             }
         }
     }
 
-    /// The faces between nodes next to one another between which no node is born: centre (m), edges of the nodes'
-    /// cells (m), and the axis across.
-    pub fn parted_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
+    /// The faces between adjacent nodes at suppressed nodes: centre (m), edges of the nodes' cells (m) and
+    /// axis of the normal.
+    pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
             let Some(grid) = grid else { continue };
-            for (level, place) in grid.pattern.parted() {
-                let mut half_way = (0..3).filter(|k| place[*k] & 1 == 1);
+            for (level, index) in grid.pattern.suppressed() {
+                let mut half_way = (0..3).filter(|k| index[*k] & 1 == 1);
                 let number = self.problem.block_number(body, level - 1, Kind::Whole);
                 if let (Some(axis), None) = (half_way.next(), half_way.next())
                     && let Some(edges) = self.problem.block(number).spacing()
                 {
-                    faces.push((grid.position(level, place), edges, axis));
+                    faces.push((grid.position(level, index), edges, axis));
                 }
             }
         }
         faces
     }
 
-    /// All nodes that are refined, and all places without nodes with the level that they would be born at.
+    /// All refined nodes, and all suppressed nodes by canonical level and index.
     pub fn state(&self) -> [Vec<NodeKey>; 2] {
         let mut state = [Vec::new(), Vec::new()];
         for (body, grid) in (0..).zip(&self.bodies) {
-            let pick = |(level, [x, y, z]): (u32, Place)| [body, i64::from(level), x, y, z];
-            let [refined, parted] = &mut state;
-            refined.extend(
+            let key = |(level, [x, y, z]): (u32, GridIndex)| [body, i64::from(level), x, y, z];
+            let [refined, suppressed] = &mut state;
+            refined.extend(grid.iter().flat_map(|grid| grid.pattern.refined()).map(key));
+            suppressed.extend(
                 grid.iter()
-                    .flat_map(|grid| grid.pattern.refined())
-                    .map(pick),
+                    .flat_map(|grid| grid.pattern.suppressed())
+                    .map(key),
             );
-            parted.extend(grid.iter().flat_map(|grid| grid.pattern.parted()).map(pick));
         }
         state.iter_mut().for_each(|keys| keys.sort_unstable());
         state
     }
 
-    /// Refines to what [`Self::state`] gave. Returns whether anything was not yet.
-    pub fn refine_to(&mut self, [refined, parted]: &[Vec<NodeKey>; 2]) -> bool {
-        for [body, level, x, y, z] in parted {
+    /// Refine to a [`Self::state`]. Return true if any node was not refined before.
+    pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
+        for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
-                grid.pattern.part(*level as u32, [*x, *y, *z]);
+                grid.pattern.suppress(*level as u32, [*x, *y, *z]);
             }
         }
         self.refine(refined)
     }
 
-    /// What refining the point of a block at a position (m) means; none if it is of the finest level.
-    pub fn pick(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
+    /// The node to refine for the point of a block at a position (m), unless it is of the finest level.
+    pub fn refining(&self, block: usize, position: [f64; 3]) -> Option<NodeKey> {
         let level = self.problem.block(block).level;
         if level == self.finest {
             return None;
         }
         let body = self.problem.body_of(block);
         let [x, y, z] = self
-            .place_at(body, position)?
+            .index_at(body, position)?
             .map(|x| x >> (self.finest - level));
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// The place of a point of a body at a position (m), in steps of the finest level.
-    pub fn place_at(&self, body: usize, position: [f64; 3]) -> Option<Place> {
+    /// The index of the finest level at a position (m) in a body.
+    pub fn index_at(&self, body: usize, position: [f64; 3]) -> Option<GridIndex> {
         let grid = self.bodies.get(body)?.as_ref()?;
-        Some(grid.cells.place_at(position, f64::from(1 << self.finest)))
+        Some(grid.cells.index_at(position, f64::from(1 << self.finest)))
     }
 
-    /// Reference position (m) of a place of a body in steps of the finest level, if it is one of level 0.
-    pub fn coarse_position(&self, body: usize, place: Place) -> Option<[f64; 3]> {
+    /// Reference position (m) at an index of the finest level, if it is on the grid of level 0.
+    pub fn coarse_position(&self, body: usize, index: GridIndex) -> Option<[f64; 3]> {
         let grid = self.bodies.get(body)?.as_ref()?;
-        (canonical(self.finest, place).0 == 0).then(|| grid.position(self.finest, place))
+        (canonical(self.finest, index).0 == 0).then(|| grid.position(self.finest, index))
     }
 
-    /// The places, in steps of the finest level, of the points that one lies between.
-    pub fn parents(&self, place: Place) -> Vec<Place> {
-        let (level, place) = canonical(self.finest, place);
+    /// The parents of an index; all are indices of the finest level.
+    pub fn parents(&self, index: GridIndex) -> Vec<GridIndex> {
+        let (level, index) = canonical(self.finest, index);
         let steps = 1 << (self.finest + 1 - level);
-        parents(place)
+        parents(index)
             .map(|parent| parent.map(|x| x * steps))
             .collect()
     }
 
-    /// Points of level 0 as they are without refinement.
+    /// Reset level-0 points to the volume and block that they have without refinement.
     pub fn unrefined(&self, points: impl Iterator<Item = Point>) -> Vec<Point> {
         let unrefined = |mut point: Point| {
             let body = self.problem.body_of(point.block as usize);
@@ -282,8 +286,8 @@ impl<'a> Grids<'a> {
         points.map(unrefined).collect()
     }
 
-    /// The points in the cells of `coarse`, points of level 0 as they are without refinement: those with
-    /// the volume and the block that they have with it, and those of finer levels.
+    /// The points of the cells of `coarse`, which are level-0 points as without refinement: first these with
+    /// updated volumes and blocks, then the finer points.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
         let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
             let grid = grid.as_ref()?;
@@ -303,21 +307,22 @@ impl<'a> Grids<'a> {
             }
             let origin = cell.map(|x| x << self.finest);
             let cell_volume = point.volume;
-            let block = |place, node: &Node| self.block(body, interfaces, grid, place, node);
+            let block = |index, node: &Node| self.block(body, interfaces, grid, index, node);
             let mut finer = Vec::new();
             if grid.pattern.touches(cell) {
-                for part in 1..1_u64 << (self.finest as usize * self.problem.dimension.count()) {
-                    let place = numbered(origin, self.finest, part);
-                    if let Some(node) = grid.node(place) {
-                        let id = point.id + self.coarsest * part;
-                        let block = block(place, &node);
-                        let place = grid.position(self.finest, place);
-                        finer.push(Point::new(id, place, cell_volume * node.share, block));
+                for number in 1..1_u64 << (self.finest as usize * self.problem.dimension.count()) {
+                    let index = numbered(origin, self.finest, number);
+                    if let Some(node) = grid.node(index) {
+                        let id = point.id + self.coarsest * number;
+                        let block = block(index, &node);
+                        let position = grid.position(self.finest, index);
+                        let volume = cell_volume * node.volume_fraction;
+                        finer.push(Point::new(id, position, volume, block));
                     }
                 }
             }
             if let Some(node) = grid.node(origin) {
-                point.volume = cell_volume * node.share;
+                point.volume = cell_volume * node.volume_fraction;
                 point.block = block(origin, &node) as u32;
             }
             Some(finer)
@@ -327,12 +332,12 @@ impl<'a> Grids<'a> {
         coarse
     }
 
-    /// Which nodes of each level from 1 on have coarser ones within their horizon; none where horizons are not
-    /// enlarged for it.
+    /// For each level from 1: the detection of coarser nodes within the horizon. Empty if horizons are not
+    /// enlarged at interfaces.
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
-            // They can share a lattice with the others.
+            // Nodes at interfaces can then share a lattice with the others.
             return Vec::new();
         }
         let of_level = |level| {
@@ -349,14 +354,14 @@ impl<'a> Grids<'a> {
         body: usize,
         interfaces: &[AtCoarser],
         grid: &BodyGrid,
-        place: Place,
+        index: GridIndex,
         node: &Node,
     ) -> usize {
         let cells = &grid.cells;
         let at_coarser = node.level.checked_sub(1).is_some_and(|k| {
-            let place = place.map(|x| x >> (self.finest - node.level));
+            let index = index.map(|x| x >> (self.finest - node.level));
             let interface = interfaces.get(k as usize);
-            interface.is_some_and(|nodes| nodes.has(&|cell| cells.has_cell(cell), place))
+            interface.is_some_and(|nodes| nodes.has(&|cell| cells.has_cell(cell), index))
         });
         let kind = if at_coarser {
             Kind::AtCoarser
@@ -368,48 +373,52 @@ impl<'a> Grids<'a> {
         self.problem.block_number(body, node.level, kind)
     }
 
-    /// Which cells of a body hold points that are other than without refinement, or nodes that are next to them;
-    /// none for a body that is not given as a shape.
-    pub fn changed(&self, body: usize) -> Option<PlaceSet> {
+    /// The cells of a body whose points can differ from those without refinement; `None` for a body without
+    /// a shape.
+    pub fn changed(&self, body: usize) -> Option<GridIndexSet> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.pattern.changed())
     }
 
-    /// The cell of level 0 that a place of a body, in steps of the finest level, lies in.
-    pub fn cell_of(&self, place: Place) -> Place {
-        place.map(|x| x >> self.finest)
+    /// The cell of level 0 that contains an index of the finest level.
+    pub fn cell_of(&self, index: GridIndex) -> GridIndex {
+        index.map(|x| x >> self.finest)
     }
 }
 
 impl BodyGrid<'_> {
-    fn node(&self, place: Place) -> Option<Node> {
+    fn node(&self, index: GridIndex) -> Option<Node> {
         let cells = &self.cells;
-        self.pattern.node(&|cell| cells.has_cell(cell), place)
+        self.pattern.node(&|cell| cells.has_cell(cell), index)
     }
 
-    /// Reference position (m) of a place in steps of a level.
-    fn position(&self, level: u32, place: Place) -> [f64; 3] {
+    /// Reference position (m) at an index of a level.
+    fn position(&self, level: u32, index: GridIndex) -> [f64; 3] {
         let scale = 0.5_f64.powi(level as i32);
-        self.cells.place(place.map(|x| x as f64 * scale))
+        self.cells.position(index.map(|x| x as f64 * scale))
     }
 
-    /// Calls `found` with the place, in steps of a level, and the reference position (m) of each node of
-    /// the level's grid in the cell whose centre is at a position (m).
-    fn for_each_node(&self, centre: [f64; 3], level: u32, found: &mut impl FnMut(Place, [f64; 3])) {
+    /// Call `visit(index, position)` for each node of a level in the cell with a given centre (m).
+    fn for_each_node(
+        &self,
+        centre: [f64; 3],
+        level: u32,
+        visit: &mut impl FnMut(GridIndex, [f64; 3]),
+    ) {
         let cells = &self.cells;
         let cell = cells.cell_at(centre);
         let origin = cell.map(|x| x << level);
         let dimension = self.pattern.dimension();
-        let parts = if level > 0 && self.pattern.touches(cell) {
+        let count = if level > 0 && self.pattern.touches(cell) {
             1_u64 << (level as usize * dimension)
         } else {
             1
         };
         let body = |cell| cells.has_cell(cell);
-        for part in 0..parts {
-            let place = numbered(origin, level, part);
-            if self.pattern.exists(&body, level, place) {
-                found(place, self.position(level, place));
+        for number in 0..count {
+            let index = numbered(origin, level, number);
+            if self.pattern.exists(&body, level, index) {
+                visit(index, self.position(level, index));
             }
         }
     }

@@ -1,51 +1,52 @@
-//! Which nodes of a body are refined, and the nodes that follow.
+//! The refined nodes of a body, and all nodes that follow from them.
 
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
-use super::place::{Place, around, between, canonical, halves, parents};
-use super::place_set::PlaceSet;
+use super::grid_index::{GridIndex, around, between, canonical, halves, parents};
+use super::grid_index_set::GridIndexSet;
 
 /// A node of a refined grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// The level at whose spacing it lies among its neighbours.
+    /// The level of its block: the spacing of its neighbours.
     pub level: u32,
-    /// Volume as a share of that of a cell of level 0.
-    pub share: f64,
-    /// Whether this is just the volume of a cell of its level.
+    /// Volume over that of a cell of level 0.
+    pub volume_fraction: f64,
+    /// The volume is exactly that of a cell of its level.
     pub whole: bool,
 }
 
-/// The refined nodes of a body, by level, in steps of their level's spacing.
+/// The refined nodes of a body, by level, as grid indices of their level.
 ///
-/// `body` says of a cell, by its numbers, whether it is one of the body's. If a node is refined, its
-/// parents are; so neighbouring nodes differ by one level at most. Where a crack has parted the nodes
-/// that a new one would lie between, none is born: its faces are like the sides of the body.
+/// - `body` arguments test whether a cell belongs to the body.
+/// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level.
+/// - Where a crack separates the parents of a new node, the node is suppressed: crack faces act as the
+///   boundary of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pattern {
     dimension: usize,
-    /// One set a level but the finest.
-    refined: Vec<FxHashSet<Place>>,
-    /// Those that stay refined, by level.
-    lasting: Arc<[FxHashSet<Place>]>,
-    /// Places where no node is born, with the level that it would be born at.
-    parted: FxHashSet<(u32, Place)>,
+    /// One set per level, except the finest.
+    refined: Vec<FxHashSet<GridIndex>>,
+    /// Nodes that are never coarsened, by level.
+    permanent: Arc<[FxHashSet<GridIndex>]>,
+    /// Suppressed nodes, by canonical level and index.
+    suppressed: FxHashSet<(u32, GridIndex)>,
 }
 
 impl Pattern {
-    /// Nothing is refined; `finest` is the finest level there can be.
+    /// A pattern without refined nodes and with the finest level `finest`.
     pub fn new(dimension: usize, finest: u32) -> Self {
         Self {
             dimension,
             refined: vec![FxHashSet::default(); finest as usize],
-            lasting: vec![FxHashSet::default(); finest as usize].into(),
-            parted: FxHashSet::default(),
+            permanent: vec![FxHashSet::default(); finest as usize].into(),
+            suppressed: FxHashSet::default(),
         }
     }
 
-    /// The finest level that there can be.
+    /// The finest level.
     pub fn finest(&self) -> u32 {
         self.refined.len() as u32
     }
@@ -55,89 +56,90 @@ impl Pattern {
         self.dimension
     }
 
-    /// Refines a node of a level, given in steps of it; its parents first. A place outside of the body
-    /// stays as it is. Returns whether it was not refined yet.
-    pub fn refine(&mut self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
-        if !self.is_possible(body, level, place) || !self.refined[level as usize].insert(place) {
+    /// Refine a node and its parents, unless no node is possible at the index. Return true if the node was
+    /// not refined before.
+    pub fn refine(
+        &mut self,
+        body: &impl Fn(GridIndex) -> bool,
+        level: u32,
+        index: GridIndex,
+    ) -> bool {
+        if !self.is_possible(body, level, index) || !self.refined[level as usize].insert(index) {
             return false;
         }
         if level > 0 {
-            for parent in parents(place) {
+            for parent in parents(index) {
                 self.refine(body, level - 1, parent);
             }
         }
         true
     }
 
-    /// Makes a refined node of a level, given in steps of it, coarse again, unless it is to last or is needed by
-    /// one of the next level. Returns whether it was refined until now.
-    pub fn coarsen(&mut self, level: u32, place: Place) -> bool {
+    /// Coarsen a node, unless it is permanent or a parent of a refined node. Return true if it was refined.
+    pub fn coarsen(&mut self, level: u32, index: GridIndex) -> bool {
         let finer = level as usize + 1;
         let is_needed = self.refined.get(finer).is_some_and(|finer| {
-            finer.contains(&place.map(|x| 2 * x))
-                || around(place, self.dimension).any(|other| finer.contains(&other))
+            finer.contains(&index.map(|x| 2 * x))
+                || around(index, self.dimension).any(|other| finer.contains(&other))
         });
         let level = level as usize;
-        !is_needed && !self.lasting[level].contains(&place) && self.refined[level].remove(&place)
+        !is_needed && !self.permanent[level].contains(&index) && self.refined[level].remove(&index)
     }
 
-    /// Makes the nodes that are refined now last.
-    pub fn make_last(&mut self) {
-        self.lasting = self.refined.as_slice().into();
+    /// Make all refined nodes permanent.
+    pub fn make_permanent(&mut self) {
+        self.permanent = self.refined.as_slice().into();
     }
 
-    /// The finest level at which a place, in steps of the finest level, is a refined node, if it is not to last
-    /// there.
-    pub fn refined_at(&self, place: Place) -> Option<(u32, Place)> {
+    /// The finest level at which an index of the finest level is a refined node, if it is not permanent.
+    pub fn refined_at(&self, index: GridIndex) -> Option<(u32, GridIndex)> {
         let finest = self.finest();
-        let (birth, _) = canonical(finest, place);
-        let nodes = (birth..finest).map(|level| (level, place.map(|x| x >> (finest - level))));
-        let is_in = |sets: &[FxHashSet<Place>], (level, place): &(u32, Place)| {
-            sets[*level as usize].contains(place)
+        let (coarsest, _) = canonical(finest, index);
+        let nodes = (coarsest..finest).map(|level| (level, index.map(|x| x >> (finest - level))));
+        let is_in = |sets: &[FxHashSet<GridIndex>], (level, index): &(u32, GridIndex)| {
+            sets[*level as usize].contains(index)
         };
         let node = nodes.rev().find(|node| is_in(&self.refined, node));
-        node.filter(|node| !is_in(&self.lasting, node))
+        node.filter(|node| !is_in(&self.permanent, node))
     }
 
-    /// The nodes that a refined one of a level had around it and that are no longer there now that it is coarse,
-    /// in steps of the finest level.
+    /// The nodes removed by the coarsening of a node, as indices of the finest level.
     pub fn removed(
         &self,
-        body: &impl Fn(Place) -> bool,
+        body: &impl Fn(GridIndex) -> bool,
         level: u32,
-        place: Place,
-    ) -> impl Iterator<Item = Place> {
+        index: GridIndex,
+    ) -> impl Iterator<Item = GridIndex> {
         let steps = 1 << (self.finest() - level - 1);
-        around(place, self.dimension)
+        around(index, self.dimension)
             .filter(move |other| {
                 !self.is_taken(level + 1, *other) && self.is_possible(body, level + 1, *other)
             })
             .map(move |other| other.map(|x| x * steps))
     }
 
-    /// The refined nodes with their levels, in no order.
-    pub fn refined(&self) -> impl Iterator<Item = (u32, Place)> {
+    /// The refined nodes with their levels, unordered.
+    pub fn refined(&self) -> impl Iterator<Item = (u32, GridIndex)> {
         let by_level = (0..).zip(&self.refined);
-        by_level.flat_map(|(level, places)| places.iter().map(move |place| (level, *place)))
+        by_level.flat_map(|(level, indices)| indices.iter().map(move |index| (level, *index)))
     }
 
-    /// Whether there is a node at a place, in steps of a level's spacing.
-    pub fn exists(&self, body: &impl Fn(Place) -> bool, level: u32, place: Place) -> bool {
-        self.is_taken(level, place) && self.is_possible(body, level, place)
+    /// Test whether a node exists at an index of a level.
+    pub fn exists(&self, body: &impl Fn(GridIndex) -> bool, level: u32, index: GridIndex) -> bool {
+        self.is_taken(level, index) && self.is_possible(body, level, index)
     }
 
-    /// Whether there is a node at a place, in steps of a level's spacing, if there can be one.
-    fn is_taken(&self, level: u32, place: Place) -> bool {
-        let (level, place) = canonical(level, place);
+    /// Test whether a node exists at an index of a level where one is possible.
+    fn is_taken(&self, level: u32, index: GridIndex) -> bool {
+        let (level, index) = canonical(level, index);
         level == 0 || {
             let refined = &self.refined[level as usize - 1];
-            parents(place).any(|parent| refined.contains(&parent))
+            parents(index).any(|parent| refined.contains(&parent))
         }
     }
 
-    /// Whether there can be nodes within a cell, its lower sides included, beside the one at its centre
-    /// from which it is numbered.
-    pub fn touches(&self, cell: Place) -> bool {
+    /// Test whether a cell, numbered from its centre, can contain nodes beside the one at number 0.
+    pub fn touches(&self, cell: GridIndex) -> bool {
         let Some(refined) = self.refined.first() else {
             return false;
         };
@@ -145,11 +147,10 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The nodes of level 0 that may be other than without refinement, and whose cells, lower sides included, may
-    /// hold finer nodes.
-    pub fn changed(&self) -> PlaceSet {
+    /// The cells whose nodes can differ from those without refinement, or that can contain finer nodes.
+    pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
-        let mut changed = PlaceSet::default();
+        let mut changed = GridIndexSet::default();
         for cell in self.refined.iter().take(1).flatten() {
             let low = std::array::from_fn(|k| cell[k] - step(k));
             let high = std::array::from_fn(|k| cell[k] + step(k));
@@ -158,29 +159,29 @@ impl Pattern {
         changed
     }
 
-    /// What the node at a place is, in steps of the finest level; none if there is no node.
-    pub fn node(&self, body: &impl Fn(Place) -> bool, place: Place) -> Option<Node> {
+    /// The node at an index of the finest level, if it exists.
+    pub fn node(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> Option<Node> {
         let finest = self.finest();
-        if !self.exists(body, finest, place) {
+        if !self.exists(body, finest, index) {
             return None;
         }
-        let (birth, at_birth) = canonical(finest, place);
+        let (coarsest, canonical_index) = canonical(finest, index);
         let dimension = self.dimension as u32;
-        // Volume in units of which the finest cell has 2^dimension: all of this is exact.
+        // Volumes in units of 1/2^dimension of the finest cell are integers, so the arithmetic is exact.
         let cell = |level: u32| 1_u64 << (dimension * (finest + 1 - level));
-        let (mut level, mut volume) = (birth, cell(birth));
+        let (mut level, mut volume) = (coarsest, cell(coarsest));
         let mut complete = true;
-        let mut here = at_birth;
-        for coarse in birth..finest {
+        let mut centre = canonical_index;
+        for coarse in coarsest..finest {
             let (mut taken, mut all) = (0, 0);
-            for other in around(here, self.dimension) {
+            for other in around(centre, self.dimension) {
                 if !self.is_possible(body, coarse + 1, other) {
                     continue;
                 }
                 all += 1;
                 if self.is_taken(coarse + 1, other) {
                     taken += 1;
-                    // Eq. 12: half of the finer volume on an axis, a quarter on a diagonal.
+                    // Eq. 12: subtract half of the finer volume on an axis, a quarter on a diagonal.
                     volume -= cell(coarse + 1) >> halves(other);
                 }
             }
@@ -191,65 +192,64 @@ impl Pattern {
             if taken == 0 {
                 break;
             }
-            here = here.map(|x| 2 * x);
+            centre = centre.map(|x| 2 * x);
         }
         let scale = cell(0) as f64;
         Some(Node {
             level,
-            share: volume as f64 / scale,
+            volume_fraction: volume as f64 / scale,
             whole: volume == cell(level),
         })
     }
 
-    /// Whether there could be a node at a place, in steps of a level's spacing: whether the nodes of level 0
-    /// around it are the body's, and no crack has parted those between which it would be born, or these.
+    /// Test whether a node is possible at an index of a level: all level-0 nodes around it belong to the
+    /// body, and neither it nor an ancestor is suppressed.
     pub(super) fn is_possible(
         &self,
-        body: &impl Fn(Place) -> bool,
+        body: &impl Fn(GridIndex) -> bool,
         level: u32,
-        place: Place,
+        index: GridIndex,
     ) -> bool {
-        if self.parted.is_empty() {
-            let low = place.map(|x| x >> level);
-            let high = place.map(|x| (x + (1 << level) - 1) >> level);
+        if self.suppressed.is_empty() {
+            let low = index.map(|x| x >> level);
+            let high = index.map(|x| (x + (1 << level) - 1) >> level);
             return between(low, high).all(body);
         }
-        let (level, place) = canonical(level, place);
+        let (level, index) = canonical(level, index);
         if level == 0 {
-            return body(place);
+            return body(index);
         }
-        !self.parted.contains(&(level, place))
-            && parents(place).all(|parent| self.is_possible(body, level - 1, parent))
+        !self.suppressed.contains(&(level, index))
+            && parents(index).all(|parent| self.is_possible(body, level - 1, parent))
     }
 
-    /// Leaves a place, in steps of the level that a node there would be born at, without one for ever.
-    pub fn part(&mut self, level: u32, place: Place) {
-        self.parted.insert((level, place));
+    /// Suppress a node for the rest of the run, given by its canonical level and index.
+    pub fn suppress(&mut self, level: u32, index: GridIndex) {
+        self.suppressed.insert((level, index));
     }
 
-    /// The places where no node is born, with the level that it would be born at; in no order.
-    pub fn parted(&self) -> impl Iterator<Item = (u32, Place)> {
-        self.parted.iter().copied()
+    /// The suppressed nodes by canonical level and index, unordered.
+    pub fn suppressed(&self) -> impl Iterator<Item = (u32, GridIndex)> {
+        self.suppressed.iter().copied()
     }
 
-    /// The places, in steps of the level of their birth, of the nodes that have come since an earlier state of
-    /// the pattern, for one such level.
-    pub fn born_since(
+    /// The nodes of one canonical level that exist now but did not in `earlier`, as indices of the level.
+    pub fn created_since(
         &self,
         earlier: &Self,
-        body: &impl Fn(Place) -> bool,
+        body: &impl Fn(GridIndex) -> bool,
         level: u32,
-    ) -> Vec<Place> {
+    ) -> Vec<GridIndex> {
         let coarse = level as usize - 1;
-        let newly = self.refined[coarse].difference(&earlier.refined[coarse]);
-        let places: FxHashSet<Place> = newly
-            .flat_map(|place| around(*place, self.dimension))
-            .filter(|place| canonical(level, *place).0 == level)
-            .filter(|place| {
-                self.exists(body, level, *place) && !earlier.exists(body, level, *place)
+        let added = self.refined[coarse].difference(&earlier.refined[coarse]);
+        let indices: FxHashSet<GridIndex> = added
+            .flat_map(|index| around(*index, self.dimension))
+            .filter(|index| canonical(level, *index).0 == level)
+            .filter(|index| {
+                self.exists(body, level, *index) && !earlier.exists(body, level, *index)
             })
             .collect();
-        places.into_iter().collect()
+        indices.into_iter().collect()
     }
 }
 
@@ -259,41 +259,45 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All nodes of the body by place, in steps of the finest level.
-    fn nodes(pattern: &Pattern, body: &impl Fn(Place) -> bool, edge: i64) -> Vec<(Place, Node)> {
+    /// All nodes of the body by index, in steps of the finest level.
+    fn nodes(
+        pattern: &Pattern,
+        body: &impl Fn(GridIndex) -> bool,
+        edge: i64,
+    ) -> Vec<(GridIndex, Node)> {
         let end = edge << pattern.finest();
         let high = std::array::from_fn(|k| if k < pattern.dimension { end } else { 0 });
         between([0; 3], high)
-            .filter_map(|place| Some((place, pattern.node(body, place)?)))
+            .filter_map(|index| Some((index, pattern.node(body, index)?)))
             .collect()
     }
 
     #[test]
     fn volumes_at_interfaces_are_those_of_the_paper() {
-        // What is taken from the node (0, 0), in volumes of the finer level.
+        // Volume taken from the node (0, 0), in volumes of the finer level.
         let taken = |bottom: i64, refined: &[[i64; 2]]| {
-            let body = |cell: Place| cell[1] >= bottom;
+            let body = |cell: GridIndex| cell[1] >= bottom;
             let mut pattern = Pattern::new(2, 1);
             for [x, y] in refined {
                 pattern.refine(&body, 0, [*x, *y, 0]);
             }
             let node = pattern.node(&body, [0; 3]).unwrap();
-            4.0 * (1.0 - node.share)
+            4.0 * (1.0 - node.volume_fraction)
         };
         assert_eq!(taken(-9, &[]), 0.0);
         assert_eq!(taken(-9, &[[1, 1]]), 0.25);
-        // Two finer nodes and four are there along the edge of a body.
+        // At an edge of the body, the node has two finer neighbours, then four.
         assert_eq!(taken(0, &[[1, 0]]), 0.75);
         assert_eq!(taken(-9, &[[1, 0]]), 1.0);
         assert_eq!(taken(0, &[[1, 0], [0, 1]]), 1.5);
         assert_eq!(taken(-9, &[[1, 0], [0, 1]]), 1.75);
-        // All eight: what is left is a cell of the finer level.
+        // With all eight, a cell of the finer level remains.
         assert_eq!(taken(-9, &[[0, 0]]), 3.0);
     }
 
     #[test]
-    fn a_refined_node_is_of_the_finer_level_at_an_edge_too() {
-        let body = |cell: Place| cell[..2].iter().all(|x| (0..5).contains(x));
+    fn a_refined_node_at_an_edge_has_the_finer_level() {
+        let body = |cell: GridIndex| cell[..2].iter().all(|x| (0..5).contains(x));
         let mut pattern = Pattern::new(2, 2);
         pattern.refine(&body, 0, [0, 2, 0]);
         let node = pattern.node(&body, [0, 8, 0]).unwrap();
@@ -308,90 +312,90 @@ mod tests {
         assert!(!at_coarser(1, 0.5) && at_coarser(1, 0.75));
     }
 
-    /// Refined at random, some nodes twice or three times over, with places where nothing is born.
+    /// Refine randomly up to level `finest`, with suppressed nodes, then coarsen; check volumes and levels.
     fn check(
         (dimension, edge, finest): (usize, i64, u32),
-        holes: &[Place],
-        picks: &[(u32, Place)],
-        parted: &[(u32, Place)],
+        holes: &[GridIndex],
+        selected: &[(u32, GridIndex)],
+        suppressed: &[(u32, GridIndex)],
     ) {
-        let within = |cell: Place| (0..dimension).all(|k| (0..edge).contains(&cell[k]));
-        let body = |cell: Place| within(cell) && !holes.contains(&cell);
+        let within = |cell: GridIndex| (0..dimension).all(|k| (0..edge).contains(&cell[k]));
+        let body = |cell: GridIndex| within(cell) && !holes.contains(&cell);
         let mut pattern = Pattern::new(dimension, finest);
-        for (level, place) in parted {
-            let place = std::array::from_fn(|k| if k < dimension { place[k] } else { 0 });
-            if let (level @ 1.., place) = canonical(level % (finest + 1), place) {
-                pattern.part(level, place);
+        for (level, index) in suppressed {
+            let index = std::array::from_fn(|k| if k < dimension { index[k] } else { 0 });
+            if let (level @ 1.., index) = canonical(level % (finest + 1), index) {
+                pattern.suppress(level, index);
             }
         }
-        for (level, place) in picks {
-            let place = std::array::from_fn(|k| if k < dimension { place[k] } else { 0 });
+        for (level, index) in selected {
+            let index = std::array::from_fn(|k| if k < dimension { index[k] } else { 0 });
             let level = level % finest;
-            if pattern.exists(&body, level, place) {
-                pattern.refine(&body, level, place);
+            if pattern.exists(&body, level, index) {
+                pattern.refine(&body, level, index);
             }
         }
         let high = std::array::from_fn(|k| if k < dimension { edge } else { 0 });
         let cells = between([0; 3], high).filter(|cell| body(*cell)).count() as f64;
         let is_sound = |pattern: &Pattern| {
             let nodes = nodes(pattern, &body, edge);
-            let volume: f64 = nodes.iter().map(|(_, node)| node.share).sum();
+            let volume: f64 = nodes.iter().map(|(_, node)| node.volume_fraction).sum();
             assert!((volume / cells - 1.0).abs() < 1e-13, "{volume} for {cells}");
-            for (place, node) in &nodes {
-                assert!(node.share > 0.0, "{place:?}: {node:?}");
+            for (index, node) in &nodes {
+                assert!(node.volume_fraction > 0.0, "{index:?}: {node:?}");
             }
-            for (level, place) in pattern.refined() {
-                assert!(pattern.exists(&body, level, place));
-                for parent in parents(place).filter(|_| level > 0) {
+            for (level, index) in pattern.refined() {
+                assert!(pattern.exists(&body, level, index));
+                for parent in parents(index).filter(|_| level > 0) {
                     assert!(pattern.refined[level as usize - 1].contains(&parent));
                 }
             }
-            // A node and the next one in a row differ by one level at most, if no crack lies between them.
-            for (place, node) in &nodes {
-                for k in (0..dimension).filter(|_| parted.is_empty()) {
+            // Adjacent nodes differ by at most one level, unless nodes are suppressed.
+            for (index, node) in &nodes {
+                for k in (0..dimension).filter(|_| suppressed.is_empty()) {
                     let next = (1..=1 << finest).find_map(|step| {
-                        let mut other = *place;
+                        let mut other = *index;
                         other[k] += step;
                         pattern.node(&body, other)
                     });
                     if let Some(next) = next {
-                        assert!(node.level.abs_diff(next.level) <= 1, "{place:?} {k}");
+                        assert!(node.level.abs_diff(next.level) <= 1, "{index:?} {k}");
                     }
                 }
             }
             nodes
         };
         let mut before = is_sound(&pattern);
-        // Some of what was refined becomes coarse again, then the rest of it.
+        // Coarsen every third refined node, then the rest.
         for every in [3, 1] {
-            let mut refined: Vec<(u32, Place)> = pattern.refined().collect();
-            refined.sort_unstable_by_key(|(level, place)| (std::cmp::Reverse(*level), *place));
+            let mut refined: Vec<(u32, GridIndex)> = pattern.refined().collect();
+            refined.sort_unstable_by_key(|(level, index)| (std::cmp::Reverse(*level), *index));
             let earlier = pattern.clone();
             let coarse = refined.into_iter().step_by(every);
-            let coarse: Vec<(u32, Place)> = coarse
-                .filter(|(level, place)| pattern.coarsen(*level, *place))
+            let coarse: Vec<(u32, GridIndex)> = coarse
+                .filter(|(level, index)| pattern.coarsen(*level, *index))
                 .collect();
-            let left = coarse
+            let removed = coarse
                 .iter()
-                .flat_map(|(level, place)| pattern.removed(&body, *level, *place));
-            let left: FxHashSet<Place> = left.collect();
+                .flat_map(|(level, index)| pattern.removed(&body, *level, *index));
+            let removed: FxHashSet<GridIndex> = removed.collect();
             let after = is_sound(&pattern);
-            let stays = |(place, _): &&(Place, Node)| !left.contains(place);
-            let places = |nodes: Vec<&(Place, Node)>| -> Vec<Place> {
-                nodes.into_iter().map(|(place, _)| *place).collect()
+            let remains = |(index, _): &&(GridIndex, Node)| !removed.contains(index);
+            let indices = |nodes: Vec<&(GridIndex, Node)>| -> Vec<GridIndex> {
+                nodes.into_iter().map(|(index, _)| *index).collect()
             };
-            let stayed = places(before.iter().filter(stays).collect());
-            assert_eq!(stayed, places(after.iter().collect()));
-            // Those that leave have their whole cell to give, but for finer ones that leave with them.
-            for (place, node) in before.iter().filter(|node| !stays(node)) {
-                let (level, _) = canonical(finest, *place);
-                let alone = 0.5_f64.powi((level * dimension as u32) as i32);
-                let finer = around_by_half(level, finest, *place, dimension);
+            let remaining = indices(before.iter().filter(remains).collect());
+            assert_eq!(remaining, indices(after.iter().collect()));
+            // A removed node has the volume of a cell of its level, unless finer nodes are removed with it.
+            for (index, node) in before.iter().filter(|node| !remains(node)) {
+                let (level, _) = canonical(finest, *index);
+                let cell = 0.5_f64.powi((level * dimension as u32) as i32);
+                let finer = around_by_half(level, finest, *index, dimension);
                 if finer
                     .iter()
                     .all(|other| earlier.node(&body, *other).is_none())
                 {
-                    assert_eq!((node.level, node.share), (level, alone));
+                    assert_eq!((node.level, node.volume_fraction), (level, cell));
                 }
             }
             before = after;
@@ -399,14 +403,19 @@ mod tests {
         assert_eq!(before.len() as f64, cells);
     }
 
-    /// The places half a step of a level around a place, in steps of the finest level.
-    fn around_by_half(level: u32, finest: u32, place: Place, dimension: usize) -> Vec<Place> {
+    /// The indices at half a step of a level around an index, all of the finest level.
+    fn around_by_half(
+        level: u32,
+        finest: u32,
+        index: GridIndex,
+        dimension: usize,
+    ) -> Vec<GridIndex> {
         if level == finest {
             return Vec::new();
         }
         let scale = 1 << (finest - level - 1);
-        let here = place.map(|x| x >> (finest - level));
-        around(here, dimension)
+        let centre = index.map(|x| x >> (finest - level));
+        around(centre, dimension)
             .map(|other| other.map(|x| x * scale))
             .collect()
     }
@@ -415,23 +424,23 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
-        fn volume_is_kept_in_the_plane(
+        fn volume_is_conserved_in_2d(
             holes in prop::collection::vec([0_i64..7, 0_i64..7, 0_i64..1], 0..6),
-            picks in prop::collection::vec((0_u32..3, [0_i64..28, 0_i64..28, 0_i64..1]), 0..40),
-            parted in prop::collection::vec((1_u32..4, [0_i64..28, 0_i64..28, 0_i64..1]), 1..20),
+            selected in prop::collection::vec((0_u32..3, [0_i64..28, 0_i64..28, 0_i64..1]), 0..40),
+            suppressed in prop::collection::vec((1_u32..4, [0_i64..28, 0_i64..28, 0_i64..1]), 1..20),
         ) {
-            check((2, 7, 3), &holes, &picks, &[]);
-            check((2, 7, 3), &holes, &picks, &parted);
+            check((2, 7, 3), &holes, &selected, &[]);
+            check((2, 7, 3), &holes, &selected, &suppressed);
         }
 
         #[test]
-        fn volume_is_kept_in_space(
+        fn volume_is_conserved_in_3d(
             holes in prop::collection::vec([0_i64..4, 0_i64..4, 0_i64..4], 0..6),
-            picks in prop::collection::vec((0_u32..2, [0_i64..8, 0_i64..8, 0_i64..8]), 0..12),
-            parted in prop::collection::vec((1_u32..3, [0_i64..8, 0_i64..8, 0_i64..8]), 1..12),
+            selected in prop::collection::vec((0_u32..2, [0_i64..8, 0_i64..8, 0_i64..8]), 0..12),
+            suppressed in prop::collection::vec((1_u32..3, [0_i64..8, 0_i64..8, 0_i64..8]), 1..12),
         ) {
-            check((3, 4, 2), &holes, &picks, &[]);
-            check((3, 4, 2), &holes, &picks, &parted);
+            check((3, 4, 2), &holes, &selected, &[]);
+            check((3, 4, 2), &holes, &selected, &suppressed);
         }
     }
 }

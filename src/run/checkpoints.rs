@@ -63,7 +63,7 @@ impl CheckpointWriter {
         recorder: &mut Recorder<'_>,
     ) -> Result<Duration> {
         let begin = Instant::now();
-        recorder.confirm()?;
+        recorder.sync()?;
         let header = Header {
             number: simulation.clock.number(),
             step: simulation.clock.step(),

@@ -248,7 +248,7 @@ impl<'a> Recorder<'a> {
         simulation: &mut Simulation<'_, D>,
     ) -> Result<()> {
         if self.outputs.is_due(&simulation.clock) {
-            self.confirm()
+            self.sync()
         } else {
             self.write(simulation, true, false)
         }
@@ -268,9 +268,9 @@ impl<'a> Recorder<'a> {
     ///
     /// # Errors
     /// When the disc is full.
-    pub fn confirm(&mut self) -> Result<()> {
+    pub fn sync(&mut self) -> Result<()> {
         self.write_rows()?;
-        self.file.confirm()
+        self.file.sync()
     }
 
     fn write_rows(&mut self) -> Result<()> {

@@ -1,4 +1,4 @@
-//! Mass, volume and centre of each body, and whether its points fill it.
+//! Mass, volume and centre of each body, and a check of its volume.
 
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
@@ -7,13 +7,13 @@ use crate::points::{LatticeBody, distance_squared};
 use crate::problem::{PointSource, Problem};
 use crate::solver::Simulation;
 
-/// The share of a shape's volume by which that of its points may differ without a warning.
+/// Relative difference between the volumes of points and shape above which a warning is printed.
 const VOLUME_SLACK: f64 = 5e-3;
 
-/// The factor by which the volume of a file's points may differ from the cube of their distance.
+/// Ratio between the mean volume of a file's points and their spacing³ above which a warning is printed.
 const VOLUME_FACTOR: f64 = 10.0;
 
-/// What the points of a body come to.
+/// Figures of a body's points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyFigures {
     /// Number of points.
@@ -24,13 +24,13 @@ pub struct BodyFigures {
     pub mass: f64,
     /// Centre of mass, m.
     pub centre: [f64; 3],
-    /// Volume (m³) of its shape less that of later bodies, if it is made from one.
+    /// Volume of the shape without later bodies, m³; `None` for points from a file.
     pub shape_volume: Option<f64>,
-    /// Mean distance of points from file to their nearest neighbours, m; 0 without neighbours.
+    /// Mean distance to the nearest neighbour for points from a file, m; 0 without neighbours.
     pub spacing: f64,
 }
 
-/// The figures of all bodies, and warnings about volumes that do not fit. Collective.
+/// The figures of all bodies, with warnings of inconsistent volumes. Collective.
 pub fn figures<const D: usize>(
     simulation: &Simulation<'_, D>,
     warnings: &mut Vec<Warning>,
@@ -38,7 +38,7 @@ pub fn figures<const D: usize>(
     let (problem, model) = (simulation.problem, &simulation.model);
     let nearest = nearest_neighbours(simulation);
     let mut counts = vec![0; 2 * problem.bodies.len()];
-    // Volume, its moments by direction, and the distance to the nearest neighbour.
+    // Volume, its first moments, and the distance to the nearest neighbour.
     let mut sums = vec![ExactSum::ZERO; 5 * problem.bodies.len()];
     for point in 0..model.owned() {
         let body = problem.body_of(usize::from(model.block[point]));
@@ -65,7 +65,7 @@ pub fn figures<const D: usize>(
     });
     let figures: Vec<BodyFigures> = figures.collect();
     for (index, body) in figures.iter().enumerate() {
-        warnings.extend(volume_doubt(problem, index, body));
+        warnings.extend(volume_warning(problem, index, body));
     }
     figures
 }
@@ -75,8 +75,7 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
     Some(lattice.shape_volume())
 }
 
-/// The distance (m) of each owned point to the nearest one that it is bonded to; of no point where no body
-/// has its points from a file.
+/// Distance (m) of each owned point to its nearest bonded neighbour; empty if no body comes from a file.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let from_file = |body: &crate::problem::Body| matches!(body.points, PointSource::File { .. });
@@ -84,15 +83,15 @@ fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64
         return Vec::new();
     }
     let mut squares = vec![f64::INFINITY; model.owned()];
-    simulation.forces.for_each_intact(|here, there| {
-        let square = distance_squared(model.position(here), model.position(there));
-        squares[here] = squares[here].min(square);
+    simulation.forces.for_each_intact(|i, j| {
+        let square = distance_squared(model.position(i), model.position(j));
+        squares[i] = squares[i].min(square);
     });
     squares.into_iter().map(f64::sqrt).collect()
 }
 
-/// A warning if the points of a body do not fill it, or fill more.
-fn volume_doubt(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
+/// The warning of a body whose points have another volume than its shape or spacing.
+fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {
         let excess = figures.volume / volume - 1.0;
@@ -120,9 +119,9 @@ fn volume_doubt(problem: &Problem, index: usize, figures: &BodyFigures) -> Optio
             body.name, figures.spacing
         )
     };
-    let place = match &body.points {
+    let span = match &body.points {
         PointSource::Lattice { .. } => &body.span,
         PointSource::File { span, .. } => span,
     };
-    Some(Warning::new(message).at(place))
+    Some(Warning::new(message).at(span))
 }

@@ -1,39 +1,38 @@
-//! What a body is like far from its surface: a small block of its lattice, bonded and stretched.
+//! Discrete properties of a body away from its surface, computed on a small block of its lattice.
 
 use crate::comm::threads;
 use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
-use crate::problem::single_body::{alone, fill};
+use crate::problem::single_body::{fill, single_body};
 use crate::problem::{PointSource, Problem, Shape};
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 use crate::solver::bonds::BondUpdate;
 use crate::solver::observers::nearest;
 
-/// Blocks with more bonds than this are not made.
-const MOST_BONDS: f64 = 2e7;
+/// Maximum number of bonds of a block.
+const MAX_BONDS: f64 = 2e7;
 
-/// A strain so small that what is not linear in it does not count, and rounding does not either.
+/// Strain at which both nonlinear terms and round-off are negligible.
 const STRAIN: f64 = 1e-6;
 
-/// A point of a body that has all of its neighbours.
+/// Properties of a point with a complete family.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interior {
-    /// Number of its bonds.
+    /// Number of neighbours.
     pub neighbours: u32,
-    /// The largest step that is sure to be stable there, s.
+    /// Guaranteed stable step, s.
     pub stable_step: f64,
-    /// Stiffness against expansion by its own strain energy, Pa: the bulk modulus in 3-D, in the plane
-    /// and in 1-D the modulus of an expansion in as many directions.
+    /// Modulus of isotropic expansion in the dimensions of the problem, from the strain energy, Pa; in 3-D,
+    /// the bulk modulus.
     pub bulk: f64,
-    /// Shear modulus of a shear along the axes of the grid and along its diagonals, Pa; none in 1-D.
+    /// Shear moduli along the axes and along the diagonals of the grid, Pa; `None` in 1-D.
     pub shear: Option<[f64; 2]>,
-    /// What both should be, Pa.
-    pub wanted: [f64; 2],
+    /// Exact values of both moduli, Pa.
+    pub exact: [f64; 2],
 }
 
-/// A point within a body of a lattice, with no other body near; `None` for points from a file and for
-/// families too large for a block of them.
+/// The interior of a lattice body; `None` for points from a file and for families too large for a block.
 pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     let block = block(problem, body)?;
     match problem.dimension.count() {
@@ -43,9 +42,9 @@ pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
     }
 }
 
-/// The problem of a block that has one point with all of its neighbours.
+/// The problem of a block with at least one complete family.
 fn block(problem: &Problem, body: usize) -> Option<Problem> {
-    let (mut block, spacing) = alone(problem, body)?;
+    let (mut block, spacing) = single_body(problem, body)?;
     block.bodies[0].damage = None;
     let cutoff = cutoffs(&block)[0];
     let (mut upper, mut bonds) = ([0.0; 3], 1.0);
@@ -55,7 +54,7 @@ fn block(problem: &Problem, body: usize) -> Option<Problem> {
         bonds *= cells * cells * f64::from(problem.quadrature.points(1)).powi(2);
     }
     fill(&mut block, [[0.0; 3], upper], spacing, [0.0; 3]);
-    (bonds < MOST_BONDS).then_some(block)
+    (bonds < MAX_BONDS).then_some(block)
 }
 
 fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
@@ -70,11 +69,12 @@ fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
     };
     let middle = nearest(&simulation, upper.map(|x| 0.5 * x)).own?;
     let stable_step = simulation.stable_step;
-    let neighbours = stored(&mut simulation, middle, [[0.0; D]; D]).1;
-    // Both signs, so that what is odd in the strain drops out.
+    let neighbours = energy_and_bonds(&mut simulation, middle, [[0.0; D]; D]).1;
+    // Average over both signs, so odd terms in the strain cancel.
     let mut energy = |gradient: [[f64; D]; D]| {
-        let turned = gradient.map(|row| row.map(|entry| -entry));
-        let [a, b] = [gradient, turned].map(|gradient| stored(&mut simulation, middle, gradient).0);
+        let negative = gradient.map(|row| row.map(|entry| -entry));
+        let [a, b] = [gradient, negative]
+            .map(|gradient| energy_and_bonds(&mut simulation, middle, gradient).0);
         0.5 * (a + b) / (STRAIN * STRAIN)
     };
     let one = |row: usize, column: usize| f64::from(u8::from(row == column));
@@ -94,16 +94,16 @@ fn measure<const D: usize>(block: &Problem) -> Option<Interior> {
         stable_step,
         bulk: 2.0 * expansion / (D * D) as f64,
         shear,
-        wanted: [
+        exact: [
             bulk_modulus(block.dimension, elastic),
             elastic.shear_modulus(),
         ],
     })
 }
 
-/// Strain energy density (J/m³) and intact bonds of a point where the displacement gradient is
-/// everywhere the same multiple of the [`STRAIN`].
-fn stored<const D: usize>(
+/// Strain energy density (J/m³) and number of intact bonds of a point under the uniform displacement
+/// gradient `gradient` × [`STRAIN`].
+fn energy_and_bonds<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     point: usize,
     gradient: [[f64; D]; D],
@@ -111,8 +111,8 @@ fn stored<const D: usize>(
     let model = &simulation.model;
     for (row, field) in gradient.iter().zip(&mut simulation.fields.displacement) {
         for (entry, values) in field.iter_mut().enumerate() {
-            let place = model.position(entry);
-            *values = STRAIN * (0..D).map(|d| row[d] * place[d]).sum::<f64>();
+            let position = model.position(entry);
+            *values = STRAIN * (0..D).map(|d| row[d] * position[d]).sum::<f64>();
         }
     }
     simulation.evaluate(BondUpdate::None);
@@ -120,7 +120,7 @@ fn stored<const D: usize>(
     (stored.energy[point], stored.neighbours[point] as u32)
 }
 
-/// Twice the classical energy density of an expansion θ in the setting's directions, by θ² (Pa).
+/// Modulus of isotropic expansion, Pa: 2 W/θ², where W is the classical energy density at dilatation θ.
 fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
     let (bulk, shear) = (elastic.bulk_modulus(), elastic.shear_modulus());
     match dimension {

@@ -1,4 +1,4 @@
-//! Loads and supports that do not do what they seem to.
+//! Warnings of loads and supports without the intended effect.
 
 use std::collections::HashSet;
 
@@ -14,15 +14,18 @@ use crate::solver::conditions::members;
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// How many times the depth of a load the layer that it acts on may be thick or thin: a round layer of
-/// one cell is π/2 cells thick.
-const THICKER: f64 = 1.8;
+/// Ratio between the thickness of a loaded layer and the load's depth above which a warning is printed.
+/// A curved layer of one cell is up to π/2 cells thick.
+const MAX_THICKNESS_RATIO: f64 = 1.8;
 
-/// Layers with more points than this are not looked at.
+/// Maximum number of points of a layer that is checked.
 const LARGE_LAYER: u64 = 4_000_000;
 
-/// Adds a warning for each of them. Collective.
-pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
+/// Check all conditions and append warnings. Collective.
+pub fn check_conditions<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    warnings: &mut Vec<Warning>,
+) {
     let problem = simulation.problem;
     let points: Vec<Vec<u32>> = problem
         .conditions
@@ -36,7 +39,7 @@ pub fn doubts<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec
             layer(simulation, condition, depth, points, warnings);
         }
     }
-    against_the_surface(simulation, &points, warnings);
+    inward_normals(simulation, &points, warnings);
 }
 
 fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
@@ -47,7 +50,7 @@ fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
     warnings.push(Warning::new(message).at(&condition.place));
 }
 
-/// What a condition prescribes of the motion, by component; `None` for loads.
+/// The components of the motion that a condition prescribes; `None` for loads.
 fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     match &condition.action {
         Action::Displacement(values) | Action::Velocity(values) => Some(values),
@@ -55,7 +58,7 @@ fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     }
 }
 
-/// Motions of which a later one takes the place, unless it is the same.
+/// Warn of prescribed motions that a later, different one overrides.
 fn twice_prescribed<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
@@ -94,7 +97,7 @@ fn twice_prescribed<const D: usize>(
     }
 }
 
-/// Loads that are 0, or act only where the motion is prescribed.
+/// Warn of loads that are 0 or act only on points with prescribed motion.
 fn without_effect<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
@@ -115,17 +118,17 @@ fn without_effect<const D: usize>(
             warn(condition, "is 0, so it does nothing", warnings);
             continue;
         }
-        let is_held = |point: &u32, d: usize| {
+        let is_prescribed = |point: &u32, d: usize| {
             problem
                 .conditions
                 .iter()
                 .zip(points)
                 .any(|(other, others)| {
-                    let holds = motion(other).is_some_and(|motion| motion[d].is_some());
-                    holds && others.binary_search(point).is_ok()
+                    let prescribes = motion(other).is_some_and(|motion| motion[d].is_some());
+                    prescribes && others.binary_search(point).is_ok()
                 })
         };
-        let is_free = |point: &&u32| acts.iter().any(|d| !is_held(point, *d));
+        let is_free = |point: &&u32| acts.iter().any(|d| !is_prescribed(point, *d));
         let free = own.iter().filter(is_free).count();
         if total(simulation.comm, free as u64) == 0 {
             let words = "acts only where supports prescribe the motion, so it moves nothing";
@@ -134,7 +137,7 @@ fn without_effect<const D: usize>(
     }
 }
 
-/// A traction or pressure that is divided by another depth than that of the layer it acts on.
+/// Warn of a traction or pressure whose depth differs from the thickness of its layer.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,
@@ -146,7 +149,7 @@ fn layer<const D: usize>(
     if total(comm, points.len() as u64) > LARGE_LAYER {
         return;
     }
-    // Rank 0 looks at all points of the layer: body and cell of each.
+    // Gather body and cell of all points of the layer on rank 0.
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
         let body = problem.body_of(usize::from(model.block[*point as usize]));
@@ -166,13 +169,13 @@ fn layer<const D: usize>(
         .map(|cell| [cell[0], cell[1], cell[2], cell[3]])
         .collect();
     let thickness = thickness::<D>(problem, &cells, depth);
-    let mut known = thickness.map_or(Vec::new(), |thickness| thickness.to_le_bytes().to_vec());
-    comm.broadcast(0, &mut known);
-    let Ok(bytes) = <[u8; 8]>::try_from(&known[..]) else {
+    let mut packed = thickness.map_or(Vec::new(), |thickness| thickness.to_le_bytes().to_vec());
+    comm.broadcast(0, &mut packed);
+    let Ok(bytes) = <[u8; 8]>::try_from(&packed[..]) else {
         return;
     };
     let thickness = f64::from_le_bytes(bytes);
-    if !(THICKER.recip()..THICKER).contains(&(thickness / depth)) {
+    if !(MAX_THICKNESS_RATIO.recip()..MAX_THICKNESS_RATIO).contains(&(thickness / depth)) {
         let words = format!(
             "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give \
              the layer's `depth`",
@@ -182,16 +185,16 @@ fn layer<const D: usize>(
     }
 }
 
-/// The edges (m) of the cells of a body; of one from a file the given length.
-fn edges(problem: &Problem, body: usize, otherwise: f64) -> [f64; 3] {
+/// The cell edges of a body, m; `default` for points from a file.
+fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     match &problem.bodies[body].points {
         PointSource::Lattice { spacing, .. } => *spacing,
-        PointSource::File { .. } => [otherwise; 3],
+        PointSource::File { .. } => [default; 3],
     }
 }
 
-/// The mean length (m) of the rows of adjacent cells in the direction in which they are shortest, of the
-/// body for which it differs most from `depth` (m); `None` without cells.
+/// Thickness of a layer, m: the mean length of rows of adjacent cells in the direction of shortest rows.
+/// Of several bodies, the thickness farthest from `depth` (m); `None` without cells.
 fn thickness<const D: usize>(
     problem: &Problem,
     cells: &HashSet<[i64; 4]>,
@@ -217,8 +220,8 @@ fn thickness<const D: usize>(
         .max_by(|a, b| difference(a).total_cmp(&difference(b)))
 }
 
-/// Pressures whose normal points into the body.
-fn against_the_surface<const D: usize>(
+/// Warn of pressures whose normal points into the body.
+fn inward_normals<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
     warnings: &mut Vec<Warning>,
@@ -228,13 +231,13 @@ fn against_the_surface<const D: usize>(
     if !problem.conditions.iter().any(is_pressure) {
         return;
     }
-    // Where the neighbours of each point lie: a sum of unit vectors.
-    let mut towards = vec![[0.0; 3]; model.owned()];
-    simulation.forces.for_each_intact(|here, there| {
-        let (a, b) = (model.position(here), model.position(there));
+    // Sum of the unit vectors to the neighbours of each point.
+    let mut inward = vec![[0.0; 3]; model.owned()];
+    simulation.forces.for_each_intact(|i, j| {
+        let (a, b) = (model.position(i), model.position(j));
         let along: [f64; 3] = std::array::from_fn(|k| b[k] - a[k]);
         let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
-        (0..3).for_each(|k| towards[here][k] += along[k] / length);
+        (0..3).for_each(|k| inward[i][k] += along[k] / length);
     });
     for (condition, points) in problem.conditions.iter().zip(points) {
         let Action::BodyForce(_, factors) = &condition.action else {
@@ -243,11 +246,11 @@ fn against_the_surface<const D: usize>(
         if !is_pressure(condition) {
             continue;
         }
-        // The factors are the normal, turned round and divided by the depth.
+        // The factors are −normal/depth.
         let mut sum = [ExactSum::ZERO];
         for point in points {
-            let towards = towards[*point as usize];
-            sum[0].add((0..D).map(|d| -factors[d] * towards[d]).sum());
+            let inward = inward[*point as usize];
+            sum[0].add((0..D).map(|d| -factors[d] * inward[d]).sum());
         }
         if reduce(simulation.comm, &mut sum)[0] > 0.0 {
             let words =

@@ -1,15 +1,15 @@
-//! The memory of this process as the system counts it.
+//! Resident memory of this process.
 
-/// What of this process is in memory, bytes.
+/// Resident memory, bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Resident {
-    /// Now.
+    /// Current.
     pub now: f64,
-    /// The most that there has been.
+    /// Peak.
     pub peak: f64,
 }
 
-/// What of this process is in memory; NaN where the system does not tell (Linux does).
+/// Read the resident memory; NaN on systems other than Linux.
 pub fn resident() -> Resident {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let entry = |name: &str| {
@@ -23,9 +23,8 @@ pub fn resident() -> Resident {
     }
 }
 
-/// Forgets the most that there has been, and returns what is in memory now, bytes; `None` where the system
-/// cannot forget (Linux can).
-pub fn forget_peak() -> Option<f64> {
+/// Reset the peak and return the current resident memory, bytes; `None` on systems other than Linux.
+pub fn reset_peak() -> Option<f64> {
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     Some(resident().now)
 }
@@ -35,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_to_is_counted() {
+    fn written_memory_is_resident() {
         let before = resident();
         let block = std::hint::black_box(vec![1_u8; 64 << 20]);
         let after = resident();

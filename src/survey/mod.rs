@@ -1,20 +1,19 @@
-//! What stands ready before the first step of a run: figures of its bodies, cracks, probes and sets, and
-//! warnings about what a deck may say but most likely does not mean. `check` and the start of a run say
-//! the same.
+//! Checks before the first step: figures of bodies, cracks, probes and sets, and warnings of likely
+//! mistakes. `check` and the start of a run print the same.
 
 mod bodies;
 mod cost;
+mod dry_run;
 mod interior;
 mod loads;
-mod look;
 pub mod memory;
 mod size;
 mod speed;
 
 pub use bodies::BodyFigures;
 pub use cost::{Cost, Measured, ghost_share};
+pub use dry_run::{DryRun, dry_run};
 pub use interior::{Interior, interior};
-pub use look::{Look, look};
 pub use size::{Size, size};
 pub use speed::{Speed, speed};
 
@@ -28,38 +27,38 @@ use crate::solver::assign::block_laws;
 use crate::solver::conditions::members;
 use crate::solver::observers::{Nearest, nearest};
 
-/// Fewest bonds of a point, by dimension, below which it is poorly held: half of a family at a horizon
-/// of two spacings.
+/// Number of intact bonds, by dimension, below which a point is weakly bonded: half of a family at a
+/// horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
-/// Horizons in spacings that are in common use.
+/// Common horizons, in spacings.
 const USUAL_HORIZONS: std::ops::RangeInclusive<f64> = 1.999..=8.001;
 
-/// Runs of more steps than this take weeks, however small they are.
+/// Number of steps above which even small runs take weeks.
 const MANY_STEPS: u64 = 1_000_000_000;
 
-/// The largest stretch at which bonds of a solid are expected to break.
+/// Critical stretch above which a warning is printed.
 const LARGEST_STRETCH: f64 = 1.0;
 
-/// The figures and warnings of a run; the same on all ranks.
+/// The figures and warnings of a run; equal on all ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
-    /// Of each body.
+    /// Figures of each body.
     pub bodies: Vec<BodyFigures>,
-    /// Bonds between each two bodies that have any, by the lower index first.
+    /// Number of bonds of each bonded pair of bodies, lower index first.
     pub joints: Vec<([usize; 2], u64)>,
-    /// Bonds that each pre-crack cuts.
+    /// Number of bonds cut by each pre-crack.
     pub cuts: Vec<u64>,
-    /// The point that each probe follows.
+    /// The point of each probe.
     pub probes: Vec<Nearest>,
     /// Number of points of each set.
     pub sets: Vec<u64>,
-    /// What is allowed but most likely not meant.
+    /// Warnings of likely mistakes, most with a place in the deck.
     pub warnings: Vec<Warning>,
 }
 
 impl Survey {
-    /// Looks at a run before its first step. Collective.
+    /// Survey a run before its first step. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let mut warnings = problem.warnings.clone();
@@ -81,7 +80,7 @@ impl Survey {
         }
         let sets = sets(simulation, &mut warnings);
         let probes = probes(simulation, &mut warnings);
-        loads::doubts(simulation, &mut warnings);
+        loads::check_conditions(simulation, &mut warnings);
         few_neighbours(simulation, &mut warnings);
         time(simulation, &mut warnings);
         Self {
@@ -95,18 +94,18 @@ impl Survey {
     }
 }
 
-/// Bonds between each two bodies, of all ranks; those within a body are left out.
+/// Number of bonds of each pair of different bodies, over all ranks.
 fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u64)> {
     let count = simulation.problem.bodies.len();
     let mut bonds = vec![0; count * count];
-    for ([here, there], own) in simulation.forces.bonds_of_blocks() {
-        let [here, there] = [here, there].map(|block| simulation.problem.body_of(block));
-        bonds[here * count + there] += own;
+    for (blocks, own) in simulation.forces.bonds_of_blocks() {
+        let [i, j] = blocks.map(|block| simulation.problem.body_of(block));
+        bonds[i * count + j] += own;
     }
     simulation.comm.sum(&mut bonds);
-    let pairs = (0..count).flat_map(|here| (here + 1..count).map(move |there| [here, there]));
+    let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| [i, j]));
     pairs
-        .map(|[here, there]| ([here, there], bonds[here * count + there]))
+        .map(|[i, j]| ([i, j], bonds[i * count + j]))
         .filter(|(_, bonds)| *bonds > 0)
         .collect()
 }
@@ -150,19 +149,19 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
             warn(format!(", at {:.3} times their length", 1.0 + critical));
         }
         let slower = stretched_stiffness(critical, problem.dimension.count()).sqrt();
-        let too_bold = safeties(problem)
+        let unstable = safeties(problem)
             .into_iter()
             .find(|safety| safety * slower > 1.0);
-        if let Some(safety) = too_bold {
-            let enough = (100.0 / slower).floor() / 100.0;
+        if let Some(safety) = unstable {
+            let largest = (100.0 / slower).floor() / 100.0;
             warn(format!(
-                "; so far stretched they ask for `safety = {enough:.2}` or less, it is {safety}"
+                "; so far stretched they ask for `safety = {largest:.2}` or less, it is {safety}"
             ));
         }
     }
 }
 
-/// The shares of the stable step that the stages of a run take.
+/// The `safety` factors of the stages.
 fn safeties(problem: &Problem) -> Vec<f64> {
     let moving = problem
         .all_stages()
@@ -175,8 +174,8 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     moving.filter_map(safety).collect()
 }
 
-/// How many times stiffer a family with bonds stretched by `stretch` is than the stable step is for: such bonds
-/// resist being turned with s/(1 + s) of their stiffness.
+/// Stiffness of a family with bonds stretched by s, over that assumed by the stable step. A stretched bond
+/// resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
@@ -188,8 +187,8 @@ fn sets<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
     let mut sizes: Vec<u64> = (0..problem.sets.len()).map(count).collect();
     comm.sum(&mut sizes);
     for (set, size) in problem.sets.iter().zip(&sizes) {
-        let by_place = matches!(set.selector, Selector::Where(_) | Selector::Within(_));
-        if by_place && *size < D as u64 && simulation.model.total > 2 * D as u64 {
+        let by_position = matches!(set.selector, Selector::Where(_) | Selector::Within(_));
+        if by_position && *size < D as u64 && simulation.model.total > 2 * D as u64 {
             let message = format!("[set.{}]: has {size} point(s) only", set.name);
             warnings.push(Warning::new(message).at(&set.span));
         }

@@ -1,4 +1,4 @@
-//! How large a run is, from its problem: without making its points, of which there may be too many.
+//! Size of a run, estimated without its points, which may be too many to generate.
 
 use crate::dimension::Dimension;
 use crate::error::Result;
@@ -6,23 +6,23 @@ use crate::points::{LatticeBody, file, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
-/// Cells looked at, of all samples together, to count neighbours.
-const MOST_LOOKS: f64 = 4e6;
+/// Maximum number of cells read to count neighbours, over all samples.
+const MAX_CELLS_READ: f64 = 4e6;
 
-/// Points of each body whose neighbours are counted, at most.
+/// Maximum number of sampled points per body.
 const SAMPLES: u64 = 400;
 
-/// The size of a run, about.
+/// The estimated size of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
-    /// Lattice cells that have to be gone through.
+    /// Number of candidate lattice cells.
     pub cells: f64,
     /// Number of points of each body.
     pub points: Vec<f64>,
-    /// Bonds of the points of each body; those of all bodies count each bond from both ends.
+    /// Number of neighbours of all points of each body; their sum counts each bond twice.
     pub bonds: Vec<f64>,
-    /// Number of points of the result.
-    pub held: f64,
+    /// Number of points in the result.
+    pub output_points: f64,
 }
 
 impl Size {
@@ -31,16 +31,16 @@ impl Size {
         self.points.iter().sum()
     }
 
-    /// Number of all bonds, each counted from both ends.
+    /// Number of bonds, counted at both ends.
     pub fn directed_bonds(&self) -> f64 {
         self.bonds.iter().sum()
     }
 }
 
-/// Finds the size of a run.
+/// Estimate the size of a run.
 ///
 /// # Errors
-/// When lattice cells are too far away to be numbered.
+/// If lattice cells are too far from the origin to be numbered.
 pub fn size(problem: &Problem) -> Result<Size> {
     let bodies = (0..problem.bodies.len())
         .map(|body| LatticeBody::new(problem, body))
@@ -58,69 +58,69 @@ pub fn size(problem: &Problem) -> Result<Size> {
             .sum(),
         points: (0..bodies.len()).map(points).collect(),
         bonds: Vec::new(),
-        held: 0.0,
+        output_points: 0.0,
     };
     let (cutoffs, all) = (cutoffs(problem), size.all_points());
-    for (here, body) in bodies.iter().enumerate() {
+    for (index, body) in bodies.iter().enumerate() {
         let neighbours = match body {
             Some(lattice) => {
-                let reach = &cutoffs[here * problem.block_count()..][..bodies.len()];
+                let reach = &cutoffs[index * problem.block_count()..][..bodies.len()];
                 neighbours(lattice, &bodies, reach)
             }
             None => {
-                let volume = files[here].volume / files[here].points;
-                (family_volume(problem, here) / volume).min(all) - 1.0
+                let volume = files[index].volume / files[index].points;
+                (family_volume(problem, index) / volume).min(all) - 1.0
             }
         };
-        // A body without points has no mean volume.
-        size.bonds.push(size.points[here] * neighbours.max(0.0));
+        // max also replaces the NaN of a body without points.
+        size.bonds.push(size.points[index] * neighbours.max(0.0));
     }
-    size.held = held(problem, &bodies, &files, &size.points);
+    size.output_points = output_points(problem, &bodies, &files, &size.points);
     Ok(size)
 }
 
-/// The mean number of neighbours of a body's points on all lattices, from some of them.
+/// Mean number of neighbours on all lattices, from sampled points of a body.
 fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64]) -> f64 {
     let lattices = || {
         let pairs = others.iter().zip(reach);
         pairs.filter_map(|(other, reach)| Some((other.as_ref()?, *reach)))
     };
-    let looks: f64 = lattices()
+    let cells: f64 = lattices()
         .map(|(other, reach)| other.cells_within(reach))
         .sum();
-    let samples = ((MOST_LOOKS / looks) as u64).clamp(1, SAMPLES);
-    let places = body.some_centres(samples);
-    if places.is_empty() {
+    let samples = ((MAX_CELLS_READ / cells) as u64).clamp(1, SAMPLES);
+    let centres = body.some_centres(samples);
+    if centres.is_empty() {
         return 0.0;
     }
     let mut found = 0;
-    for place in &places {
+    for centre in &centres {
         for (other, reach) in lattices() {
-            found += other.count_near(*place, reach);
+            found += other.count_near(*centre, reach);
         }
     }
     // A point is not its own neighbour.
-    (found as f64 / places.len() as f64 - 1.0).max(0.0)
+    (found as f64 / centres.len() as f64 - 1.0).max(0.0)
 }
 
-/// The points of a body from a file.
+/// Figures of a body's points from a file.
 #[derive(Clone, Copy, Default)]
 struct Rows {
     points: f64,
     /// Volume of all points, m³.
     volume: f64,
-    /// Number of points that are in the set of the result, if there is one.
-    held: f64,
+    /// Number of points in the result.
+    output_points: f64,
 }
 
-/// The points of each body that are rows of a file.
+/// The figures of the points from files, by body.
 fn from_files(problem: &Problem) -> Vec<Rows> {
     let mut rows = vec![Rows::default(); problem.bodies.len()];
     for (index, body) in problem.bodies.iter().enumerate() {
         let PointSource::File { path, .. } = &body.points else {
             continue;
         };
-        // The first body that takes rows of a file counts those of all bodies.
+        // Each file is sampled once, for its first body.
         if file::users(problem, path)[0].0 != index {
             continue;
         }
@@ -131,13 +131,14 @@ fn from_files(problem: &Problem) -> Vec<Rows> {
             let body = point.block as usize;
             rows[body].points += weight;
             rows[body].volume += weight * point.volume;
-            rows[body].held += weight * f64::from(u8::from(is_held(problem, body, point.position)));
+            let in_result = is_in_result(problem, body, point.position);
+            rows[body].output_points += weight * f64::from(u8::from(in_result));
         }
     }
     rows
 }
 
-/// The volume (m³) within the horizon of a point of a body.
+/// Volume of a complete family of a body, m³.
 fn family_volume(problem: &Problem, body: usize) -> f64 {
     let horizon = problem.bodies[body].horizon;
     match problem.dimension {
@@ -149,16 +150,21 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
     }
 }
 
-/// Whether a point of a body at a position (m) is in the set of the result, which is not one of ids.
-fn is_held(problem: &Problem, body: usize, position: [f64; 3]) -> bool {
+/// Test whether a point is in the output set, which is not a set of ids.
+fn is_in_result(problem: &Problem, body: usize, position: [f64; 3]) -> bool {
     let set = problem.output.set.as_ref();
     set.is_none_or(|(set, _)| {
         set::contains(&problem.sets[*set], problem.horizon, 0, position, body)
     })
 }
 
-/// The number of points of the result, from some points of each body.
-fn held(problem: &Problem, bodies: &[Option<LatticeBody>], files: &[Rows], points: &[f64]) -> f64 {
+/// Number of points in the result, from sampled points of each body.
+fn output_points(
+    problem: &Problem,
+    bodies: &[Option<LatticeBody>],
+    files: &[Rows],
+    points: &[f64],
+) -> f64 {
     let Some((set, _)) = &problem.output.set else {
         return points.iter().sum();
     };
@@ -166,14 +172,14 @@ fn held(problem: &Problem, bodies: &[Option<LatticeBody>], files: &[Rows], point
         return ids.len() as f64;
     }
     let of_body = |(index, body): (usize, &Option<LatticeBody>)| match body {
-        None => files[index].held,
+        None => files[index].output_points,
         Some(lattice) => {
             let centres = lattice.some_centres(u64::MAX);
-            let held = centres
+            let selected = centres
                 .iter()
-                .filter(|centre| is_held(problem, index, **centre))
+                .filter(|centre| is_in_result(problem, index, **centre))
                 .count();
-            points[index] * held as f64 / centres.len().max(1) as f64
+            points[index] * selected as f64 / centres.len().max(1) as f64
         }
     };
     bodies.iter().enumerate().map(of_body).sum()

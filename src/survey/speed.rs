@@ -1,4 +1,4 @@
-//! How fast the time loop of a run is.
+//! Measurement of the time loop.
 
 use std::time::{Duration, Instant};
 
@@ -11,16 +11,16 @@ use crate::problem::Problem;
 use crate::solver::Simulation;
 use crate::solver::simulation::Times;
 
-/// What some steps of a run took, and what they were made with, on this rank.
+/// Figures of the measured steps on this rank.
 #[derive(Debug, Clone)]
 pub struct Speed {
     /// Points of all ranks.
     pub points: u64,
-    /// Copies of other ranks' points.
+    /// Ghosts of this rank.
     pub ghosts: u64,
-    /// Bonds, by the points of this rank that they are of.
+    /// Bonds of owned points, counted at each owned end.
     pub directed_bonds: u64,
-    /// Those of them that are kept as a lattice.
+    /// Bonds stored as a lattice.
     pub lattice_bonds: u64,
     /// Memory of the bonds, bytes.
     pub bond_bytes: u64,
@@ -30,21 +30,21 @@ pub struct Speed {
     pub set_up: Duration,
     /// Time of the steps.
     pub whole: Duration,
-    /// Time of their parts.
+    /// Time of the phases of the steps.
     pub times: Times,
     /// Messages of the steps.
     pub sent: Traffic,
-    /// The messages of displacements of as many steps, with nothing to do meanwhile.
-    pub sent_alone: Traffic,
+    /// Messages of as many halo exchanges of displacements without overlap.
+    pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
 }
 
-/// Makes so many steps of a run, after some that are not measured: caches, page tables and clock rates
-/// settle. Collective.
+/// Measure `steps` steps after `warm_up` steps, in which caches, page tables and clock rates settle.
+/// Collective.
 ///
 /// # Errors
-/// As those of a run; or the motion of a point is not finite.
+/// As a run; or if the motion of a point is not finite.
 pub fn speed(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -71,7 +71,7 @@ fn speed_in<const D: usize>(
     let set_up = simulation.times.set_up;
     let before = simulation.forces.halo().sent;
     simulation.times = Times::default();
-    begin_together(comm);
+    barrier(comm);
     let start = Instant::now();
     for _ in 0..steps {
         simulation.advance_halfway();
@@ -80,7 +80,7 @@ fn speed_in<const D: usize>(
     let whole = start.elapsed();
     simulation.check()?;
     let sent = since(before, simulation.forces.halo().sent);
-    let sent_alone = exchange_alone(comm, &mut simulation, steps);
+    let sent_without_overlap = exchange_without_overlap(comm, &mut simulation, steps);
     let (model, forces) = (&simulation.model, &simulation.forces);
     Ok(Speed {
         points: model.total,
@@ -93,19 +93,19 @@ fn speed_in<const D: usize>(
         whole,
         times: simulation.times,
         sent,
-        sent_alone,
+        sent_without_overlap,
         memory: resident(),
     })
 }
 
-/// Sends the messages of a step so many times, with nothing to do meanwhile.
-fn exchange_alone<const D: usize>(
+/// Exchange displacements `times` times without overlap.
+fn exchange_without_overlap<const D: usize>(
     comm: &dyn Communicator,
     simulation: &mut Simulation<'_, D>,
     times: u32,
 ) -> Traffic {
     let before = simulation.forces.halo().sent;
-    begin_together(comm);
+    barrier(comm);
     for _ in 0..times {
         let displacement = &mut simulation.fields.displacement;
         simulation.forces.update_ghosts(comm, displacement);
@@ -113,7 +113,7 @@ fn exchange_alone<const D: usize>(
     since(before, simulation.forces.halo().sent)
 }
 
-fn begin_together(comm: &dyn Communicator) {
+fn barrier(comm: &dyn Communicator) {
     comm.sum(&mut [0]);
 }
 

@@ -11,7 +11,7 @@ use fissure::comm::threads;
 use fissure::deck::{self, Deck, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::solver::Simulation;
-use fissure::survey::look;
+use fissure::survey::dry_run;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -43,7 +43,7 @@ fn right_decks() -> Vec<Source> {
 /// Number of points, and first step (s) and number of steps of each stage, of the run that a deck makes.
 fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
     let deck = Deck::new(source.clone())?;
-    let look = look(&deck.problem()?, 1, false).map_err(|error| deck.locate(error))?;
+    let look = dry_run(&deck.problem()?, 1, false).map_err(|error| deck.locate(error))?;
     Ok((look.points, look.steps))
 }
 

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use fissure::comm::mpi::World;
-use fissure::comm::{Communicator, Message};
+use fissure::comm::{Communicator, PeerBuffers};
 use rayon::ThreadPoolBuilder;
 
 use crate::support::command::is_rank;
@@ -25,7 +25,7 @@ fn a_panic_during_an_exchange_leaves_nothing_under_way() {
     let other = 1 - world.rank();
     let value = |rank: usize, turn: usize| (10 * turn + rank) as f64;
     for turn in 1..4 {
-        let mut messages = [Message {
+        let mut messages = [PeerBuffers {
             rank: other,
             send: vec![value(world.rank(), turn); LARGE],
             receive: vec![0.0; LARGE],
@@ -47,7 +47,7 @@ fn large_messages_arrive_while_work_is_done() {
         return;
     }
     let world = World::start().unwrap();
-    let mut messages = [Message {
+    let mut messages = [PeerBuffers {
         rank: 1 - world.rank(),
         send: vec![world.rank() as f64; LARGE],
         receive: vec![-1.0; LARGE],

@@ -1,19 +1,19 @@
-//! The result file: VTKHDF, so that ParaView (5.12 and later) and VTK open it as it is.
+//! The result file in VTKHDF layout, which VTK and ParaView (5.12 and later) open directly.
 //!
 //! ```text
 //! /                      attributes: the run (deck, version, command line, …)
 //! /VTKHDF                Version, Type = UnstructuredGrid; Points, Types, Offsets, Connectivity:
 //!                        one vertex per point, at its reference position, written once
 //! /VTKHDF/PointData/f    static fields [points], others [steps × points] (, components)
-//! /VTKHDF/Steps          NSteps; Values (times), Step (numbers), and where a step's rows start
-//! /history               a table: a row for each moment; attributes: columns, units, between commas
+//! /VTKHDF/Steps          NSteps; Values (times), Step (numbers), and offsets of a step's rows
+//! /history               table, a row per sample; attributes: columns, units, comma-separated
 //! ```
 //!
-//! Where points may be born during a run, each step has its own points and static fields, one after the
-//! other, and is a part of its own.
+//! With adaptive refinement, each step is a VTK part of its own: the points and static fields of the
+//! steps are concatenated.
 //!
-//! The points are one part whatever the number of ranks, in the order of their ids. A step's data are flushed
-//! before its row of the tables: a file whose writer was killed holds all its complete steps.
+//! On any number of ranks, a step is one part with points in the order of their ids. Data of a step are
+//! flushed before its row in the tables, so the file of a killed run has all complete steps.
 
 mod resume;
 
@@ -29,14 +29,13 @@ use crate::error::{Error, Result};
 use hdf5_metno::H5Type;
 use std::path::Path;
 
-/// VTK's number of a cell that is one point.
+/// VTK's cell type of a single point.
 pub(super) const VTK_VERTEX: u8 = 1;
 
 /// The group of the time steps.
 pub(super) const STEPS: &str = "/VTKHDF/Steps";
 
-/// What each step has one number of besides its time and number: the same in every step, or what is
-/// counted.
+/// Tables of the steps: name, columns, first value and counted quantity.
 const STEP_TABLES: [(&str, Option<usize>, i64, Counted); 5] = [
     ("PartOffsets", None, 0, Counted::Steps),
     ("NumberOfParts", None, 1, Counted::Nothing),
@@ -45,7 +44,7 @@ const STEP_TABLES: [(&str, Option<usize>, i64, Counted); 5] = [
     ("ConnectivityIdOffsets", Some(1), 0, Counted::Points),
 ];
 
-/// What a number of a step counts where each step has its own points: those of the steps before.
+/// The quantity that a table accumulates over previous steps if each step has its own points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Counted {
     Nothing,
@@ -53,33 +52,33 @@ enum Counted {
     Points,
 }
 
-/// Which rows of the point data are this rank's; ranks follow each other without gaps.
+/// This rank's range of the rows of point data; the ranges of the ranks are contiguous.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece {
-    /// The number of points of all ranks before this one.
+    /// Number of points of all lower ranks.
     pub first: u64,
-    /// The number of points of all ranks.
+    /// Number of points of all ranks.
     pub total: u64,
 }
 
-/// A result file being written. All methods are collective; where one fails on any rank, it fails on
-/// all, and the file takes no more.
+/// A result file open for writing. All methods are collective; if one fails on any rank, it fails on
+/// all, and the file is abandoned.
 ///
-/// Room for all expected steps is made in advance, so that to add a step changes little besides the
-/// data themselves: a run that is killed meanwhile leaves a sound file.
+/// Space for all expected steps is allocated in advance. Then a new step hardly changes metadata, and a
+/// killed run leaves a valid file.
 pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
     piece: Piece,
     points: usize,
     single: bool,
     steps: u64,
-    /// Time (s) and points of the steps that were taken over from an earlier file.
+    /// Time (s) and number of points of the steps of a resumed file.
     past: Vec<(f64, usize)>,
-    /// Points of all steps so far.
+    /// Total number of points of all steps.
     rows: u64,
-    /// What holds the points, if each step has its own.
+    /// The datasets of the points, if each step has its own.
     changing: Option<ChangingPoints>,
-    /// Steps that there is room for.
+    /// Number of steps with allocated space.
     capacity: u64,
     tables: Vec<Table>,
     numbers: Dataset,
@@ -88,14 +87,14 @@ pub struct ResultFile<'a> {
     history: Option<History>,
 }
 
-/// LaneTuple of the steps that are known in advance.
+/// A table of steps whose values are known in advance.
 struct Table {
     dataset: Dataset,
     rule: Rule,
 }
 
-/// The numbers of a table: `start + stride · k` for the step with index k, or from `start` on what is counted where
-/// each step has its own points.
+/// The values of a table: `start + stride · k` for step k, or `start` plus the counted quantity if each
+/// step has its own points.
 #[derive(Debug, Clone, Copy)]
 struct Rule {
     start: i64,
@@ -103,33 +102,32 @@ struct Rule {
     counted: Counted,
 }
 
-/// What a result file holds from the start.
+/// Description of a result file.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'a> {
-    /// Which points are this rank's.
+    /// The rows of this rank.
     pub piece: Piece,
-    /// Whether each step has its own points, given by [`ResultFile::set_points`].
+    /// Each step has its own points, set by [`ResultFile::set_points`].
     pub changing: bool,
-    /// Their reference positions, m.
+    /// Reference positions of this rank's points, m.
     pub positions: &'a [[f64; 3]],
-    /// Fields that do not change with time, with their values.
+    /// Static fields with their values.
     pub fixed: &'a [(FieldDescription, FieldData<'a>)],
-    /// Fields that get their values with every step.
+    /// Fields with values per step.
     pub moving: &'a [FieldDescription],
     /// Attributes of the file: name and text.
     pub metadata: &'a [(&'a str, String)],
-    /// Whether moving fields are stored as 4-byte numbers.
+    /// Store moving fields as 4-byte floats.
     pub single: bool,
-    /// Number of steps that are expected; there may be more.
+    /// Expected number of steps; there may be more.
     pub steps: u64,
 }
 
 impl<'a> ResultFile<'a> {
-    /// Creates the file and writes what does not change with time.
+    /// Create the file and write the static data.
     ///
     /// # Errors
-    /// The file exists already or cannot be written, there are no points at all, or the length of
-    /// a field does not match the positions.
+    /// If the file exists or cannot be written, there are no points, or a field has the wrong length.
     pub fn create(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -217,16 +215,15 @@ impl<'a> ResultFile<'a> {
         }
         let file = &mut result.file;
         file.set_dataset_attribute(&result.times, "unit", Attribute::Text("s"))?;
-        result.make_room(steps.max(1))?;
+        result.allocate_steps(steps.max(1))?;
         result.file.flush()?;
         Ok(result)
     }
 
-    /// Gives the next step its points, with the fields that do not change while they are there: the same
-    /// fields as at the creation of the file.
+    /// Set the points of the next step and their static fields, which are those of [`create`](Self::create).
     ///
     /// # Errors
-    /// The length of a field does not match the positions, or the disc is full.
+    /// If a field has the wrong length or the disk is full.
     pub fn set_points(&mut self, contents: &Contents) -> Result<()> {
         let Contents {
             piece,
@@ -267,12 +264,12 @@ impl<'a> ResultFile<'a> {
         Ok(())
     }
 
-    /// Adds one step: its time in s, its number and this rank's values of the moving fields, which `values` gives
-    /// one after the other, by their place in the order they were described. When this returns, the step survives
-    /// the end of the process.
+    /// Append a step: its time (s), its number and this rank's values of the moving fields.
+    ///
+    /// `values(k)` returns the values of moving field k. The step is flushed when this returns.
     ///
     /// # Errors
-    /// A field's length is wrong, or the disc is full.
+    /// If a field has the wrong length or the disk is full.
     pub fn write_step(
         &mut self,
         time: f64,
@@ -280,23 +277,23 @@ impl<'a> ResultFile<'a> {
         mut values: impl FnMut(usize) -> Vec<f64>,
     ) -> Result<()> {
         if self.changing.is_none() && self.steps == self.capacity {
-            self.make_room(self.capacity + 1)?;
+            self.allocate_steps(self.capacity + 1)?;
         }
         let first = self.rows + self.piece.first;
         for (k, (description, dataset)) in self.fields.iter().enumerate() {
             let data = values(k);
             let checked = check(description, &FieldData::F64(&data), self.points);
             agree(self.file.communicator(), checked)?;
-            let halves: Vec<f32>;
+            let rounded: Vec<f32>;
             let data = if self.single {
-                halves = data.iter().map(|value| *value as f32).collect();
-                FieldData::F32(&halves)
+                rounded = data.iter().map(|value| *value as f32).collect();
+                FieldData::F32(&rounded)
             } else {
                 FieldData::F64(&data)
             };
             write_field(&mut self.file, dataset, first, description, &data)?;
         }
-        // Only when the data are safe may the file say that it has them.
+        // Flush the data before the tables that refer to them.
         self.file.flush()?;
         append_one(&mut self.file, &mut self.numbers, step)?;
         append_one(&mut self.file, &mut self.times, time)?;
@@ -307,12 +304,12 @@ impl<'a> ResultFile<'a> {
         self.file.flush()
     }
 
-    /// Time (s) and points of the steps that were taken over from an earlier file.
+    /// Time (s) and number of points of the steps of a resumed file.
     pub fn past(&self) -> &[(f64, usize)] {
         &self.past
     }
 
-    /// Number of points of the last step, over all ranks.
+    /// Number of points of all ranks in the last step.
     pub fn points(&self) -> u64 {
         self.piece.total
     }
@@ -327,12 +324,12 @@ impl<'a> ResultFile<'a> {
         self.steps
     }
 
-    /// Makes what has been written so far safe from a loss of power, history rows included.
+    /// Flush and fsync all data and history rows, so they survive a loss of power.
     ///
     /// # Errors
-    /// The disc is full.
-    pub fn confirm(&mut self) -> Result<()> {
-        self.file.confirm()
+    /// If the disk is full.
+    pub fn sync(&mut self) -> Result<()> {
+        self.file.sync()
     }
 
     fn create_table(
@@ -343,20 +340,20 @@ impl<'a> ResultFile<'a> {
         rule: Rule,
     ) -> Result<()> {
         let rows = Rows::Extensible {
-            per_append: steps.max(LEAST_ROWS),
+            per_append: steps.max(MIN_CHUNK_ROWS),
         };
         let dataset = self.file.create_dataset::<i64>(path, rows, columns)?;
         self.tables.push(Table { dataset, rule });
         Ok(())
     }
 
-    /// Makes room for so many steps in all, and fills in the tables.
-    fn make_room(&mut self, steps: u64) -> Result<()> {
+    /// Allocate space for a total number of steps, and fill the tables.
+    fn allocate_steps(&mut self, steps: u64) -> Result<()> {
         if steps <= self.capacity || self.changing.is_some() {
             return Ok(());
         }
         let file = &mut self.file;
-        // None may become shorter, see `close`.
+        // Never shrink a dataset with several ranks, see `close`.
         for (_, dataset) in &mut self.fields {
             let rows = dataset.rows().max(steps * self.piece.total);
             file.resize(dataset, rows)?;
@@ -373,10 +370,10 @@ impl<'a> ResultFile<'a> {
         Ok(())
     }
 
-    /// Starts the history: a table of numbers, in the file and in a CSV file.
+    /// Create the history: the table in the file, and the CSV file.
     ///
     /// # Errors
-    /// The history's files cannot be written.
+    /// If a file cannot be written.
     pub fn create_history(&mut self, contents: &HistoryContents) -> Result<()> {
         self.history = Some(History::create(&mut self.file, contents)?);
         self.file.flush()
@@ -387,11 +384,11 @@ impl<'a> ResultFile<'a> {
         self.history.as_ref().map_or(0, History::rows)
     }
 
-    /// Adds rows to the history, the same on all ranks. In the result file they are safe once
-    /// the next step is written, in the CSV file when this returns.
+    /// Append rows to the history; all ranks pass the same rows. They are in the CSV file when this
+    /// returns, and flushed to the result file with the next step.
     ///
     /// # Errors
-    /// There is no history, a row has the wrong length, or the disc is full.
+    /// If there is no history, a row has the wrong length, or the disk is full.
     pub fn append_history(&mut self, rows: &[Vec<f64>]) -> Result<()> {
         match &mut self.history {
             Some(history) => history.append(&mut self.file, rows),
@@ -399,17 +396,16 @@ impl<'a> ResultFile<'a> {
         }
     }
 
-    /// Why writes so far were not collective: bits of HDF5's causes, of any rank and any write; 0 when
-    /// all were.
+    /// Causes of non-collective writes, as HDF5's bits over all ranks and writes; 0 if all were collective.
     pub fn no_collective_cause(&self) -> u32 {
         self.file.no_collective_cause()
     }
 
-    /// Closes the file. Datasets end with the last step, or keep their room for a run that `goes_on` another time.
+    /// Close the file. Unused space is freed, unless the run `will_resume`.
     ///
     /// # Errors
-    /// The disc is full, or an earlier operation failed.
-    pub fn close(self, goes_on: bool) -> Result<()> {
+    /// If the disk is full or an earlier operation failed.
+    pub fn close(self, will_resume: bool) -> Result<()> {
         let (comm, path) = (self.file.communicator(), self.file.path().to_path_buf());
         let tables = self.tables.iter().map(|table| (&table.dataset, self.steps));
         let fields = self.fields.iter().map(|(_, field)| (field, self.rows));
@@ -419,12 +415,12 @@ impl<'a> ResultFile<'a> {
         let unused = unused.map(|(dataset, rows)| (dataset.path().to_owned(), rows));
         let unused: Vec<_> = unused.collect();
         self.file.close()?;
-        // By one rank: HDF5 1.10's ranks come apart when they shorten a file that was there before them. Where
-        // somebody reads it and has locked it, it stays as it is: what is read of it is the same.
-        if !goes_on && !unused.is_empty() && comm.rank() == 0 {
+        // On one rank: HDF5 1.10 deadlocks when several ranks shrink datasets of an existing file. A
+        // failure, such as a reader's lock, is harmless: the unused rows are never read.
+        if !will_resume && !unused.is_empty() && comm.rank() == 0 {
             let alone = threads::alone();
             let _ = CollectiveFile::open_to_append(&path, &alone).and_then(|mut file| {
-                shorten(&mut file, &unused)?;
+                truncate(&mut file, &unused)?;
                 file.close()
             });
         }
@@ -432,8 +428,8 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Cuts datasets to so many rows. For one rank.
-fn shorten(file: &mut CollectiveFile<'_>, lengths: &[(String, u64)]) -> Result<()> {
+/// Truncate datasets to the given numbers of rows. For one rank.
+fn truncate(file: &mut CollectiveFile<'_>, lengths: &[(String, u64)]) -> Result<()> {
     for (path, rows) in lengths {
         let mut dataset = file.open_dataset(path)?;
         file.resize(&mut dataset, *rows)?;
@@ -441,12 +437,12 @@ fn shorten(file: &mut CollectiveFile<'_>, lengths: &[(String, u64)]) -> Result<(
     Ok(())
 }
 
-/// A chunk of a table of steps or of the history has at least so many rows.
-pub(super) const LEAST_ROWS: u64 = 512;
+/// Minimum number of rows per chunk of a table.
+pub(super) const MIN_CHUNK_ROWS: u64 = 512;
 
-/// A table that has one row more after each step.
+/// Create a table that grows by one row per step.
 fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> Result<Dataset> {
-    let per_append = steps.max(LEAST_ROWS);
+    let per_append = steps.max(MIN_CHUNK_ROWS);
     file.create_dataset::<T>(
         &format!("{STEPS}/{name}"),
         Rows::Extensible { per_append },
@@ -454,7 +450,7 @@ fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> 
     )
 }
 
-/// The tables of a result: path, columns and rule.
+/// The tables of a result: path, columns and rule of the values.
 fn tables_of(contents: &Contents) -> Vec<(String, Option<usize>, Rule)> {
     let rule = |start, stride, counted| Rule {
         start,
@@ -500,8 +496,7 @@ fn write_geometry(
     let dataset = file.create_dataset::<i64>("/VTKHDF/Connectivity", total, None)?;
     let own: Vec<i64> = (first..first + count).collect();
     file.write_rows(&dataset, piece.first, &own)?;
-    // Offsets has one row more than there are cells: each rank writes where its cells end, the
-    // first one also where they begin.
+    // There is one offset more than cells: a rank writes the ends of its cells, rank 0 also the start.
     let dataset =
         file.create_dataset::<i64>("/VTKHDF/Offsets", Rows::Fixed(piece.total + 1), None)?;
     let begin = if root { first } else { first + 1 };

@@ -1,4 +1,4 @@
-//! Going on with a result: in the file itself where no row has to move in it, else in a copy of what is kept.
+//! Resumption of a result: in place if the layout allows, otherwise in a copy.
 
 use std::path::Path;
 
@@ -8,30 +8,30 @@ use super::super::changing;
 use super::super::collective::CollectiveFile;
 use super::super::field::POINT_DATA;
 use super::super::history::{HISTORY, History, HistoryContents};
-use super::{Contents, ResultFile, STEPS, Table, append_one, shorten, tables_of};
+use super::{Contents, ResultFile, STEPS, Table, append_one, tables_of, truncate};
 use crate::comm::{Communicator, agree, threads, total};
 use crate::error::{Error, Result};
 
-/// Attributes that tell what a result is of; others tell how the last part of the run was started.
+/// Attributes that must match; the others describe the last start of the run.
 const IDENTITY: [&str; 3] = ["deck", "deck_in_full", "version"];
 
-/// What is kept of a result.
+/// Number of steps and history rows that a resumed result retains.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct Retained {
     steps: u64,
     rows: u64,
 }
 
 impl<'a> ResultFile<'a> {
-    /// Goes on with a result after its first steps and rows of its history; later ones are dropped. Also gives
-    /// the rows that are kept.
+    /// Resume a result after its first steps and history rows; later ones are dropped. Return the retained
+    /// rows.
     ///
-    /// Where the file has room for all steps that are expected, and is of the same deck and version, it is
-    /// continued in place: no row that is kept moves, and whenever the process is killed, all are there. Else, or
-    /// where it cannot be written to now, it is copied to a new file, which then takes the place of the old one.
+    /// A file of the same deck and version with space for all expected steps is continued in place. No
+    /// retained row moves, so a kill loses none. Otherwise, or if the file cannot be written to, the retained
+    /// part is copied to a new file, which then replaces the old one.
     ///
     /// # Errors
-    /// The old file cannot be read, holds less, or other points or fields; the disc is full.
+    /// If the old file cannot be read, has fewer steps, or other points or fields; if the disk is full.
     pub fn resume(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -39,33 +39,33 @@ impl<'a> ResultFile<'a> {
         history: &HistoryContents,
         (steps, rows): (u64, u64),
     ) -> Result<(Self, Vec<Vec<f64>>)> {
-        let kept = Kept { steps, rows };
+        let retained = Retained { steps, rows };
         let prepared = if comm.rank() == 0 {
-            prepare(path, contents, kept)
+            prepare(path, contents, retained)
         } else {
             Ok(false)
         };
         if total(comm, u64::from(agree(comm, prepared)?)) > 0 {
-            Self::go_on(path, comm, contents, history, kept)
+            Self::continue_in_place(path, comm, contents, history, retained)
         } else {
-            Self::copied(path, comm, contents, history, kept)
+            Self::copied(path, comm, contents, history, retained)
         }
     }
 
-    /// Opens a file that has been prepared.
-    fn go_on(
+    /// Open a prepared file and continue it in place.
+    fn continue_in_place(
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
         history: &HistoryContents,
-        kept: Kept,
+        retained: Retained,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
         let total = contents.piece.total;
         let mut file = CollectiveFile::open_to_append(path, comm)?;
         let times = file.open_dataset(&format!("{STEPS}/Values"))?;
         let numbers = file.open_dataset(&format!("{STEPS}/Step"))?;
-        let past: Vec<f64> = file.read_rows(&times, 0, kept.steps as usize)?;
-        let rows = History::read(&mut file, kept.rows)?;
+        let past: Vec<f64> = file.read_rows(&times, 0, retained.steps as usize)?;
+        let rows = History::read(&mut file, retained.rows)?;
         let mut fields = Vec::new();
         for field in contents.moving {
             let path = format!("{POINT_DATA}/{}", field.name);
@@ -83,9 +83,9 @@ impl<'a> ResultFile<'a> {
             piece: contents.piece,
             points: contents.positions.len(),
             single: contents.single,
-            steps: kept.steps,
+            steps: retained.steps,
             past: past.iter().map(|time| (*time, total as usize)).collect(),
-            rows: kept.steps * total,
+            rows: retained.steps * total,
             changing: None,
             capacity: capacity.min().unwrap_or(0),
             tables,
@@ -98,14 +98,14 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// What is kept, in a new file that takes the place of the old one: whenever the process is killed, one of
+    /// What is retained, in a new file that takes the place of the old one: whenever the process is killed, one of
     /// them is there.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
         history: &HistoryContents,
-        kept: Kept,
+        retained: Retained,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
         let piece = contents.piece;
         let mut old = CollectiveFile::open(path, comm)?;
@@ -115,20 +115,20 @@ impl<'a> ResultFile<'a> {
         let found = times.rows().min(numbers.rows());
         let fits = if !contents.changing && points.rows() != piece.total {
             Err(Error::run(format!("{}: has other points", path.display())))
-        } else if found < kept.steps {
-            let text = format!("has {found} of the first {} outputs", kept.steps);
+        } else if found < retained.steps {
+            let text = format!("has {found} of the first {} outputs", retained.steps);
             Err(Error::run(format!("{}: {text}", path.display())))
         } else {
             Ok(())
         };
         agree(comm, fits)?;
-        let times: Vec<f64> = old.read_rows(&times, 0, kept.steps as usize)?;
-        let numbers: Vec<u64> = old.read_rows(&numbers, 0, kept.steps as usize)?;
+        let times: Vec<f64> = old.read_rows(&times, 0, retained.steps as usize)?;
+        let numbers: Vec<u64> = old.read_rows(&numbers, 0, retained.steps as usize)?;
 
         let part = path.with_extension("vtkhdf.part");
         let copied = Self::copy(&mut old, &part, comm, contents, (times, numbers));
         let finished = copied.and_then(|mut result| {
-            let rows = History::read(&mut old, kept.rows)?;
+            let rows = History::read(&mut old, retained.rows)?;
             old.close()?;
             result.create_history(history)?;
             result.append_history(&rows)?;
@@ -137,13 +137,13 @@ impl<'a> ResultFile<'a> {
             Ok((result, rows))
         });
         if finished.is_err() && comm.rank() == 0 {
-            // It only takes up space; that it cannot be removed either changes nothing.
+            // Best effort: a leftover file only takes space.
             let _ = std::fs::remove_file(&part);
         }
         finished
     }
 
-    /// A new file with the first steps of an old one, at these times and with these numbers.
+    /// Create a new file with the first steps of an old one, given their times and numbers.
     fn copy(
         old: &mut CollectiveFile<'a>,
         part: &Path,
@@ -151,16 +151,16 @@ impl<'a> ResultFile<'a> {
         contents: &Contents,
         (times, numbers): (Vec<f64>, Vec<u64>),
     ) -> Result<Self> {
-        let (piece, kept) = (contents.piece, times.len() as u64);
+        let (piece, retained) = (contents.piece, times.len() as u64);
         let mut result = Self::create(part, comm, Creation::Truncate, contents)?;
         if contents.changing {
-            let counts = result.copy_changing(old, kept)?;
-            return result.note_steps(&times, &numbers, &counts);
+            let counts = result.copy_changing(old, retained)?;
+            return result.record_steps(&times, &numbers, &counts);
         }
-        result.make_room(kept)?;
+        result.allocate_steps(retained)?;
         for (field, values) in &result.fields {
             let stored = old.open_dataset(&format!("{POINT_DATA}/{}", field.name))?;
-            for step in 0..kept {
+            for step in 0..retained {
                 let (first, count) = (step * piece.total + piece.first, result.points);
                 if contents.single {
                     let rows: Vec<f32> = old.read_rows(&stored, first, count)?;
@@ -171,12 +171,12 @@ impl<'a> ResultFile<'a> {
                 }
             }
         }
-        result.rows = kept * piece.total;
-        result.note_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
+        result.rows = retained * piece.total;
+        result.record_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
     }
 
-    /// Takes note of the first steps, with so many points each.
-    fn note_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
+    /// Write the tables of the copied steps; `points` is the number of points of each.
+    fn record_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
         for ((time, number), points) in times.iter().zip(numbers).zip(points) {
             append_one(&mut self.file, &mut self.numbers, *number)?;
             append_one(&mut self.file, &mut self.times, *time)?;
@@ -188,15 +188,15 @@ impl<'a> ResultFile<'a> {
         Ok(self)
     }
 
-    /// Copies the first steps of an old file, each with its own points; gives their numbers.
-    fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, kept: u64) -> Result<Vec<i64>> {
+    /// Copy the first steps of an old file with points per step; return their numbers of points.
+    fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, retained: u64) -> Result<Vec<i64>> {
         let Some(changing) = &mut self.changing else {
             return Ok(Vec::new());
         };
         let counts = old.open_dataset("/VTKHDF/NumberOfPoints")?;
-        let counts: Vec<i64> = old.read_rows(&counts, 0, kept as usize)?;
+        let counts: Vec<i64> = old.read_rows(&counts, 0, retained as usize)?;
         self.rows = counts.iter().sum::<i64>() as u64;
-        changing.copy(old, &mut self.file, self.rows, kept)?;
+        changing.copy(old, &mut self.file, self.rows, retained)?;
         for (_, dataset) in &mut self.fields {
             if self.single {
                 changing::copy::<f32>(old, &mut self.file, dataset, self.rows)?;
@@ -205,37 +205,36 @@ impl<'a> ResultFile<'a> {
             }
         }
         for table in &mut self.tables {
-            changing::copy::<i64>(old, &mut self.file, &mut table.dataset, kept)?;
+            changing::copy::<i64>(old, &mut self.file, &mut table.dataset, retained)?;
         }
         Ok(counts)
     }
 }
 
-/// Lets a file end after what is kept, if it can be continued in place; else it is left alone. For one rank.
+/// Lets a file end after what is retained, if it can be continued in place; else it is left alone. For one rank.
 ///
 /// # Errors
 /// It cannot be written any more.
-fn prepare(path: &Path, contents: &Contents, kept: Kept) -> Result<bool> {
+fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool> {
     let alone = threads::alone();
-    let looked = CollectiveFile::open(path, &alone).and_then(|mut file| {
-        let fits = has_room(&mut file, contents, kept)?;
+    let checked = CollectiveFile::open(path, &alone).and_then(|mut file| {
+        let fits = has_room(&mut file, contents, retained)?;
         file.close()?;
         Ok(fits)
     });
-    // Whoever reads the file may have locked it, and it may be read-only; what is damaged is found when it is
-    // copied.
-    let opened = match looked {
+    // The file may be read-only or locked by a reader; then it is copied. The copy finds any damage.
+    let opened = match checked {
         Ok(true) => CollectiveFile::open_to_append(path, &alone).ok(),
         _ => None,
     };
     let Some(mut file) = opened else {
         return Ok(false);
     };
-    // The number of steps first: whenever the process is killed, what it counts is there.
-    let steps = Attribute::Integer(kept.steps as i64);
+    // NSteps first: a killed process must not leave it larger than the tables.
+    let steps = Attribute::Integer(retained.steps as i64);
     file.set_attribute(STEPS, "NSteps", steps)?;
     file.flush()?;
-    shorten(&mut file, &counted_rows(kept))?;
+    truncate(&mut file, &counted_rows(retained))?;
     for (name, text) in contents.metadata {
         if file.text_attribute("/", name).ok().as_ref() != Some(text) {
             file.set_attribute("/", name, Attribute::Text(text))?;
@@ -247,11 +246,15 @@ fn prepare(path: &Path, contents: &Contents, kept: Kept) -> Result<bool> {
 
 /// Whether a file is of the same deck and version and has room for the steps that are expected, and no chunk
 /// goes with the rows that are dropped.
-fn has_room(file: &mut CollectiveFile<'_>, contents: &Contents, kept: Kept) -> Result<bool> {
+fn has_room(
+    file: &mut CollectiveFile<'_>,
+    contents: &Contents,
+    retained: Retained,
+) -> Result<bool> {
     if contents.changing {
         return Ok(false);
     }
-    let (total, steps) = (contents.piece.total, contents.steps.max(kept.steps));
+    let (total, steps) = (contents.piece.total, contents.steps.max(retained.steps));
     let texts = contents.metadata.iter();
     for (name, text) in texts.filter(|(name, _)| IDENTITY.contains(name)) {
         if file.text_attribute("/", name)? != *text {
@@ -272,7 +275,7 @@ fn has_room(file: &mut CollectiveFile<'_>, contents: &Contents, kept: Kept) -> R
             return Ok(false);
         }
     }
-    for (path, rows) in counted_rows(kept) {
+    for (path, rows) in counted_rows(retained) {
         let dataset = file.open_dataset(&path)?;
         if dataset.rows() < rows || dataset.frees_a_chunk(rows) {
             return Ok(false);
@@ -281,11 +284,11 @@ fn has_room(file: &mut CollectiveFile<'_>, contents: &Contents, kept: Kept) -> R
     Ok(true)
 }
 
-/// The datasets whose lengths are counts, and how long they are to be.
-fn counted_rows(kept: Kept) -> [(String, u64); 3] {
+/// The datasets whose lengths count steps or rows, with their target lengths.
+fn counted_rows(retained: Retained) -> [(String, u64); 3] {
     [
-        (format!("{STEPS}/Values"), kept.steps),
-        (format!("{STEPS}/Step"), kept.steps),
-        (HISTORY.to_owned(), kept.rows),
+        (format!("{STEPS}/Values"), retained.steps),
+        (format!("{STEPS}/Step"), retained.steps),
+        (HISTORY.to_owned(), retained.rows),
     ]
 }

@@ -180,7 +180,7 @@ impl<const D: usize> Forces<D> {
         let mut halo = std::mem::take(&mut self.halo);
         let (columns, count) = self.changing_columns();
         let columns = columns.into_iter().take(count).chain([&mut flags[..]]);
-        halo.bring(comm, &mut columns.collect::<Vec<_>>());
+        halo.update_ghosts(comm, &mut columns.collect::<Vec<_>>());
         self.halo = halo;
         times.halo += start.elapsed();
         self.update(News::LaneTuple, Which::All, model, displacement);

@@ -27,7 +27,7 @@ pub struct GridValues<const D: usize> {
 impl<const D: usize> GridValues<D> {
     /// For a grid at rest, whose bonds read so many numbers of each point and these limits.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead) -> Self {
-        let count = grid.places();
+        let count = grid.slots();
         Self {
             displacement: std::array::from_fn(|d| Column::new(d, count, 0.0)),
             numbers: (0..numbers)
@@ -113,7 +113,7 @@ impl<const D: usize> OwnedPlaces<'_, D> {
     /// No other thread does so for any of these points at the same time.
     pub unsafe fn take(&self, first: usize, displacement: [&[f64]; D]) {
         let count = displacement[0].len();
-        for (place, points) in self.grid.places_of(first..first + count) {
+        for (place, points) in self.grid.slots_of(first..first + count) {
             for d in 0..D {
                 let values = &displacement[d][points.start - first..points.end - first];
                 // SAFETY: these are places of the grid, for each of which a column has an entry, and no other
@@ -163,7 +163,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// When an array that the kernel reads does not cover the grid.
     pub fn new(kernel: &K, values: &'a GridValues<D>, volumes: [f64; 2]) -> Self {
         let numbers = K::Point::columns(&values.numbers);
-        let covers = |column: &[f64]| column.len() >= values.grid.places();
+        let covers = |column: &[f64]| column.len() >= values.grid.slots();
         assert!(
             values.displacement.iter().all(|column| covers(column))
                 && (0..K::Point::COUNT).all(|k| {
@@ -175,11 +175,11 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         Self {
             displacement: values.displacement.each_ref().map(|column| &column[..]),
             numbers,
-            limits: ReadLimits::new(kernel.criterion(), &values.limits, values.grid.places()),
+            limits: ReadLimits::new(kernel.criterion(), &values.limits, values.grid.slots()),
             rotations: ReadRotations::new::<D>(
                 kernel.criterion(),
                 &values.limits,
-                values.grid.places(),
+                values.grid.slots(),
             ),
             limit: kernel.criterion().limit(),
             is_linear: kernel.is_linear(),

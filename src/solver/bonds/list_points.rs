@@ -245,7 +245,7 @@ pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 
     if H::COUNT == 0 {
         return [H::splat(0.0); 2];
     }
-    let all = groups.numbers(group);
+    let all = groups.history(group);
     if H::PADDED {
         let of_each = all.len() / 2;
         let load = |first: usize| {

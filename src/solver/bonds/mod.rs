@@ -199,7 +199,7 @@ impl<const D: usize> Forces<D> {
         let columns = columns
             .chain(truncation_factors)
             .map(|column| &mut column[..]);
-        halo.bring(comm, &mut columns.collect::<Vec<_>>());
+        halo.update_ghosts(comm, &mut columns.collect::<Vec<_>>());
         for grid in &mut self.grids {
             grid.update_numbers(Which::All, 0, &self.numbers.columns);
             if read.truncation_factors {
@@ -316,18 +316,18 @@ impl<const D: usize> Forces<D> {
 
     /// Brings the entries of ghosts from their owners.
     pub fn bring(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
-        self.halo.bring(comm, &mut [values]);
+        self.halo.update_ghosts(comm, &mut [values]);
     }
 
     /// Exchange the ghost values of several columns over the local points. Collective.
     pub fn bring_all(&mut self, comm: &dyn Communicator, columns: &mut [&mut [f64]]) {
-        self.halo.bring(comm, columns);
+        self.halo.update_ghosts(comm, columns);
     }
 
     /// Brings the ghosts' displacements up to date.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         let mut components = displacement.each_mut().map(Vec::as_mut_slice);
-        self.halo.bring(comm, &mut components);
+        self.halo.update_ghosts(comm, &mut components);
     }
 
     /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are

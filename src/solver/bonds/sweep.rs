@@ -419,7 +419,7 @@ unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
     // SAFETY: passed on to the caller.
-    let here = unsafe { points.here(vector.place) };
+    let here = unsafe { points.here(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
         let mut bonds = unsafe { points.load::<S, true>(simd, &here, vector, o) };
@@ -450,7 +450,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
         let mut sums = kernel.start();
         let mut gone = 0;
         // SAFETY: `points` was made for the grid of the vector.
-        let own = unsafe { points.here(vector.place) };
+        let own = unsafe { points.here(vector.slot) };
         for o in 0..vector.offsets.len() {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
@@ -461,7 +461,7 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
             kernel.add(simd, &mut bonds, &mut sums);
             gone |= before ^ bonds.intact;
             if K::BondHistory::COUNT > 0 && kernel.stores_history() {
-                store_history(vector.groups.numbers(o), &bonds.history, before);
+                store_history(vector.groups.history(o), &bonds.history, before);
             }
         }
         (sums, gone)
@@ -484,7 +484,7 @@ impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
         let (kernel, points, vector) = (self.kernel, self.points, self.vector);
         let mut broken = K::Broken::splat(0.0);
         // SAFETY: `points` was made for the grid of the vector.
-        let own = unsafe { points.here(vector.place) };
+        let own = unsafe { points.here(vector.slot) };
         for o in 0..vector.offsets.len() {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
@@ -554,7 +554,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
                 kernel.add(simd, &mut bonds, &mut sums);
                 gone |= before ^ bonds.intact;
                 if K::BondHistory::COUNT > 0 && kernel.stores_history() {
-                    store_history(row.groups.numbers(group), &bonds.history, before);
+                    store_history(row.groups.history(group), &bonds.history, before);
                 }
             }
             for quantity in 0..K::Sums::COUNT {

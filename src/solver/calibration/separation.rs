@@ -1,48 +1,50 @@
-//! What it costs to part a body: a block of its lattice is cut along a plane between two layers of points, and
-//! its halves move off until no bond joins them.
+//! The separation energy of a body: a block of its lattice is pulled apart along a plane between two
+//! layers of points until no bond crosses the plane.
 
 use crate::comm::threads;
 use crate::damage::{CriticalStretch, DamageLaw};
-use crate::problem::single_body::{alone, fill};
+use crate::problem::single_body::{fill, single_body};
 use crate::problem::{Block, Problem, Toughness};
 use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::BondUpdate;
 
-/// Blocks with more bonds than this are not parted: it would take more than seconds.
-const MOST_BONDS: f64 = 1e6;
+/// Maximum number of bonds of a block, which takes some seconds.
+const MAX_BONDS: f64 = 1e6;
 
-/// The share by which the way of the halves grows from step to step. Bonds break late by up to as much, which
-/// is not counted.
+/// Relative growth of the separation per step. Bonds break late by at most this; the overshoot energy is
+/// subtracted.
 const GROWTH: f64 = 0.01;
 
-/// Way at the start, over that at which the first bond is expected to break.
+/// First separation over that at which the first bond is expected to break.
 const START: f64 = 0.02;
 
-/// The block has parted long before so many steps.
-const MOST_STEPS: u32 = 1500;
+/// Maximum number of steps; blocks separate in far fewer.
+const MAX_STEPS: u32 = 1500;
 
-/// The share by which a cutoff that is a multiple of the spacing may be rounded down.
+/// Relative tolerance of a cutoff that is a multiple of the spacing.
 const SLACK: f64 = 1e-9;
 
-/// Steps from one look at the bonds to the next.
-const LOOK: u32 = 20;
+/// Steps between checks of the bonds across the plane.
+const CHECK_INTERVAL: u32 = 20;
 
-/// What a unit area costs when the upper half moves off at an angle (rad) to the normal of the cut, as a share of
-/// the fracture energy. The normal is along y (in 1-D along x), and what is left of the way is along x. What bonds
-/// hold above their criterion when they are seen to break is not counted.
+/// The separation energy per area over the fracture energy, if the upper half moves at an angle (rad) to
+/// the normal of the plane.
 ///
-/// `None` for a body without a fracture energy, for points from a file, for families so large that it would take
-/// long, and for a body that does not part.
+/// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of
+/// bonds at breaking is subtracted.
+///
+/// `None` for a body without a fracture energy, for points from a file, for families that are too large,
+/// and for a body that does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
-    let (mut block, spacing) = alone(problem, body)?;
+    let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;
     let fracture_energy = fracture_energy(problem, body)?;
     let first = match block_laws(&block, &Block::unrefined(&block.bodies[0])).damage? {
         DamageLaw::CriticalStretch(law) => law.critical,
         DamageLaw::BondEnergy(law) => law.stretch,
     };
-    // Families of the middle, and of their neighbours, are whole.
+    // Large enough for complete families of the middle points and of their neighbours.
     let cutoff = cutoffs(&block)[0];
     let dimension = problem.dimension.count();
     let normal = normal(dimension);
@@ -59,24 +61,24 @@ pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Op
         bonds *= 2.0 * cells * (2.0 * reach + 1.0) * points.powi(2);
     }
     fill(&mut block, [upper.map(|x| -x), upper], spacing, origin);
-    if bonds > MOST_BONDS {
+    if bonds > MAX_BONDS {
         return None;
     }
-    let way = Way {
+    let separation = Separation {
         angle,
         start: START * first * spacing[normal],
         half_cell: spacing.map(|edge| 0.5 * edge),
         height: 2.0 * upper[normal],
     };
     let spent = match dimension {
-        1 => way.energy::<1>(&block),
-        2 => way.energy::<2>(&block),
-        _ => way.energy::<3>(&block),
+        1 => separation.energy::<1>(&block),
+        2 => separation.energy::<2>(&block),
+        _ => separation.energy::<3>(&block),
     };
     spent.map(|energy| energy / fracture_energy)
 }
 
-/// Index of the direction of the cut's normal.
+/// Index of the axis of the plane's normal.
 fn normal(dimension: usize) -> usize {
     usize::from(dimension > 1)
 }
@@ -96,38 +98,38 @@ fn fracture_energy(problem: &Problem, body: usize) -> Option<f64> {
     }
 }
 
-/// How the upper half moves off.
-struct Way {
-    /// To the normal, rad.
+/// The motion of the upper half.
+struct Separation {
+    /// Angle to the normal, rad.
     angle: f64,
-    /// Of the first step, m.
+    /// Separation at the first step, m.
     start: f64,
     /// Half the edges of a cell, m.
     half_cell: [f64; 3],
-    /// Of the block, m.
+    /// Height of the block, m.
     height: f64,
 }
 
-impl Way {
-    /// The energy that a unit area in the middle of the cut takes, J/m².
+impl Separation {
+    /// Separation energy per area in the middle of the plane, J/m².
     fn energy<const D: usize>(&self, block: &Problem) -> Option<f64> {
         let comm = threads::alone();
         let mut simulation = Simulation::<D>::new(block, &comm).ok()?;
         let normal = normal(D);
         let (sin, cos) = self.angle.sin_cos();
         let upper: Vec<bool> = (simulation.model.reference[normal].iter())
-            .map(|place| *place > 0.0)
+            .map(|coordinate| *coordinate > 0.0)
             .collect();
-        let in_middle = |place: &[f64; 3]| {
+        let in_middle = |position: &[f64; 3]| {
             let mut sides = (0..D).filter(|k| *k != normal);
-            sides.all(|k| place[k].abs() < self.half_cell[k])
+            sides.all(|k| position[k].abs() < self.half_cell[k])
         };
         let points = 0..simulation.model.owned();
         let middle: Vec<bool> = points
             .map(|point| in_middle(&simulation.model.position(point)))
             .collect();
         let mut size = self.start;
-        for step in 1..=MOST_STEPS {
+        for step in 1..=MAX_STEPS {
             let fields = &mut simulation.fields.displacement;
             for (point, _) in upper.iter().enumerate().filter(|(_, upper)| **upper) {
                 fields[normal][point] = cos * size;
@@ -137,7 +139,7 @@ impl Way {
             }
             simulation.evaluate(BondUpdate::Step(0.0));
             size *= 1.0 + GROWTH;
-            if step % LOOK == 0 && is_parted(&simulation, &middle, &upper) {
+            if step % CHECK_INTERVAL == 0 && is_separated(&simulation, &middle, &upper) {
                 return Some(spent(&mut simulation, &middle, self.height));
             }
         }
@@ -145,20 +147,20 @@ impl Way {
     }
 }
 
-/// Whether no bond of the middle points crosses the cut.
-fn is_parted<const D: usize>(
+/// Test that no intact bond of the middle points crosses the plane.
+fn is_separated<const D: usize>(
     simulation: &Simulation<'_, D>,
     middle: &[bool],
     upper: &[bool],
 ) -> bool {
     let mut crossing = 0_u64;
-    simulation.forces.for_each_intact(|here, there| {
-        crossing += u64::from(middle[here] && upper[here] != upper[there]);
+    simulation.forces.for_each_intact(|i, j| {
+        crossing += u64::from(middle[i] && upper[i] != upper[j]);
     });
     crossing == 0
 }
 
-/// What a unit area of the middle column has taken, whose height is given (m); J/m².
+/// Energy per area dissipated in the middle column of a given height (m), J/m².
 fn spent<const D: usize>(simulation: &mut Simulation<'_, D>, middle: &[bool], height: f64) -> f64 {
     let dissipated = simulation.forces.stored(&simulation.model).dissipated;
     let (model, fields) = (&simulation.model, &simulation.fields);

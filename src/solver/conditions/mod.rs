@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::set;
 use crate::problem::{Action, Problem};
-use crate::refine::{Grids, Shares};
+use crate::refine::{Grids, SetFractions};
 
 use super::model::Model;
 use super::motion::Fields;
@@ -91,7 +91,7 @@ fn loaded<const D: usize>(
     if problem.refinement.is_none() {
         return (members(problem, model, set), None);
     }
-    let mut shares = Shares::new(grids);
+    let mut shares = SetFractions::new(grids);
     // Sets of a load are not given by ids here, see `is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
         set::contains(&problem.sets[set], problem.horizon, 0, position, body)

@@ -49,7 +49,7 @@ impl Facets {
         });
         let mut all = all_gather_many(comm, &own);
         // Of those that were parted on a coarser grid bonds may be too short to tell.
-        let faces = simulation.grids.parted_faces().into_iter();
+        let faces = simulation.grids.suppressed_faces().into_iter();
         all.extend(faces.map(|(centre, edges, axis)| Facet {
             centre,
             edges,

@@ -121,7 +121,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         let facets = Facets::new(self);
         if !facets.are_none() {
-            grids.part(&self.grids, &|a, b| {
+            grids.suppress_separated(&self.grids, &|a, b| {
                 facets.lie_between(&facets.near(a), a, b)
             });
         }

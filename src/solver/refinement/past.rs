@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::points::Point;
-use crate::refine::{Grids, NodeKey, Place};
+use crate::refine::{GridIndex, Grids, NodeKey};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
@@ -17,7 +17,7 @@ pub struct Past {
     /// What new points have of each.
     births: Vec<Birth>,
     /// Local index by body and place, in steps of the finest level, of points where a grid is refined.
-    at: FxHashMap<(usize, Place), usize>,
+    at: FxHashMap<(usize, GridIndex), usize>,
     /// Which local points leave.
     leaves: Vec<bool>,
 }
@@ -60,7 +60,7 @@ impl Past {
         let blocks = &columns[columns.len() - 1];
         let place = |point: usize| {
             let body = problem.body_of(blocks[point] as usize);
-            let place = grids.place_at(body, simulation.model.position(point))?;
+            let place = grids.index_at(body, simulation.model.position(point))?;
             let cell = grids.cell_of(place);
             let mut changed = changed[body].iter().flatten();
             let is_near = changed.any(|cells| cells.contains(cell));
@@ -146,7 +146,7 @@ impl Past {
         [body, _, x, y, z]: &NodeKey,
     ) -> Option<(usize, Vec<usize>)> {
         let (body, place) = (*body as usize, [*x, *y, *z]);
-        let at = |place: Place| self.at.get(&(body, place)).copied();
+        let at = |place: GridIndex| self.at.get(&(body, place)).copied();
         let parents = grids.parents(place).into_iter().map(at);
         Some((at(place)?, parents.collect::<Option<_>>()?))
     }
@@ -168,7 +168,7 @@ impl Past {
         let mut born = Born::default();
         for piece in pieces.iter().filter(|piece| piece.id >= model.coarsest) {
             let body = simulation.problem.body_of(piece.block as usize);
-            let Some(place) = grids.place_at(body, piece.position) else {
+            let Some(place) = grids.index_at(body, piece.position) else {
                 continue;
             };
             if !self.at.contains_key(&(body, place)) {
@@ -181,7 +181,7 @@ impl Past {
     }
 
     /// Where the row of a new point starts: the mean of those that it lies between.
-    fn row(&self, grids: &Grids<'_>, (body, place): (usize, Place), born: &mut Born) -> usize {
+    fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
         if let Some(row) = born.at.get(&(body, place)) {
             return *row;
         }
@@ -216,6 +216,6 @@ impl Past {
 #[derive(Default)]
 struct Born {
     /// Where the row starts, by body and place.
-    at: FxHashMap<(usize, Place), usize>,
+    at: FxHashMap<(usize, GridIndex), usize>,
     rows: Vec<f64>,
 }

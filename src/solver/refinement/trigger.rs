@@ -110,7 +110,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
-        let pick = |block, position| self.grids.pick(block, position);
+        let pick = |block, position| self.grids.refining(block, position);
         // Where nothing becomes coarse again, points that cannot be refined need not be looked at.
         let matters =
             |block, position| trigger.coarsen_after.is_some() || pick(block, position).is_some();

@@ -1,0 +1,63 @@
+//! Fractions of refined points that belong to a set of level-0 points.
+
+use rustc_hash::FxHashMap;
+
+use super::Grids;
+use super::grid_index::GridIndex;
+
+/// Computes the fraction with which points belong to a set of level-0 points.
+///
+/// The fraction of a level-0 point is 0 or 1; that of a finer point is the mean of its parents'. A point
+/// takes its volume in equal parts from its parents. So refinement does not change the set's volume.
+pub struct SetFractions<'a, 'b> {
+    grids: &'b Grids<'a>,
+    cache: FxHashMap<(usize, GridIndex), f64>,
+}
+
+impl<'a, 'b> SetFractions<'a, 'b> {
+    /// A calculator for one set.
+    pub fn new(grids: &'b Grids<'a>) -> Self {
+        Self {
+            grids,
+            cache: FxHashMap::default(),
+        }
+    }
+
+    /// The fraction of a point, given its body, id and reference position (m); `selected` tests a body and
+    /// a reference position of level 0.
+    pub fn of(
+        &mut self,
+        (body, id, position): (usize, u64, [f64; 3]),
+        selected: &impl Fn(usize, [f64; 3]) -> bool,
+    ) -> f64 {
+        let index = self.grids.index_at(body, position);
+        match index.filter(|_| id >= self.grids.coarsest()) {
+            Some(index) => self.at(body, index, selected),
+            None => f64::from(u8::from(selected(body, position))),
+        }
+    }
+
+    /// The fraction at an index of the finest level.
+    fn at(
+        &mut self,
+        body: usize,
+        index: GridIndex,
+        selected: &impl Fn(usize, [f64; 3]) -> bool,
+    ) -> f64 {
+        if let Some(fraction) = self.cache.get(&(body, index)) {
+            return *fraction;
+        }
+        let fraction = match self.grids.coarse_position(body, index) {
+            Some(position) => f64::from(u8::from(selected(body, position))),
+            None => {
+                let parents = self.grids.parents(index);
+                let fractions = parents
+                    .iter()
+                    .map(|parent| self.at(body, *parent, selected));
+                fractions.sum::<f64>() / parents.len() as f64
+            }
+        };
+        self.cache.insert((body, index), fraction);
+        fraction
+    }
+}

@@ -1,0 +1,106 @@
+//! A dry run: points and bonds on one rank, without the time loop, for the figures of `check`.
+
+use std::time::{Duration, Instant};
+
+use super::memory;
+use super::{Cost, Measured, Survey, ghost_share};
+use crate::comm::threads;
+use crate::error::Result;
+use crate::problem::Problem;
+use crate::solver::Simulation;
+use crate::solver::conditions::output_members;
+use crate::solver::observers::HistoryObserver;
+use crate::solver::steps::choose_steps;
+
+/// Duration of the speed measurement.
+const MEASUREMENT: Duration = Duration::from_millis(300);
+
+/// Maximum number of steps of the speed measurement.
+const MAX_STEPS: u32 = 1000;
+
+/// The results of a dry run.
+#[derive(Debug, Clone)]
+pub struct DryRun {
+    /// Figures and warnings.
+    pub survey: Survey,
+    /// Number of points.
+    pub points: u64,
+    /// Number of bonds.
+    pub bonds: u64,
+    /// Number of bonds stored as a lattice.
+    pub lattice_bonds: u64,
+    /// Ghosts per owned point on the given number of ranks.
+    pub ghosts: f64,
+    /// Memory and disk space.
+    pub cost: Cost,
+    /// Stable step × `safety`, s.
+    pub stable_step: f64,
+    /// For each stage: first step (s) and number of steps if no bond breaks.
+    pub steps: Vec<(f64, f64)>,
+    /// Wall-clock time per step on one rank, s, if measured.
+    pub seconds: Option<f64>,
+}
+
+/// Dry-run a problem for a number of ranks; `measure` measures the time per step.
+///
+/// # Errors
+/// As a run before its first step.
+pub fn dry_run(problem: &Problem, ranks: u32, measure: bool) -> Result<DryRun> {
+    match problem.dimension.count() {
+        1 => dry_run_in::<1>(problem, ranks, measure),
+        2 => dry_run_in::<2>(problem, ranks, measure),
+        _ => dry_run_in::<3>(problem, ranks, measure),
+    }
+}
+
+fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> Result<DryRun> {
+    let comm = threads::alone();
+    let before = memory::reset_peak();
+    let mut simulation = Simulation::<D>::new(problem, &comm)?;
+    let after = memory::resident();
+    simulation.check()?;
+    let columns = HistoryObserver::new(&simulation)?.columns().len();
+    let total = simulation.model.total;
+    let output_points = output_members(problem, &comm, &simulation.model)?;
+    let output_points = output_points.map_or(total, |points| points.len() as u64);
+    let survey = Survey::new(&mut simulation);
+    let measured = before.map(|before| Measured {
+        peak: after.peak - before,
+        resident: after.now - before,
+    });
+    Ok(DryRun {
+        survey,
+        points: total,
+        bonds: simulation.forces.directed_bonds() / 2,
+        lattice_bonds: simulation.forces.lattice_bonds() / 2,
+        ghosts: ghost_share(&edges(&simulation), problem.horizon, ranks),
+        cost: Cost::of(&simulation, columns, output_points, measured),
+        stable_step: simulation.scaled_stable_step(),
+        steps: choose_steps(problem, simulation.stable_step)?,
+        seconds: measure.then(|| seconds_per_step(&mut simulation)),
+    })
+}
+
+/// The edges of the bounding box of all points, m.
+fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
+    simulation.model.reference.each_ref().map(|coordinates| {
+        let low = coordinates.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = coordinates
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        high - low
+    })
+}
+
+/// Measure the wall-clock time per step, s.
+fn seconds_per_step<const D: usize>(simulation: &mut Simulation<'_, D>) -> f64 {
+    // The first step warms the caches.
+    simulation.advance_halfway();
+    let (start, mut steps) = (Instant::now(), 0);
+    while start.elapsed() < MEASUREMENT && steps < MAX_STEPS {
+        simulation.advance_halfway();
+        steps += 1;
+    }
+    start.elapsed().as_secs_f64() / f64::from(steps)
+}
