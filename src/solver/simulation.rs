@@ -78,8 +78,6 @@ pub struct Simulation<'a, const D: usize> {
     pub density_scale_energy: f64,
     /// Where the time went.
     pub times: Times,
-    /// Whether the second half kick of the present step is still to be made.
-    pub(super) is_halfway: bool,
     bad: Option<BadPoint>,
 }
 
@@ -237,7 +235,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
             refined: Refined::default(),
             density_scale_energy: 0.0,
             times: Times::default(),
-            is_halfway: false,
             bad: None,
         };
         simulation.scale_density();
@@ -265,34 +262,42 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.stages[self.stage].time
     }
 
-    /// Makes one step, or one iteration of a load step. Collective.
+    /// Makes one step, or one iteration of a load step. A [`Stepper`](super::Stepper) makes several faster.
+    /// Collective.
     pub fn advance(&mut self) {
-        self.advance_halfway();
-        self.complete_step();
+        if self.leap(false) {
+            self.kick();
+        }
     }
 
-    /// As [`Self::advance`], but the second half kick may be left to the next step, which then goes over the
-    /// points once. Until it is made velocities are those in the middle of the step, and reactions, loads, damping and
-    /// the energies of these those of the step before. Collective.
-    pub fn advance_halfway(&mut self) {
-        if self.is_stage_over() && self.stage + 1 < self.stages.len() {
-            self.begin_stage(self.stage + 1);
+    /// Makes one step, or one iteration of a load step, but for its second half kick. `kick_is_due` says whether that
+    /// of the step before is still to be made, which it is not where a stage begins. Returns whether that of this step
+    /// is. Collective.
+    pub(super) fn leap(&mut self, kick_is_due: bool) -> bool {
+        if let Some(stage) = self.next_stage() {
+            self.begin_stage(stage);
         }
         let Time {
             method, adaptive, ..
         } = self.time_rule();
         match (method, adaptive) {
-            (Method::Explicit, None) => self.make_step(),
-            (Method::Explicit, Some(rule)) => self.make_adaptive_step(&rule),
-            (Method::Relaxation(rule), _) => self.relax(&rule),
+            (Method::Explicit, None) => {
+                self.make_step(kick_is_due);
+                true
+            }
+            (Method::Explicit, Some(rule)) => {
+                self.make_adaptive_step(&rule);
+                false
+            }
+            (Method::Relaxation(rule), _) => {
+                self.relax(&rule);
+                false
+            }
         }
     }
 
-    /// Makes the second half kick, if that was left.
-    pub fn complete_step(&mut self) {
-        if !std::mem::take(&mut self.is_halfway) {
-            return;
-        }
+    /// Makes the second half kick of the present step.
+    pub(super) fn kick(&mut self) {
         let start = Instant::now();
         let clock = self.clock;
         self.set_second_half(&clock);
@@ -303,27 +308,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.motion += start.elapsed();
     }
 
-    /// Whether the present step is complete.
-    pub fn is_complete(&self) -> bool {
-        !self.is_halfway
-    }
-
-    /// Makes one step by the equation of motion, but for its second half kick. Collective.
-    pub(super) fn make_step(&mut self) {
+    /// Makes one step by the equation of motion, but for its second half kick; before it that of the step before, if
+    /// it is due. Collective.
+    pub(super) fn make_step(&mut self, kick_is_due: bool) {
         let start = Instant::now();
         let before = self.clock;
         let step = before.step();
-        let was_halfway = std::mem::replace(&mut self.is_halfway, true);
-        if was_halfway {
+        if kick_is_due {
             self.set_second_half(&before);
         }
         self.clock.advance();
         self.conditions.set_places(self.clock.time(), step);
         let finite = self.walk(|part, mut here| {
-            let finite = if was_halfway && here.is_empty() && part.damping.is_none() {
+            let finite = if kick_is_due && here.is_empty() && part.damping.is_none() {
                 verlet::kick_and_drift(part, step)
             } else {
-                let finite = !was_halfway || second_half(part, &mut here, step);
+                let finite = !kick_is_due || second_half(part, &mut here, step);
                 here.before_moving(part);
                 verlet::half_kick_and_drift(part, step);
                 here.apply_displacements(part);

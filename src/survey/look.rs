@@ -7,7 +7,7 @@ use super::{Cost, Measured, Survey, ghost_share};
 use crate::comm::threads;
 use crate::error::Result;
 use crate::problem::Problem;
-use crate::solver::Simulation;
+use crate::solver::{Simulation, Stepper};
 use crate::solver::conditions::output_members;
 use crate::solver::observers::HistoryObserver;
 use crate::solver::steps::choose_steps;
@@ -77,7 +77,7 @@ fn look_in<const D: usize>(problem: &Problem, ranks: u32, tried: bool) -> Result
         cost: Cost::of(&simulation, columns, held, measured),
         stable_step: simulation.scaled_stable_step(),
         steps: choose_steps(problem, simulation.stable_step)?,
-        seconds: tried.then(|| seconds_a_step(&mut simulation)),
+        seconds: tried.then(|| seconds_a_step(simulation)),
     })
 }
 
@@ -91,12 +91,13 @@ fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
 }
 
 /// Wall-clock time of a step, from some of them.
-fn seconds_a_step<const D: usize>(simulation: &mut Simulation<'_, D>) -> f64 {
+fn seconds_a_step<const D: usize>(simulation: Simulation<'_, D>) -> f64 {
+    let mut stepper = Stepper::new(simulation);
     // The first ones bring everything into the caches.
-    simulation.advance_halfway();
+    stepper.advance();
     let (start, mut steps) = (Instant::now(), 0);
     while start.elapsed() < TRIAL && steps < MOST_STEPS {
-        simulation.advance_halfway();
+        stepper.advance();
         steps += 1;
     }
     start.elapsed().as_secs_f64() / f64::from(steps)
