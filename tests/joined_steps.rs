@@ -2,9 +2,9 @@
 
 use crate::support::simulate_on;
 use fissure::comm::IdOrder;
-use fissure::solver::{Simulation, Stepper};
 use fissure::solver::motion::Saved;
 use fissure::solver::observers::{HistoryObserver, Snapshot};
+use fissure::solver::{Simulation, Stepper};
 
 /// Two sheets of different density that touch, in lattices with a list between them, or in lists: with more points
 /// than a thread works on at once, and a last part of fewer.

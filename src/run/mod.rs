@@ -49,9 +49,9 @@ use crate::comm::{self, Communicator, agree};
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::problem::Problem;
-use crate::solver::{Simulation, Stepper};
 use crate::solver::observers::{ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
+use crate::solver::{Simulation, Stepper};
 use crate::survey::{Survey, calibrated};
 
 use checkpoints::CheckpointWriter;

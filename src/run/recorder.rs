@@ -11,11 +11,11 @@ use crate::output::{
 };
 use crate::problem::Field;
 use crate::problem::Problem;
-use crate::solver::{Simulation, Stepper};
 use crate::solver::conditions::output_members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
+use crate::solver::{Simulation, Stepper};
 
 use super::crack_files;
 use super::files::Files;

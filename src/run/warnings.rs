@@ -5,9 +5,9 @@ use super::observer::Message;
 use super::recorder::Recorder;
 use crate::error::Result;
 use crate::message::format_number;
-use crate::solver::{Simulation, Stepper};
 use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
+use crate::solver::{Simulation, Stepper};
 
 /// Kinetic energy as a share of the strain energy above which loading is not slow.
 const INERTIA_SHARE: f64 = 0.05;

@@ -11,8 +11,8 @@ use crate::partition::Cost;
 use crate::points::Point;
 use crate::problem::Balance;
 
-use super::{Simulation, Stepper};
 use super::model::Model;
+use super::{Simulation, Stepper};
 
 /// A repartition; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use crate::comm::{self, Communicator, agree};
+use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
@@ -492,39 +492,40 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let valued = are_finite(self.problem, self.comm, &self.model, time);
         valued.map_err(|error| Error::run(error.message))?;
         let own = self.bad.filter(|bad| bad.step as f64 == step);
-        let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
-        comm::min(self.comm, &mut smallest);
-        let named = match own.filter(|bad| bad.id as f64 == smallest[0]) {
-            None => Ok(()),
-            Some(bad) => {
-                let block = usize::from(self.model.block[bad.index]);
-                let body = self.problem.block(block).body;
-                let position = self.model.position(bad.index);
-                Err(if bad.step == 0 {
-                    let message = format!(
-                        "[body.{}]: the force on its point {}, {:?} m, is not finite at the start; \
-                         do displacements move points onto one another?",
-                        body.name,
-                        bad.id,
-                        &position[..D],
-                    );
-                    self.problem.source.error(body.span.clone(), message)
-                } else {
-                    Error::run(format!(
-                        "step {} (t = {time:.6e} s): the motion of point {} of body `{}` is not \
-                         finite; reference position {:?} m. A time step beyond the stable one, or a \
-                         load that grows without bound? (time step {:.3e} s, stable {:.3e} s)",
-                        bad.step,
-                        bad.id,
-                        body.name,
-                        &position[..D],
-                        self.clock.step(),
-                        self.scaled_stable_step(),
-                    ))
-                })
+        let own = own.map(|bad| {
+            let [x, y, z] = self.model.position(bad.index);
+            Found {
+                key: 0.0,
+                ids: [bad.id],
+                payload: [f64::from(self.model.block[bad.index]), x, y, z],
             }
+        });
+        let Some(Found {
+            ids: [id],
+            payload: [block, position @ ..],
+            ..
+        }) = least(self.comm, own)
+        else {
+            unreachable!("a rank has the earliest step");
         };
-        agree(self.comm, named)
+        let (body, position) = (self.problem.block(block as usize).body, &position[..D]);
+        Err(if step == 0.0 {
+            let message = format!(
+                "[body.{}]: the force on its point {id}, {position:?} m, is not finite at the start; do displacements \
+                 move points onto one another?",
+                body.name,
+            );
+            self.problem.source.error(body.span.clone(), message)
+        } else {
+            Error::run(format!(
+                "step {step} (t = {time:.6e} s): the motion of point {id} of body `{}` is not finite; reference \
+                 position {position:?} m. A time step beyond the stable one, or a load that grows without bound? (time \
+                 step {:.3e} s, stable {:.3e} s)",
+                body.name,
+                self.clock.step(),
+                self.scaled_stable_step(),
+            ))
+        })
     }
 }
 

@@ -7,10 +7,10 @@ use super::{Cost, Measured, Survey, ghost_share};
 use crate::comm::threads;
 use crate::error::Result;
 use crate::problem::Problem;
-use crate::solver::{Simulation, Stepper};
 use crate::solver::conditions::output_members;
 use crate::solver::observers::HistoryObserver;
 use crate::solver::steps::choose_steps;
+use crate::solver::{Simulation, Stepper};
 
 /// How long the time loop is tried to know its speed.
 const TRIAL: Duration = Duration::from_millis(300);

@@ -8,8 +8,8 @@ use crate::comm::halo::Traffic;
 use crate::error::Result;
 use crate::lanes::Instructions;
 use crate::problem::Problem;
-use crate::solver::{Simulation, Stepper};
 use crate::solver::simulation::Times;
+use crate::solver::{Simulation, Stepper};
 
 /// What some steps of a run took, and what they were made with, on this rank.
 #[derive(Debug, Clone)]
