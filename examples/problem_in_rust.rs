@@ -87,11 +87,7 @@ struct Printer {
 }
 
 impl Observer for Printer {
-    fn looks_at_velocities(&self) -> bool {
-        false
-    }
-
-    fn row(&mut self, now: &dyn View, row: &Row) {
+    fn row(&mut self, now: &mut dyn View, row: &Row) {
         if self.speaks {
             let energies = row.energies();
             println!(

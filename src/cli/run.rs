@@ -190,7 +190,7 @@ impl Observer for Log {
         }
     }
 
-    fn begin(&mut self, now: &dyn View) {
+    fn begin(&mut self, now: &mut dyn View) {
         let left = now.last() - now.number();
         if self.speaks && left > 0 {
             let step = si(now.step(), "s");
@@ -200,12 +200,8 @@ impl Observer for Log {
         self.progress = Progress::new(self.speaks, now.number(), now.last());
     }
 
-    fn step(&mut self, now: &dyn View) {
+    fn step(&mut self, now: &mut dyn View) {
         self.progress.show(now.number(), now.last(), now.time());
-    }
-
-    fn looks_at_velocities(&self) -> bool {
-        false
     }
 
     fn end(&mut self, complete: bool) {

@@ -55,6 +55,9 @@ pub trait Communicator {
     /// Send `outgoing[q]` to rank q; return the received buffers by rank.
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
 
+    /// Gather the bytes of all ranks, concatenated in rank order; ranks may have different counts.
+    fn all_gather(&self, own: &[u8]) -> Vec<u8>;
+
     /// Send and receive all buffers, and call `during` while messages are in flight.
     ///
     /// Large messages progress only inside MPI calls. So `during` should call its argument from time to
@@ -92,9 +95,46 @@ pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
 
 /// The values of all ranks, concatenated in rank order; ranks may have different counts.
 pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
-    let bytes: &[u8] = bytemuck::cast_slice(own);
-    let all = comm.all_to_all(vec![bytes.to_vec(); comm.size()]).concat();
-    bytemuck::pod_collect_to_vec(&all)
+    bytemuck::pod_collect_to_vec(&comm.all_gather(bytemuck::cast_slice(own)))
+}
+
+/// What a rank has found, to be compared with what others have; see [`least`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found<T, const N: usize = 1> {
+    /// What is compared first.
+    pub key: f64,
+    /// What is compared where keys are equal, such as the id of a point.
+    pub ids: [u64; N],
+    /// What comes with it.
+    pub payload: T,
+}
+
+/// What the ranks have found with the least key and, of these, the least ids; none if no rank has found anything. The
+/// same on all ranks. Collective.
+pub fn least<T: bytemuck::Pod, const N: usize>(
+    comm: &dyn Communicator,
+    own: Option<Found<T, N>>,
+) -> Option<Found<T, N>>
+where
+    [u64; N]: bytemuck::Pod,
+{
+    let mut packed = Vec::new();
+    if let Some(Found { key, ids, payload }) = own {
+        packed.extend_from_slice(bytemuck::bytes_of(&key));
+        packed.extend_from_slice(bytemuck::bytes_of(&ids));
+        packed.extend_from_slice(bytemuck::bytes_of(&payload));
+    }
+    let (key, ids) = (size_of::<f64>(), size_of::<[u64; N]>());
+    let all = comm.all_gather(&packed);
+    let found = all.chunks_exact(key + ids + size_of::<T>()).map(|bytes| {
+        let (first, payload) = bytes.split_at(key + ids);
+        Found {
+            key: bytemuck::pod_read_unaligned(&first[..key]),
+            ids: bytemuck::pod_read_unaligned(&first[key..]),
+            payload: bytemuck::pod_read_unaligned(payload),
+        }
+    });
+    found.min_by(|a: &Found<T, N>, b| a.key.total_cmp(&b.key).then(a.ids.cmp(&b.ids)))
 }
 
 /// The sum of `value` over the ranks before this one, and over all.
@@ -181,6 +221,24 @@ mod tests {
         for all in gathered {
             assert_eq!(all, [[1.0, 0.5], [2.0, 0.5], [2.0, 0.5]]);
         }
+    }
+
+    #[test]
+    fn the_least_key_and_then_the_least_id_count() {
+        let of = |key: f64, id: u64, payload: u32| Found {
+            key,
+            ids: [id],
+            payload,
+        };
+        let found = threads::run(4, |comm| match comm.rank() {
+            0 => least(comm, Some(of(2.0, 0, 5))),
+            1 => least(comm, Some(of(-1.0, 1 << 60, 6))),
+            2 => least(comm, Some(of(-1.0, (1 << 60) - 1, 7))),
+            _ => least(comm, None),
+        });
+        assert_eq!(found, [Some(of(-1.0, (1 << 60) - 1, 7)); 4]);
+        let none = threads::run(2, |comm| least::<(), 1>(comm, None));
+        assert_eq!(none, [None; 2]);
     }
 
     #[test]

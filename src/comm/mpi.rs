@@ -8,6 +8,7 @@ use std::marker::PhantomData;
 use std::os::raw::c_int;
 
 use mpi::collective::SystemOperation;
+use mpi::datatype::PartitionMut;
 use mpi::environment::Universe;
 use mpi::topology::{Communicator as _, SimpleCommunicator};
 use mpi::traits::*;
@@ -259,6 +260,40 @@ impl Communicator for World {
         }
         drop(in_flight);
         incoming
+    }
+
+    fn all_gather(&self, own: &[u8]) -> Vec<u8> {
+        let mut sizes = vec![0_u64; self.size()];
+        self.world
+            .all_gather_into(&(own.len() as u64), &mut sizes[..]);
+        let mut all = vec![0; sizes.iter().sum::<u64>() as usize];
+        if all.len() <= LARGEST_MESSAGE {
+            let counts: Vec<c_int> = sizes.iter().map(|size| *size as c_int).collect();
+            let starts: Vec<c_int> = counts
+                .iter()
+                .scan(0, |end, count| {
+                    *end += count;
+                    Some(*end - count)
+                })
+                .collect();
+            let mut parts = PartitionMut::new(&mut all[..], counts, starts);
+            self.world.all_gather_varcount_into(own, &mut parts);
+            return all;
+        }
+        // The displacements may not fit in 32 bits.
+        let mut rest = &mut all[..];
+        for (rank, size) in sizes.into_iter().enumerate() {
+            let (part, others) = rest.split_at_mut(size as usize);
+            rest = others;
+            if rank == self.rank() {
+                part.copy_from_slice(own);
+            }
+            let process = self.world.process_at_rank(rank as i32);
+            for chunk in part.chunks_mut(LARGEST_MESSAGE) {
+                process.broadcast_into(chunk);
+            }
+        }
+        all
     }
 
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>) {

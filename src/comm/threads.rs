@@ -4,7 +4,8 @@ use std::sync::{Arc, Barrier, Mutex};
 
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 
-/// The shared state of the ranks: a barrier, and a slot for one message per pair of ranks.
+/// The shared state of the ranks: a barrier, and a slot for one message per pair of ranks. The slot of a rank and itself
+/// also holds what it contributes to an all-gather.
 struct Shared {
     barrier: Barrier,
     slots: Vec<Mutex<Vec<u8>>>,
@@ -60,12 +61,11 @@ impl ThreadRank {
             .expect("no rank panics while it holds a slot")
     }
 
-    /// Every rank's values, in rank order.
+    /// Every rank's values of which all have as many, in rank order.
     fn gather<T: bytemuck::Pod>(&self, values: &[T]) -> Vec<Vec<T>> {
-        let outgoing = vec![bytemuck::cast_slice(values).to_vec(); self.size];
-        self.all_to_all(outgoing)
-            .iter()
-            .map(|bytes| bytemuck::pod_collect_to_vec(bytes))
+        let all = self.all_gather(bytemuck::cast_slice(values));
+        let rows = (0..self.size).map(|rank| &all[rank * size_of_val(values)..]);
+        rows.map(|row| bytemuck::pod_collect_to_vec(&row[..size_of_val(values)]))
             .collect()
     }
 }
@@ -120,6 +120,17 @@ impl Communicator for ThreadRank {
             .collect();
         self.shared.barrier.wait();
         incoming
+    }
+
+    fn all_gather(&self, own: &[u8]) -> Vec<u8> {
+        *self.slot(self.rank, self.rank) = own.to_vec();
+        self.shared.barrier.wait();
+        let mut all = Vec::new();
+        for rank in 0..self.size {
+            all.extend_from_slice(&self.slot(rank, rank));
+        }
+        self.shared.barrier.wait();
+        all
     }
 
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>) {

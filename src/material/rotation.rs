@@ -121,8 +121,8 @@ pub fn displacement<S: Simd, const D: usize>(
         let mut turned = [Lanes::splat(0.0); D];
         if D > 1 {
             let (tx, ty) = (twice * xi[1] * -1.0, twice * xi[0]);
-            turned[0] = simd.whole(simd.multiply_add(*q0, tx, *z * ty * -1.0));
-            turned[1] = simd.whole(simd.multiply_add(*q0, ty, *z * tx));
+            turned[0] = simd.multiply_add(*q0, tx, *z * ty * -1.0);
+            turned[1] = simd.multiply_add(*q0, ty, *z * tx);
         }
         return turned;
     }

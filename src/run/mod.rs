@@ -51,10 +51,10 @@ use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::problem::Problem;
-use crate::solver::Simulation;
 use crate::solver::calibration::calibrated;
 use crate::solver::observers::{ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
+use crate::solver::{Simulation, Stepper};
 use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
@@ -191,13 +191,14 @@ impl<'a> Job<'a> {
         let decided = decisions(&simulation);
         self.observer.message(&Message::Decided(decided));
         self.look_before_the_first_step()?;
+        let mut stepper = Stepper::new(simulation);
         let (mut checkpoints, mut recorder) = match self.options.existing {
-            Existing::Continue => self.continue_run(&mut simulation)?,
-            Existing::Refuse | Existing::Replace => self.begin_run(&mut simulation)?,
+            Existing::Continue => self.continue_run(stepper.at_full_step())?,
+            Existing::Refuse | Existing::Replace => self.begin_run(&mut stepper)?,
         };
-        let first = simulation.clock.number();
-        self.observer.begin(&simulation);
-        let left = self.make_steps(&mut simulation, &mut checkpoints, &mut recorder)?;
+        let first = stepper.clock().number();
+        self.observer.begin(&mut stepper);
+        let left = self.make_steps(&mut stepper, &mut checkpoints, &mut recorder)?;
         self.observer.end(matches!(left, Left::Complete));
         let no_collective_cause = recorder.file.no_collective_cause();
         let last_row = recorder.last_row.take();
@@ -210,6 +211,7 @@ impl<'a> Job<'a> {
         };
         let whole = self.options.started.elapsed();
         let spent = [spent.0, spent.1, checkpoints.spent, whole];
+        let simulation = stepper.at_full_step();
         let steps = simulation.clock.number() - first;
         Ok(Outcome {
             stopped,
@@ -218,7 +220,7 @@ impl<'a> Job<'a> {
             time: simulation.clock.time(),
             last_row,
             files: self.files.clone(),
-            summary: Summary::new(&simulation, steps, checkpoints.written, spent),
+            summary: Summary::new(simulation, steps, checkpoints.written, spent),
             no_collective_cause,
         })
     }
@@ -244,7 +246,7 @@ impl<'a> Job<'a> {
     /// The time loop.
     fn make_steps<const D: usize>(
         &mut self,
-        simulation: &mut Simulation<'a, D>,
+        stepper: &mut Stepper<'a, D>,
         checkpoints: &mut CheckpointWriter,
         recorder: &mut Recorder<'a>,
     ) -> Result<Left> {
@@ -252,15 +254,17 @@ impl<'a> Job<'a> {
         let started = self.options.started;
         let limit = self.options.wall_time.map(|limit| (started, limit));
         let mut watch = Watch::new(signals.as_ref(), self.problem.checkpoint, limit);
+        let simulation = stepper.at_full_step();
         let mut contact = Some(ContactWatch::new(simulation));
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
         let mut energy = (!self.problem.relaxes()).then(|| EnergyWatch::new(simulation));
-        while !simulation.is_over() {
-            if simulation.is_refinement_due()
-                && let Some(regridded) = simulation.refine()?
+        while !stepper.is_over() {
+            if stepper.is_refinement_due()
+                && let Some(regridded) = stepper.at_full_step().refine()?
             {
+                let simulation = stepper.at_full_step();
                 recorder.follow(simulation)?;
                 stable = stable.min(self.warn_of_step(simulation, stable));
                 self.observer.message(&Message::Refined {
@@ -269,12 +273,12 @@ impl<'a> Job<'a> {
                     points: simulation.model.total,
                 });
             }
-            simulation.advance_halfway();
-            let clock = simulation.clock;
-            let complete = simulation.is_over();
-            let step = simulation.load_step.is_settled.then_some(&clock);
+            stepper.advance();
+            let clock = *stepper.clock();
+            let complete = stepper.is_over();
+            let step = stepper.load_step().is_settled.then_some(&clock);
             let due = step.is_some_and(|clock| recorder.is_due(clock));
-            let shows = due || complete || simulation.load_step.has_failed;
+            let shows = due || complete || stepper.load_step().has_failed;
             let looks = watch.end_turn(step) || shows;
             let decision = if looks {
                 watch.look(self.comm, step)
@@ -282,24 +286,24 @@ impl<'a> Job<'a> {
                 Decision::default()
             };
             let saves = complete || decision.checkpoint || decision.stop.is_some();
-            if shows || saves || self.observer.looks_at_velocities() {
-                simulation.complete_step();
+            if shows || saves {
+                // What the second half kick finds is checked, too.
+                stepper.at_full_step();
             }
             if looks {
-                if let Err(error) = simulation.check() {
+                if let Err(error) = stepper.check() {
                     // The reader of the result should see where it went wrong.
-                    recorder.write(simulation, true, true)?;
+                    recorder.write(stepper.at_full_step(), true, true)?;
                     return Ok(Left::Failed(error));
                 }
-                if due
-                    && let Some(found) = contact.as_ref().and_then(|watch| watch.look(simulation))
-                {
-                    self.warn_of_contact(&found, clock.time());
-                    contact = None;
-                }
                 if due {
-                    recorder.record(simulation, self.observer)?;
-                    slow = slow && !self.warn_of_inertia(simulation, recorder);
+                    let simulation = stepper.at_full_step();
+                    if let Some(found) = contact.as_ref().and_then(|watch| watch.look(simulation)) {
+                        self.warn_of_contact(&found, clock.time());
+                        contact = None;
+                    }
+                    recorder.record(stepper, self.observer)?;
+                    slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
                 if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
                     let growth = energy.look(row, &clock);
@@ -311,21 +315,22 @@ impl<'a> Job<'a> {
                             }
                         }
                         Err(error) => {
-                            recorder.write_failure(simulation)?;
+                            recorder.write_failure(stepper.at_full_step())?;
                             return Ok(Left::Failed(error));
                         }
                     }
                 }
                 if saves {
-                    watch.wrote_checkpoint(checkpoints.write(simulation, recorder)?);
+                    let cost = checkpoints.write(stepper.at_full_step(), recorder)?;
+                    watch.wrote_checkpoint(cost);
                 }
             }
-            self.observer.step(simulation);
+            self.observer.step(stepper);
             if let (Some(reason), false) = (decision.stop, complete) {
                 return Ok(Left::Stopped(reason));
             }
-            if !complete && let Some(done) = balance.look(simulation)? {
-                recorder.follow(simulation)?;
+            if !complete && let Some(done) = balance.look(stepper)? {
+                recorder.follow(stepper.at_full_step())?;
                 self.observer.message(&Message::Repartitioned {
                     number: clock.number(),
                     what: done,
@@ -338,8 +343,9 @@ impl<'a> Job<'a> {
 
     fn begin_run<const D: usize>(
         &mut self,
-        simulation: &mut Simulation<'a, D>,
+        stepper: &mut Stepper<'a, D>,
     ) -> Result<(CheckpointWriter, Recorder<'a>)> {
+        let simulation = stepper.at_full_step();
         let creation = match self.options.existing {
             Existing::Replace => Creation::Truncate,
             Existing::Refuse | Existing::Continue => Creation::Exclusive,
@@ -347,7 +353,7 @@ impl<'a> Job<'a> {
         let checkpoints = CheckpointWriter::new(simulation, &self.files, self.physics.clone())?;
         let metadata = self.metadata(simulation);
         let mut recorder = Recorder::new(simulation, &self.files, Start::New(creation), &metadata)?;
-        recorder.record(simulation, self.observer)?;
+        recorder.record(stepper, self.observer)?;
         Ok((checkpoints, recorder))
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::solver::Simulation;
+use crate::solver::Stepper;
 use crate::solver::observers::{Energies, HistoryRow};
 use crate::solver::refinement::Regridded;
 use crate::solver::repartition::Repartition;
@@ -15,19 +15,13 @@ pub trait Observer {
     fn message(&mut self, _message: &Message) {}
 
     /// The steps begin after the one that is shown: 0, or that of a checkpoint.
-    fn begin(&mut self, _now: &dyn View) {}
+    fn begin(&mut self, _now: &mut dyn View) {}
 
     /// A step has been made, and what was due after it has been written.
-    fn step(&mut self, _now: &dyn View) {}
-
-    /// Whether [`Self::step`] looks at velocities. If not, steps may run into one another, which is faster, and
-    /// velocities are known only where a row, an output or a checkpoint is due, and at the end.
-    fn looks_at_velocities(&self) -> bool {
-        true
-    }
+    fn step(&mut self, _now: &mut dyn View) {}
 
     /// A row of the history has been found.
-    fn row(&mut self, _now: &dyn View, _row: &Row) {}
+    fn row(&mut self, _now: &mut dyn View, _row: &Row) {}
 
     /// The steps are over, at the end of the run or, if not `complete`, before it.
     fn end(&mut self, _complete: bool) {}
@@ -36,11 +30,7 @@ pub trait Observer {
 /// An observer that does nothing.
 pub struct Unobserved;
 
-impl Observer for Unobserved {
-    fn looks_at_velocities(&self) -> bool {
-        false
-    }
-}
+impl Observer for Unobserved {}
 
 /// What a run tells, most of it before its first step.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,16 +112,14 @@ pub trait View {
     /// A component of the displacements, m.
     fn displacement(&self, component: usize) -> &[f64];
 
-    /// A component of the velocities, m/s.
-    ///
-    /// # Panics
-    /// When the observer does not [look at velocities](Observer::looks_at_velocities) and they are not known.
-    fn velocity(&self, component: usize) -> &[f64];
+    /// A component of the velocities, m/s. They are computed if nobody has asked for them after this step; that goes
+    /// over the points once, so ask only where you need them.
+    fn velocity(&mut self, component: usize) -> &[f64];
 }
 
-impl<const D: usize> View for Simulation<'_, D> {
+impl<const D: usize> View for Stepper<'_, D> {
     fn number(&self) -> u64 {
-        self.clock.number()
+        self.clock().number()
     }
 
     fn last(&self) -> u64 {
@@ -139,11 +127,11 @@ impl<const D: usize> View for Simulation<'_, D> {
     }
 
     fn time(&self) -> f64 {
-        self.clock.time()
+        self.clock().time()
     }
 
     fn step(&self) -> f64 {
-        self.clock.step()
+        self.clock().step()
     }
 
     fn dimension(&self) -> usize {
@@ -151,20 +139,19 @@ impl<const D: usize> View for Simulation<'_, D> {
     }
 
     fn ids(&self) -> &[u64] {
-        &self.model.ids[..self.model.owned()]
+        &self.model().ids[..self.model().owned()]
     }
 
     fn reference(&self, component: usize) -> &[f64] {
-        &self.model.reference[component][..self.model.owned()]
+        &self.model().reference[component][..self.model().owned()]
     }
 
     fn displacement(&self, component: usize) -> &[f64] {
-        &self.fields.displacement[component][..self.model.owned()]
+        &Stepper::displacement(self)[component][..self.model().owned()]
     }
 
-    fn velocity(&self, component: usize) -> &[f64] {
-        assert!(self.is_complete(), "velocities are not known yet");
-        &self.fields.velocity[component]
+    fn velocity(&mut self, component: usize) -> &[f64] {
+        &self.at_full_step().fields.velocity[component]
     }
 }
 

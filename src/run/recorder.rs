@@ -11,11 +11,11 @@ use crate::output::{
 };
 use crate::problem::Field;
 use crate::problem::Problem;
-use crate::solver::Simulation;
 use crate::solver::conditions::output_members;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
+use crate::solver::{Simulation, Stepper};
 
 use super::crack_files;
 use super::files::Files;
@@ -158,19 +158,19 @@ impl<'a> Recorder<'a> {
     /// When the disc is full.
     pub fn record<const D: usize>(
         &mut self,
-        simulation: &mut Simulation<'_, D>,
+        stepper: &mut Stepper<'_, D>,
         observer: &mut dyn Observer,
     ) -> Result<()> {
-        let clock = &simulation.clock;
+        let clock = stepper.clock();
         let (output, row) = (self.outputs.is_due(clock), self.rows.is_due(clock));
-        self.write(simulation, output, row)?;
+        self.write(stepper.at_full_step(), output, row)?;
         if let (Some(values), true) = (&self.last_row, row) {
             let columns = self.observer.columns();
             let row = Row {
                 columns,
                 row: values,
             };
-            observer.row(simulation, &row);
+            observer.row(stepper, &row);
         }
         Ok(())
     }

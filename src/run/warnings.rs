@@ -5,9 +5,9 @@ use super::observer::Message;
 use super::recorder::Recorder;
 use crate::error::Result;
 use crate::message::format_number;
-use crate::solver::Simulation;
 use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
+use crate::solver::{Simulation, Stepper};
 
 /// Kinetic energy as a share of the strain energy above which loading is not slow.
 const INERTIA_SHARE: f64 = 0.05;
@@ -54,11 +54,11 @@ impl<'a> Job<'a> {
     /// Says, of a run with another density, that it is not slow; returns whether it was said.
     pub(super) fn warn_of_inertia<const D: usize>(
         &mut self,
-        simulation: &Simulation<'a, D>,
+        stepper: &Stepper<'a, D>,
         recorder: &Recorder<'a>,
     ) -> bool {
-        let (time, end) = (simulation.clock.time(), self.problem.time.end);
-        let scaled = simulation.time_rule().density_scale != 1.0;
+        let (time, end) = (stepper.clock().time(), self.problem.time.end);
+        let scaled = stepper.time_rule().density_scale != 1.0;
         let Some(row) = recorder.last_row.as_ref().filter(|_| scaled) else {
             return false;
         };

@@ -14,6 +14,8 @@ pub mod repartition;
 pub mod simulation;
 pub mod size;
 mod stages;
+mod stepper;
 pub mod steps;
 
 pub use simulation::Simulation;
+pub use stepper::Stepper;

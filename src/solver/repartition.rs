@@ -11,8 +11,8 @@ use crate::partition::Cost;
 use crate::points::Point;
 use crate::problem::Balance;
 
-use super::Simulation;
 use super::model::Model;
+use super::{Simulation, Stepper};
 
 /// A repartition; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,24 +51,24 @@ impl BalanceWatch {
     /// When METIS fails; the same on all ranks.
     pub fn look<const D: usize>(
         &mut self,
-        simulation: &mut Simulation<'_, D>,
+        stepper: &mut Stepper<'_, D>,
     ) -> Result<Option<Repartition>> {
         let Some(rule) = self.rule else {
             return Ok(None);
         };
-        if !simulation.clock.number().is_multiple_of(rule.every_steps) {
+        if !stepper.clock().number().is_multiple_of(rule.every_steps) {
             return Ok(None);
         }
-        let now = simulation.times.forces.bonds;
+        let now = stepper.times().forces.bonds;
         let own = (now - self.seen).as_nanos() as u64;
         self.seen = now;
-        let all = all_gather(simulation.comm, own);
+        let all = all_gather(stepper.comm(), own);
         let most = all.iter().copied().max().unwrap_or(0) as f64;
         let mean = all.iter().sum::<u64>() as f64 / all.len() as f64;
         if most <= rule.imbalance * mean {
             return Ok(None);
         }
-        simulation.complete_step();
+        let simulation = stepper.at_full_step();
         let start = Instant::now();
         let moved = simulation.repartition(own)?;
         simulation.times.regridding += start.elapsed();
@@ -114,7 +114,6 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// When METIS fails; the same on all ranks. The points are gone then.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
-        self.complete_step();
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();
         let mut before: Vec<u64> = pieces.iter().map(|point| point.id).collect();

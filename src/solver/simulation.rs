@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use crate::comm::{self, Communicator, agree};
+use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
@@ -78,8 +78,6 @@ pub struct Simulation<'a, const D: usize> {
     pub density_scale_energy: f64,
     /// Where the time went.
     pub times: Times,
-    /// Whether the second half kick of the present step is still to be made.
-    pub(super) is_halfway: bool,
     bad: Option<BadPoint>,
 }
 
@@ -237,7 +235,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
             refined: Refined::default(),
             density_scale_energy: 0.0,
             times: Times::default(),
-            is_halfway: false,
             bad: None,
         };
         simulation.scale_density();
@@ -265,34 +262,42 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.stages[self.stage].time
     }
 
-    /// Makes one step, or one iteration of a load step. Collective.
+    /// Makes one step, or one iteration of a load step. A [`Stepper`](super::Stepper) makes several faster.
+    /// Collective.
     pub fn advance(&mut self) {
-        self.advance_halfway();
-        self.complete_step();
+        if self.leap(false) {
+            self.kick();
+        }
     }
 
-    /// As [`Self::advance`], but the second half kick may be left to the next step, which then goes over the
-    /// points once. Until it is made velocities are those in the middle of the step, and reactions, loads, damping and
-    /// the energies of these those of the step before. Collective.
-    pub fn advance_halfway(&mut self) {
-        if self.is_stage_over() && self.stage + 1 < self.stages.len() {
-            self.begin_stage(self.stage + 1);
+    /// Makes one step, or one iteration of a load step, but for its second half kick. `kick_is_due` says whether that
+    /// of the step before is still to be made, which it is not where a stage begins. Returns whether that of this step
+    /// is. Collective.
+    pub(super) fn leap(&mut self, kick_is_due: bool) -> bool {
+        if let Some(stage) = self.next_stage() {
+            self.begin_stage(stage);
         }
         let Time {
             method, adaptive, ..
         } = self.time_rule();
         match (method, adaptive) {
-            (Method::Explicit, None) => self.make_step(),
-            (Method::Explicit, Some(rule)) => self.make_adaptive_step(&rule),
-            (Method::Relaxation(rule), _) => self.relax(&rule),
+            (Method::Explicit, None) => {
+                self.make_step(kick_is_due);
+                true
+            }
+            (Method::Explicit, Some(rule)) => {
+                self.make_adaptive_step(&rule);
+                false
+            }
+            (Method::Relaxation(rule), _) => {
+                self.relax(&rule);
+                false
+            }
         }
     }
 
-    /// Makes the second half kick, if that was left.
-    pub fn complete_step(&mut self) {
-        if !std::mem::take(&mut self.is_halfway) {
-            return;
-        }
+    /// Makes the second half kick of the present step.
+    pub(super) fn kick(&mut self) {
         let start = Instant::now();
         let clock = self.clock;
         self.set_second_half(&clock);
@@ -303,27 +308,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.motion += start.elapsed();
     }
 
-    /// Whether the present step is complete.
-    pub fn is_complete(&self) -> bool {
-        !self.is_halfway
-    }
-
-    /// Makes one step by the equation of motion, but for its second half kick. Collective.
-    pub(super) fn make_step(&mut self) {
+    /// Makes one step by the equation of motion, but for its second half kick; before it that of the step before, if
+    /// it is due. Collective.
+    pub(super) fn make_step(&mut self, kick_is_due: bool) {
         let start = Instant::now();
         let before = self.clock;
         let step = before.step();
-        let was_halfway = std::mem::replace(&mut self.is_halfway, true);
-        if was_halfway {
+        if kick_is_due {
             self.set_second_half(&before);
         }
         self.clock.advance();
         self.conditions.set_places(self.clock.time(), step);
         let finite = self.walk(|part, mut here| {
-            let finite = if was_halfway && here.is_empty() && part.damping.is_none() {
+            let finite = if kick_is_due && here.is_empty() && part.damping.is_none() {
                 verlet::kick_and_drift(part, step)
             } else {
-                let finite = !was_halfway || second_half(part, &mut here, step);
+                let finite = !kick_is_due || second_half(part, &mut here, step);
                 here.before_moving(part);
                 verlet::half_kick_and_drift(part, step);
                 here.apply_displacements(part);
@@ -495,39 +495,40 @@ impl<'a, const D: usize> Simulation<'a, D> {
             ..error
         })?;
         let own = self.bad.filter(|bad| bad.step as f64 == step);
-        let mut smallest = [own.map_or(f64::MAX, |bad| bad.id as f64)];
-        comm::min(self.comm, &mut smallest);
-        let named = match own.filter(|bad| bad.id as f64 == smallest[0]) {
-            None => Ok(()),
-            Some(bad) => {
-                let block = usize::from(self.model.block[bad.index]);
-                let body = self.problem.block(block).body;
-                let position = self.model.position(bad.index);
-                Err(if bad.step == 0 {
-                    let message = format!(
-                        "[body.{}]: the force on its point {}, {:?} m, is not finite at the start; \
-                         do displacements move points onto one another?",
-                        body.name,
-                        bad.id,
-                        &position[..D],
-                    );
-                    Error::input(message).at(&body.span)
-                } else {
-                    Error::run(format!(
-                        "step {} (t = {time:.6e} s): the motion of point {} of body `{}` is not \
-                         finite; reference position {:?} m. A time step beyond the stable one, or a \
-                         load that grows without bound? (time step {:.3e} s, stable {:.3e} s)",
-                        bad.step,
-                        bad.id,
-                        body.name,
-                        &position[..D],
-                        self.clock.step(),
-                        self.scaled_stable_step(),
-                    ))
-                })
+        let own = own.map(|bad| {
+            let [x, y, z] = self.model.position(bad.index);
+            Found {
+                key: 0.0,
+                ids: [bad.id],
+                payload: [f64::from(self.model.block[bad.index]), x, y, z],
             }
+        });
+        let Some(Found {
+            ids: [id],
+            payload: [block, position @ ..],
+            ..
+        }) = least(self.comm, own)
+        else {
+            unreachable!("a rank has the earliest step");
         };
-        agree(self.comm, named)
+        let (body, position) = (self.problem.block(block as usize).body, &position[..D]);
+        Err(if step == 0.0 {
+            let message = format!(
+                "[body.{}]: the force on its point {id}, {position:?} m, is not finite at the start; do displacements \
+                 move points onto one another?",
+                body.name,
+            );
+            Error::input(message).at(&body.span)
+        } else {
+            Error::run(format!(
+                "step {step} (t = {time:.6e} s): the motion of point {id} of body `{}` is not finite; reference \
+                 position {position:?} m. A time step beyond the stable one, or a load that grows without bound? (time \
+                 step {:.3e} s, stable {:.3e} s)",
+                body.name,
+                self.clock.step(),
+                self.scaled_stable_step(),
+            ))
+        })
     }
 }
 

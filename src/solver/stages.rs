@@ -18,6 +18,12 @@ impl<const D: usize> Simulation<'_, D> {
         self.is_stage_over() && self.stage + 1 == self.stages.len()
     }
 
+    /// Index of the stage that begins with the next step, if one does.
+    pub(super) fn next_stage(&self) -> Option<usize> {
+        let next = self.stage + 1;
+        (self.is_stage_over() && next < self.stages.len()).then_some(next)
+    }
+
     /// Number of the last step of the run, if steps keep their size.
     pub fn last_step(&self) -> u64 {
         let later = self.steps[self.stage + 1..].iter();
@@ -40,7 +46,6 @@ impl<const D: usize> Simulation<'_, D> {
     /// Goes on with another stage from where the points are. Nothing moves in a relaxation, nor after
     /// one.
     pub(super) fn begin_stage(&mut self, stage: usize) {
-        self.complete_step();
         let (relaxed, scale) = (self.relaxes(), self.time_rule().density_scale);
         self.enter(stage);
         let (step, _) = self.steps[stage];

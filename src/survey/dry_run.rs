@@ -7,10 +7,10 @@ use super::{Cost, Measured, Survey, ghost_share};
 use crate::comm::threads;
 use crate::error::Result;
 use crate::problem::Problem;
-use crate::solver::Simulation;
 use crate::solver::conditions::output_members;
 use crate::solver::observers::HistoryObserver;
 use crate::solver::steps::choose_steps;
+use crate::solver::{Simulation, Stepper};
 
 /// Duration of the speed measurement.
 const MEASUREMENT: Duration = Duration::from_millis(300);
@@ -77,7 +77,7 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
         cost: Cost::of(&simulation, columns, output_points, measured),
         stable_step: simulation.scaled_stable_step(),
         steps: choose_steps(problem, simulation.stable_step)?,
-        seconds: measure.then(|| seconds_per_step(&mut simulation)),
+        seconds: measure.then(|| seconds_per_step(simulation)),
     })
 }
 
@@ -94,12 +94,13 @@ fn edges<const D: usize>(simulation: &Simulation<'_, D>) -> [f64; D] {
 }
 
 /// Measure the wall-clock time per step, s.
-fn seconds_per_step<const D: usize>(simulation: &mut Simulation<'_, D>) -> f64 {
+fn seconds_per_step<const D: usize>(simulation: Simulation<'_, D>) -> f64 {
+    let mut stepper = Stepper::new(simulation);
     // The first step warms the caches.
-    simulation.advance_halfway();
+    stepper.advance();
     let (start, mut steps) = (Instant::now(), 0);
     while start.elapsed() < MEASUREMENT && steps < MAX_STEPS {
-        simulation.advance_halfway();
+        stepper.advance();
         steps += 1;
     }
     start.elapsed().as_secs_f64() / f64::from(steps)

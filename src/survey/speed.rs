@@ -8,8 +8,8 @@ use crate::comm::halo::Traffic;
 use crate::error::Result;
 use crate::lanes::Instructions;
 use crate::problem::Problem;
-use crate::solver::Simulation;
 use crate::solver::simulation::Times;
+use crate::solver::{Simulation, Stepper};
 
 /// Figures of the measured steps on this rank.
 #[derive(Debug, Clone)]
@@ -73,14 +73,15 @@ fn speed_in<const D: usize>(
     simulation.times = Times::default();
     barrier(comm);
     let start = Instant::now();
+    let mut stepper = Stepper::new(simulation);
     for _ in 0..steps {
-        simulation.advance_halfway();
+        stepper.advance();
     }
-    simulation.complete_step();
+    let simulation = stepper.at_full_step();
     let whole = start.elapsed();
     simulation.check()?;
     let sent = since(before, simulation.forces.halo().sent);
-    let sent_without_overlap = exchange_without_overlap(comm, &mut simulation, steps);
+    let sent_without_overlap = exchange_without_overlap(comm, simulation, steps);
     let (model, forces) = (&simulation.model, &simulation.forces);
     Ok(Speed {
         points: model.total,

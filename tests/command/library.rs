@@ -52,11 +52,11 @@ impl Observer for Notes {
         self.messages.push(message.clone());
     }
 
-    fn begin(&mut self, now: &dyn View) {
+    fn begin(&mut self, now: &mut dyn View) {
         self.begun_at = Some(now.number());
     }
 
-    fn step(&mut self, now: &dyn View) {
+    fn step(&mut self, now: &mut dyn View) {
         self.steps.push(now.number());
         assert_eq!((now.dimension(), now.ids().len()), (2, 1800));
         assert_eq!(now.reference(1).len(), 1800);
@@ -66,7 +66,7 @@ impl Observer for Notes {
         self.top = now.displacement(1)[top.unwrap().0];
     }
 
-    fn row(&mut self, now: &dyn View, row: &Row) {
+    fn row(&mut self, now: &mut dyn View, row: &Row) {
         assert_eq!(row.value("time"), Some(now.time()));
         assert_eq!(row.values().len(), row.columns.len());
         let energies = row.energies();

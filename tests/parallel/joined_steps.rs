@@ -3,9 +3,9 @@
 use crate::support::history::row;
 use crate::support::simulate_on;
 use fissure::comm::IdOrder;
-use fissure::solver::Simulation;
 use fissure::solver::motion::Saved;
 use fissure::solver::observers::HistoryObserver;
+use fissure::solver::{Simulation, Stepper};
 
 /// Two sheets of different density that touch, in lattices with a list between them, or in lists: with more points
 /// than a thread works on at once, and a last part of fewer.
@@ -57,25 +57,24 @@ type Seen = (Saved, Vec<u64>, Vec<u64>, u64);
 
 /// What is seen after every 25 steps and at the end, whole or run into one another.
 fn run(deck: &str, ranks: usize, whole: bool) -> Vec<Vec<Seen>> {
-    simulate_on(ranks, deck, |mut simulation: Simulation<2>| {
+    simulate_on(ranks, deck, |simulation: Simulation<2>| {
         let owned = simulation.model.owned();
         let (ids, total) = (&simulation.model.ids[..owned], simulation.model.total);
         let order = IdOrder::new(simulation.comm, ids, total);
         let mut observer = HistoryObserver::new(&simulation).unwrap();
         let bits = |values: &[f64]| -> Vec<u64> { values.iter().map(|v| v.to_bits()).collect() };
         let mut seen = Vec::new();
+        let mut stepper = Stepper::new(simulation);
         let mut step = 0;
-        while !simulation.is_over() {
+        while !stepper.is_over() {
             step += 1;
+            stepper.advance();
             if whole {
-                simulation.advance();
-                assert!(simulation.is_complete());
-            } else {
-                simulation.advance_halfway();
-                assert!(simulation.is_complete() == simulation.time_rule().is_relaxation());
+                stepper.at_full_step();
             }
-            if step % 25 == 0 || simulation.is_over() {
-                let row = row(&mut observer, &mut simulation);
+            if step % 25 == 0 || stepper.is_over() {
+                let simulation = stepper.at_full_step();
+                let row = row(&mut observer, simulation);
                 seen.push((
                     simulation.save(&order),
                     bits(&simulation.fields.internal_force.concat()),
@@ -84,7 +83,7 @@ fn run(deck: &str, ranks: usize, whole: bool) -> Vec<Vec<Seen>> {
                 ));
             }
         }
-        simulation.check().unwrap();
+        stepper.check().unwrap();
         seen
     })
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use fissure::comm::{Communicator, all_gather_many, threads};
 use fissure::problem::Problem;
-use fissure::solver::Simulation;
+use fissure::solver::motion::Clock;
 use fissure::solver::observers::{HistoryObserver, Schedule, Snapshot};
 use fissure::solver::repartition::BalanceWatch;
+use fissure::solver::{Simulation, Stepper};
 use rayon::ThreadPoolBuilder;
 
 use super::datasets::sorted;
@@ -40,26 +41,37 @@ fn run<const D: usize>(problem: &Problem, comm: &dyn Communicator) -> Recorded {
     let mut balance = BalanceWatch::new(&simulation);
     let mut recorded = Recorded::default();
     recorded.add(&mut simulation, &mut history);
-    while !simulation.is_over() {
-        if simulation.is_refinement_due() && simulation.refine().unwrap().is_some() {
-            history.follow(&simulation).unwrap();
+    let mut stepper = Stepper::new(simulation);
+    while !stepper.is_over() {
+        if stepper.is_refinement_due() {
+            let simulation = stepper.at_full_step();
+            if simulation.refine().unwrap().is_some() {
+                history.follow(simulation).unwrap();
+            }
         }
-        simulation.advance_halfway();
-        if simulation.load_step.is_settled {
-            recorded.add(&mut simulation, &mut history);
+        stepper.advance();
+        if stepper.load_step().is_settled {
+            if Recorded::is_due(problem, stepper.clock()).contains(&true) {
+                recorded.add(stepper.at_full_step(), &mut history);
+            }
         }
-        if !simulation.is_over()
-            && let Some(done) = balance.look(&mut simulation).unwrap()
+        if !stepper.is_over()
+            && let Some(done) = balance.look(&mut stepper).unwrap()
         {
-            history.follow(&simulation).unwrap();
+            history.follow(stepper.at_full_step()).unwrap();
             recorded.repartitions += usize::from(done.moved > 0);
         }
     }
-    simulation.check().unwrap();
+    stepper.at_full_step().check().unwrap();
     recorded
 }
 
 impl Recorded {
+    /// Whether an output or a row of the history is due.
+    fn is_due(problem: &Problem, clock: &Clock) -> [bool; 2] {
+        [problem.output.every, problem.row_interval()].map(|every| Schedule(every).is_due(clock))
+    }
+
     /// Adds what is due after the present step. Collective.
     fn add<const D: usize>(
         &mut self,
@@ -67,8 +79,7 @@ impl Recorded {
         history: &mut HistoryObserver,
     ) {
         let (problem, clock) = (simulation.problem, simulation.clock);
-        let output = Schedule(problem.output.every).is_due(&clock);
-        let row = Schedule(problem.row_interval()).is_due(&clock);
+        let [output, row] = Self::is_due(problem, &clock);
         if !output && !row {
             return;
         }

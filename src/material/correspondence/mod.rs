@@ -290,7 +290,7 @@ impl<const D: usize> Law<D> for Correspondence {
     ) -> [Lanes; D] {
         let force_state_i = times_bond(simd, here, bond);
         let force_state_j = times_bond(simd, there, bond);
-        LaneTuple::each(|d| simd.whole(weights.sum(force_state_i[d], force_state_j[d])))
+        LaneTuple::each(|d| weights.sum(force_state_i[d], force_state_j[d]))
     }
 
     #[inline(always)]

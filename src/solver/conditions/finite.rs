@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::comm::{self, Communicator, agree};
+use crate::comm::{Communicator, Found, least};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::message::format_number;
@@ -109,19 +109,28 @@ impl<const D: usize> FiniteCheck<'_, D> {
             .into_iter()
             .filter_map(|point| Some((self.model.ids[point as usize], point, wrong(point)?)))
             .min_by_key(|(id, ..)| *id);
-        let mut smallest = [found.map_or(f64::MAX, |(id, ..)| id as f64)];
-        comm::min(self.comm, &mut smallest);
-        let own = found.filter(|(id, ..)| *id as f64 == smallest[0]);
-        let named = own.map_or(Ok(()), |(id, point, (component, value))| {
-            let position = self.model.position(point as usize);
-            let message = format!(
-                "{key}: component {} is {value} at t = {} s at point {id}, {:?} m",
-                AXES[component],
-                format_number(self.time),
-                &position[..D]
-            );
-            Err(Error::input(message).at(place))
+        let own = found.map(|(id, point, (component, value))| {
+            let [x, y, z] = self.model.position(point as usize);
+            Found {
+                key: 0.0,
+                ids: [id],
+                payload: [component as f64, value, x, y, z],
+            }
         });
-        agree(self.comm, named)
+        let Some(Found {
+            ids: [id],
+            payload: [component, value, position @ ..],
+            ..
+        }) = least(self.comm, own)
+        else {
+            return Ok(());
+        };
+        let message = format!(
+            "{key}: component {} is {value} at t = {} s at point {id}, {:?} m",
+            AXES[component as usize],
+            format_number(self.time),
+            &position[..D]
+        );
+        Err(Error::input(message).at(place))
     }
 }

@@ -97,8 +97,8 @@ impl<const D: usize> Simulation<'_, D> {
             if size != self.clock.step() {
                 self.clock.set_step(size);
             }
-            self.make_step();
-            self.complete_step();
+            self.make_step(false);
+            self.kick();
             let broken = self.forces.broken().iter().map(|broken| broken.count);
             let mut most = [broken.max().unwrap_or(0) as f64];
             self.comm.max(&mut most);

@@ -137,7 +137,7 @@ fields! {
         output: Some(Field::Displacement),
         ..STATE
     };
-    /// u̇ at full steps, m/s; in the middle of a step that is not complete.
+    /// u̇, m/s, at full steps but between the steps of a [`Stepper`](crate::solver::Stepper).
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",

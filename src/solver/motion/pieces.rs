@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::comm::sum::{ExactSum, reduce};
-use crate::comm::{agree, min, total};
+use crate::comm::{Found, agree, least, total};
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
 
@@ -42,12 +42,14 @@ impl<const D: usize> Simulation<'_, D> {
         let mut from = 0;
         loop {
             let own = suspects.range(from..).next();
-            let mut first = [own.map_or(f64::MAX, |(first, _)| *first as f64)];
-            min(self.comm, &mut first);
-            if first[0] == f64::MAX {
+            let own = own.map(|(first, _)| Found {
+                key: 0.0,
+                ids: [*first],
+                payload: (),
+            });
+            let Some(Found { ids: [first], .. }) = least(self.comm, own) else {
                 return Ok(());
-            }
-            let first = first[0] as u64;
+            };
             let points = suspects.get(&first).map_or(&[][..], |points| &points[..]);
             let count = total(self.comm, points.len() as u64);
             if let Some((component, force)) = self.unbalanced_load(&pieces, points) {

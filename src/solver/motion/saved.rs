@@ -91,11 +91,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 
     /// The columns of the state one by one, each dealt out by id when it is asked for. Collective.
-    ///
-    /// # Panics
-    /// When the present step is not complete.
     pub fn saved_columns(&self, order: &IdOrder) -> impl Iterator<Item = Vec<f64>> {
-        assert!(self.is_complete(), "half a step is no state");
         let owned = self.model.owned();
         self.state()
             .map(move |column| order.collect(self.comm, &column[..owned], 1))
@@ -126,7 +122,6 @@ impl<const D: usize> Simulation<'_, D> {
             Err(Error::run("the checkpoint is that of other bonds"))
         };
         agree(self.comm, fits)?;
-        self.is_halfway = false;
         let SavedBonds {
             lengths: all,
             bytes,

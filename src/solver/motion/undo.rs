@@ -15,11 +15,7 @@ pub struct Kept {
 
 impl<const D: usize> Simulation<'_, D> {
     /// Takes note of the present state. Memory that was taken for an earlier one is used again.
-    ///
-    /// # Panics
-    /// When the present step is not complete.
     pub fn keep(&self, kept: &mut Kept) {
-        assert!(self.is_complete(), "half a step is no state");
         kept.clock = Some(self.clock);
         let columns = self.fields.each().filter(|(field, _)| field.undone);
         let columns = columns.flat_map(|(_, columns)| columns);
@@ -38,7 +34,6 @@ impl<const D: usize> Simulation<'_, D> {
     pub fn undo(&mut self, kept: &Kept) {
         let Some(clock) = kept.clock else { return };
         self.clock = clock;
-        self.is_halfway = false;
         let columns = self.fields.each_mut().filter(|(field, _)| field.undone);
         let columns = columns.flat_map(|(_, columns)| columns);
         for (column, kept) in columns.zip(&kept.fields) {

@@ -7,7 +7,7 @@
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::comm::{self, Communicator};
+use crate::comm::{self, Communicator, Found, least};
 use crate::points::bins::Bins;
 use crate::points::distance_squared;
 use crate::solver::Simulation;
@@ -275,32 +275,23 @@ fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<C
 
 /// The nearest of what the ranks have found, by distance and then by ids. Collective.
 fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Contact> {
-    let mut best = own;
-    let mut smallest = |of: fn(&Contact) -> f64| {
-        let mut value = [best.as_ref().map_or(f64::INFINITY, of)];
-        comm::min(comm, &mut value);
-        best = best.filter(|contact| of(contact) == value[0]);
-        value[0]
-    };
-    let distance = smallest(|contact| contact.distance);
-    // Ids are below 2⁵³.
-    let ids = [
-        smallest(|contact| contact.ids[0] as f64),
-        smallest(|contact| contact.ids[1] as f64),
-    ];
-    if distance == f64::INFINITY {
-        return None;
-    }
-    let mut rest = [f64::NEG_INFINITY; 5];
-    if let Some(contact) = best {
-        let [x, y, z] = contact.place;
-        rest = [x, y, z, contact.bodies[0] as f64, contact.bodies[1] as f64];
-    }
-    comm.max(&mut rest);
+    let found = own.map(|contact| {
+        let ([a, b], [x, y, z]) = (contact.bodies, contact.place);
+        Found {
+            key: contact.distance,
+            ids: contact.ids,
+            payload: [a as f64, b as f64, x, y, z],
+        }
+    });
+    let Found {
+        key: distance,
+        ids,
+        payload: [a, b, x, y, z],
+    } = least(comm, found)?;
     Some(Contact {
-        bodies: [rest[3] as usize, rest[4] as usize],
-        ids: ids.map(|id| id as u64),
-        place: [rest[0], rest[1], rest[2]],
+        bodies: [a as usize, b as usize],
+        ids,
+        place: [x, y, z],
         distance,
     })
 }

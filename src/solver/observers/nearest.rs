@@ -1,6 +1,6 @@
 //! The point nearest to a place.
 
-use crate::comm;
+use crate::comm::{Found, least};
 use crate::points::distance_squared;
 use crate::solver::Simulation;
 
@@ -29,18 +29,20 @@ pub fn nearest<const D: usize>(simulation: &Simulation<'_, D>, place: [f64; 3]) 
             )
         })
         .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut square = [own.map_or(f64::MAX, |own| own.0)];
-    comm::min(comm, &mut square);
-    let own = own.filter(|own| own.0 == square[0]);
-    let mut id = [own.map_or(f64::MAX, |own| own.1 as f64)];
-    comm::min(comm, &mut id);
-    let own = own.filter(|own| own.1 as f64 == id[0]).map(|own| own.2);
-    let mut position = own.map_or([f64::MIN; 3], |point| model.position(point));
-    comm.max(&mut position);
+    let found = own.map(|(square, id, point)| Found {
+        key: square,
+        ids: [id],
+        payload: model.position(point),
+    });
+    let Found {
+        key: square,
+        ids: [id],
+        payload: position,
+    } = least(comm, found).expect("a run has points");
     Nearest {
-        id: id[0] as u64,
+        id,
         position,
-        distance: square[0].sqrt(),
-        own,
+        distance: square.sqrt(),
+        own: own.filter(|own| own.1 == id).map(|own| own.2),
     }
 }

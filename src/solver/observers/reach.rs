@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use crate::comm::{self, Communicator, total};
+use crate::comm::{self, Communicator, Found, least, total};
 use crate::points::distance_squared;
 use crate::problem::Line;
 
@@ -90,12 +90,13 @@ impl Course {
         let foremost = above()
             .filter(|(_, along)| *along >= last - tolerance)
             .map(|(point, _)| point)
-            .min_by_key(|point| model.ids[*point]);
-        let mut id = [foremost.map_or(f64::MAX, |point| model.ids[point] as f64)];
-        comm::min(comm, &mut id);
-        let own = foremost.filter(|point| model.ids[*point] as f64 == id[0]);
-        let mut place = own.map_or([f64::MIN; 3], |point| model.position(point));
-        comm.max(&mut place);
+            .min_by_key(|point| model.ids[*point])
+            .map(|point| Found {
+                key: 0.0,
+                ids: [model.ids[point]],
+                payload: model.position(point),
+            });
+        let place = least(comm, foremost)?.payload;
 
         let near = |point: usize| {
             distance_squared(place, model.position(point)).sqrt() <= horizon + tolerance

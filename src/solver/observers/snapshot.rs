@@ -18,9 +18,8 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Looks at a run, whose forces are those of the present place, after it has completed its step.
+    /// Looks at a run, whose forces are those of the present place.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        simulation.complete_step();
         let mut stored = simulation.forces.stored(&simulation.model);
         if let Some(work) = &simulation.fields.plastic_work {
             stored.dissipated.resize(work.len(), 0.0);
@@ -33,7 +32,6 @@ impl Snapshot {
 
     /// Without energies: neither for a row of the history nor for [`Field::StrainEnergyDensity`].
     pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        simulation.complete_step();
         let stored = simulation.forces.intact_families(&simulation.model);
         Self { stored }
     }

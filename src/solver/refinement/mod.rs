@@ -106,7 +106,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
         };
-        self.complete_step();
         let start = Instant::now();
         let snapshot = Snapshot::new(self);
         let wanted = self.wanted(trigger, &snapshot);
