@@ -132,9 +132,9 @@ pub fn displacement<S: Simd, const D: usize>(
         cross([*z, *x], [xi[2], xi[0]]) * 2.0,
         cross([*x, *y], [xi[0], xi[1]]) * 2.0,
     ];
-    let mut turned = [simd.whole(simd.multiply_add(*q0, t[0], cross([*y, *z], [t[1], t[2]]))); D];
-    turned[1] = simd.whole(simd.multiply_add(*q0, t[1], cross([*z, *x], [t[2], t[0]])));
-    turned[2] = simd.whole(simd.multiply_add(*q0, t[2], cross([*x, *y], [t[0], t[1]])));
+    let mut turned = [simd.multiply_add(*q0, t[0], cross([*y, *z], [t[1], t[2]])); D];
+    turned[1] = simd.multiply_add(*q0, t[1], cross([*z, *x], [t[2], t[0]]));
+    turned[2] = simd.multiply_add(*q0, t[2], cross([*x, *y], [t[0], t[1]]));
     turned
 }
 
