@@ -267,6 +267,11 @@ impl Communicator for World {
         self.world
             .all_gather_into(&(own.len() as u64), &mut sizes[..]);
         let mut all = vec![0; sizes.iter().sum::<u64>() as usize];
+        if all.is_empty() {
+            return all;
+        }
+        // An empty slice may have the address 1, which is MPI_IN_PLACE.
+        let own = if own.is_empty() { &[0; 1][..0] } else { own };
         if all.len() <= LARGEST_MESSAGE {
             let counts: Vec<c_int> = sizes.iter().map(|size| *size as c_int).collect();
             let starts: Vec<c_int> = counts

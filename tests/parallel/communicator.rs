@@ -10,7 +10,7 @@ use rayon::ThreadPoolBuilder;
 use crate::support::command::is_rank;
 use crate::support::simulate_on;
 
-/// LaneTuple of a message that waits for its receiver: larger than what any MPI sends at once.
+/// Numbers of a message that waits for its receiver: larger than what any MPI sends at once.
 const LARGE: usize = 1 << 20;
 
 #[test]
@@ -65,6 +65,28 @@ fn large_messages_arrive_while_work_is_done() {
     });
     let other = (1 - world.rank()) as f64;
     assert!(messages[0].receive.iter().all(|value| *value == other));
+}
+
+#[test]
+fn ranks_may_have_nothing_to_gather() {
+    if !is_rank(
+        2,
+        "parallel::communicator::ranks_may_have_nothing_to_gather",
+    ) {
+        return;
+    }
+    let world = World::start().unwrap();
+    // The address of an empty vector of bytes is that of `MPI_IN_PLACE`.
+    assert!(world.all_gather(&Vec::new()).is_empty());
+    for giver in 0..2 {
+        let own = if world.rank() == giver {
+            vec![7, 8]
+        } else {
+            Vec::new()
+        };
+        assert_eq!(world.all_gather(&own), [7, 8]);
+    }
+    assert_eq!(world.all_gather(&[world.rank() as u8]), [0, 1]);
 }
 
 /// More than 4096 interior points on each of two ranks: they are worked on in pieces.
