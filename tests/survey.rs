@@ -468,7 +468,10 @@ fn each_body_counts_its_own_rows_of_a_file() {
         for points in &found.points {
             assert!(near(*points, f64::from(count), off), "{found:?}");
         }
-        assert!(near(found.output_points, f64::from(count), off), "{found:?}");
+        assert!(
+            near(found.output_points, f64::from(count), off),
+            "{found:?}"
+        );
         // The area within the horizon, less that of the point itself.
         let bonds = found.directed_bonds() / found.all_points();
         assert!(

@@ -15,7 +15,7 @@ use super::report::Report;
 
 /// The deck as a whole.
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
-    report.say(format_args!(
+    report.heading(format_args!(
         "{} is a valid deck: {}",
         deck.display(),
         problem.title
@@ -29,7 +29,7 @@ pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
 
 /// What the deck says of a body.
 pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
-    report.say(format_args!("body {}", body.name));
+    report.heading(format_args!("body {}", body.name));
     report.line("material", &body.material_name);
     report.line("density", format_args!("{} kg/m³", body.material.density));
     let elastic = body.material.elastic;
@@ -157,7 +157,7 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;
     }
-    report.say("bonds between bodies");
+    report.heading("bonds between bodies");
     if survey.joints.is_empty() {
         report.line("none", "");
     }
@@ -170,13 +170,13 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
 /// Cracks and probes.
 pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
     if !problem.cracks.is_empty() {
-        report.say("cracks");
+        report.heading("cracks");
     }
     for (crack, cut) in problem.cracks.iter().zip(&survey.cuts) {
         report.line(&crack.name, format_args!("cuts {} bonds", count(*cut)));
     }
     if !problem.history.probes.is_empty() {
-        report.say("probes");
+        report.heading("probes");
     }
     for (probe, found) in problem.history.probes.iter().zip(&survey.probes) {
         report.line(
@@ -193,7 +193,7 @@ pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension
 
 /// The sets.
 pub fn sets(report: &mut Report, problem: &Problem, survey: &Survey) {
-    report.say("sets");
+    report.heading("sets");
     for (set, size) in problem.sets.iter().zip(&survey.sets) {
         let note = if *size == 0 { "  (empty!)" } else { "" };
         report.line(&set.name, format_args!("{} points{note}", count(*size)));
@@ -238,7 +238,7 @@ pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
 
 /// End and stable step.
 pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
-    report.say("time");
+    report.heading("time");
     report.line("end", si(problem.time.end, "s"));
     report.line("stable step", si(stable, "s"));
 }
