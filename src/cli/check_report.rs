@@ -1,4 +1,4 @@
-//! The parts of what `fissure check` prints.
+//! The sections of the report of `fissure check`.
 
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
@@ -13,7 +13,7 @@ use fissure::survey::{BodyFigures, Cost, Interior, Survey, separation_energy_rat
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
-/// The deck as a whole.
+/// Title, dimension and files of the deck.
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.heading(format_args!(
         "{} is a valid deck: {}",
@@ -27,7 +27,7 @@ pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.line("horizon", si(problem.horizon, "m"));
 }
 
-/// What the deck says of a body.
+/// Material and laws of a body.
 pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     report.heading(format_args!("body {}", body.name));
     report.line("material", &body.material_name);
@@ -73,7 +73,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     }
 }
 
-/// What the points of a body come to.
+/// Figures of a body's points.
 pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimension: usize) {
     report.line("points", count(figures.points));
     let of_shape = figures.shape_volume.map(|volume| {
@@ -91,19 +91,19 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
     report.line("centre", place(&figures.centre[..dimension]));
 }
 
-/// A place in metres.
+/// Format a position, m.
 fn place(position: &[f64]) -> String {
     let entries: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
     format!("[{}] m", entries.join(", "))
 }
 
-/// What a point within a body has, beside what is wanted.
+/// Properties of the interior of a body, beside the exact values.
 pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interior>) {
     let Some(interior) = interior else {
         return;
     };
     report.line("neighbours inside", interior.neighbours);
-    let share = |found: f64, wanted: f64| format!("{:+.1} %", 100.0 * (found / wanted - 1.0));
+    let deviation = |found: f64, exact: f64| format!("{:+.1} %", 100.0 * (found / exact - 1.0));
     let [bulk, shear] = interior.exact;
     let name = match problem.dimension {
         Dimension::Space => "bulk modulus inside",
@@ -115,7 +115,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
             "{}, wanted {} ({})",
             si(interior.bulk, "Pa"),
             si(bulk, "Pa"),
-            share(interior.bulk, bulk)
+            deviation(interior.bulk, bulk)
         ),
     );
     if let Some([axes, diagonals]) = interior.shear {
@@ -126,14 +126,14 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
                 si(axes, "Pa"),
                 si(diagonals, "Pa"),
                 si(shear, "Pa"),
-                share(axes, shear),
-                share(diagonals, shear)
+                deviation(axes, shear),
+                deviation(diagonals, shear)
             ),
         );
     }
 }
 
-/// What it costs to part a body whose bonds break by their work.
+/// Separation energy of a body with energy-based damage.
 pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
@@ -141,13 +141,13 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let DamageRule::Energy { work, .. } = damage.rule else {
         return;
     };
-    let mut ways = vec![("cost of opening", 0.0)];
+    let mut modes = vec![("cost of opening", 0.0)];
     if work.sense == Sense::Either && problem.dimension.count() > 1 {
-        ways.push(("cost of sliding", FRAC_PI_2));
+        modes.push(("cost of sliding", FRAC_PI_2));
     }
-    for (name, angle) in ways {
-        if let Some(cost) = separation_energy_ratio(problem, body, angle) {
-            report.line(name, format_args!("{cost:.3} of the fracture energy"));
+    for (name, angle) in modes {
+        if let Some(ratio) = separation_energy_ratio(problem, body, angle) {
+            report.line(name, format_args!("{ratio:.3} of the fracture energy"));
         }
     }
 }
@@ -200,7 +200,7 @@ pub fn sets(report: &mut Report, problem: &Problem, survey: &Survey) {
     }
 }
 
-/// Points and bonds.
+/// Numbers of points and bonds.
 pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     let trigger = problem
         .refinement
@@ -215,7 +215,7 @@ pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     report.line("bonds", count(bonds));
 }
 
-/// Memory and files; `ghosts` as a share of a rank's own points.
+/// Memory and disk space; `ghosts` is relative to owned points.
 pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     let memory = bytes(cost.memory_of_a_rank(ranks, ghosts));
     report.line(
@@ -236,7 +236,7 @@ pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     );
 }
 
-/// End and stable step.
+/// End time and stable step.
 pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
     report.heading("time");
     report.line("end", si(problem.time.end, "s"));
@@ -274,7 +274,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     }
 }
 
-/// The largest step of a stage, where it is above the first one (s).
+/// The largest step of a stage, if above the first one (s).
 fn largest_step(time: &Time, first: f64) -> String {
     match time.adaptive.and_then(|rule| rule.largest) {
         Some(largest) if largest > first => format!(" at first, then up to {}", si(largest, "s")),
@@ -289,7 +289,7 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Run time of the steps, and of an iteration of a load step, from the wall-clock time (s) of one on this rank.
+/// Estimated run time of the steps and of an iteration of a load step, from the measured time per step (s).
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

@@ -206,7 +206,7 @@ impl Observer for Log {
     }
 
     fn step(&mut self, now: &dyn RunState) {
-        self.progress.show(now.number(), now.last(), now.time());
+        self.progress.update(now.number(), now.last(), now.time());
     }
 
     fn looks_at_velocities(&self) -> bool {
