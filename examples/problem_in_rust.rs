@@ -15,7 +15,7 @@ use fissure::expression::Expression;
 use fissure::problem::{
     Action, Crack, Damage, DamageRule, Interval, Law, Material, Problem, Selector, Shape, Toughness,
 };
-use fissure::run::{Existing, Observer, Options, Row, View};
+use fissure::run::{Existing, Observer, Options, Row, RunState};
 
 /// Edge of a cell, m.
 const SPACING: f64 = 1e-3;
@@ -87,7 +87,7 @@ struct Printer {
 }
 
 impl Observer for Printer {
-    fn row(&mut self, now: &mut dyn View, row: &Row) {
+    fn row(&mut self, now: &mut dyn RunState, row: &Row) {
         if self.speaks {
             let energies = row.energies();
             println!(

@@ -1,11 +1,12 @@
-"""A crack that branches on a grid that is refined where it runs, beside uniform grids (Dipasquale et al. 2014, §4).
+"""Crack branching on adaptively refined and on uniform grids (Dipasquale et al. 2014, §4).
 
-Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 of its finer spacings, and if asked for with two
-levels, and the same plate on the coarse grid and on grids that are fine everywhere, one after the other on one core.
-Prints for each the points, the time of the run, the fracture energy, the length of the crack and, for a refined grid,
-the largest distance of its crack from that of the uniform fine grid, and from that of a uniform grid whose points lie
-where the refined one has them, on the line of the notch as well, in spacings of the coarse grid: of all branches, and
-of those that reach the right side; draws the cracks into the output folder.
+Runs inputs/crack_branching_adaptive.toml with horizons of 3 to 6 finer spacings (with --twice, also with two levels).
+Runs the same plate on the coarse grid and on uniform fine grids, one run after the other on one core.
+
+Prints for each run: points, run time, fracture energy and crack length. For a refined grid, it prints the largest
+distance of its crack from two others, in coarse spacings: from the crack of the uniform fine grid, and from that of a
+uniform grid with the points of the refined one. Both are given for all branches and for those that reach the right
+side. The cracks are drawn into the output folder.
 """
 
 import argparse
@@ -30,23 +31,23 @@ def deck(spacing):
 
 
 def value(text, key):
-    """The number that a key of a deck has first."""
+    """The first number of a key of a deck."""
     return float(re.search(rf"(?m)^{key} = (\S+)", text)[1])
 
 
 def with_value(text, key, number):
-    """A deck with another number for a key, where that comes first."""
+    """A deck with another first number of a key."""
     return re.sub(rf"(?m)^{key} = \S+", f"{key} = {number}", text, count=1)
 
 
 def uniform(spacing, ratio):
-    """The plate on a grid of one spacing (m), with so many of them a horizon."""
+    """The plate on a uniform grid with a spacing (m) and a horizon in spacings."""
     text = re.sub(r"(?ms)^\[refinement[^\]]*\]\n.*?(?=^\[(?!refinement)|\Z)", "", deck(spacing))
     return re.sub(r'(?m)^horizon = "3\*dx"', f'horizon = "{ratio}*dx"', text)
 
 
 def same_places(coarse, ratio):
-    """The plate on a fine grid with points at the places of the coarse one and half-way between them, but on the notch."""
+    """The plate on a fine grid with points at and half-way between those of the coarse one, except on the notch."""
     text = uniform(coarse / 2, ratio)
     shift = coarse / 4
     whole = 'shape.box = { lower = [0, "-height/2"], upper = ["length", "height/2"] }'
@@ -66,19 +67,19 @@ def same_places(coarse, ratio):
 
 
 def refined(coarse, ratio):
-    """The plate on a grid that is refined once, with so many finer spacings a horizon there."""
+    """The plate on a grid with one refined level, with the horizon in finer spacings."""
     return with_value(deck(coarse), "m", ratio)
 
 
 def refined_twice(coarse):
-    """The plate on a grid that is refined twice, with the same ratio on all levels."""
+    """The plate on a grid with two refined levels and the same ratio on all levels."""
     text = re.sub(r"(?m)^levels = 1", "levels = 2", deck(coarse))
     text = re.sub(r'(?m)^rule = .*\n^m = \["m"\]\n', 'rule = "delta"\n', text)
     return re.sub(r"(?m)^interface_factor = .*\n", "", text)
 
 
 def cases(arguments):
-    """Name, deck, and the uniform grids that it is compared with."""
+    """Name, deck, and the uniform grids to compare with."""
     coarse = arguments.dx
 
     def asked(text):
@@ -98,7 +99,7 @@ def cases(arguments):
 
 
 def run(arguments, name, text):
-    """The folder with the result, and the time that the run took, s."""
+    """The folder of the result, and the run time, s."""
     folder = arguments.folder / re.sub(r"\W+", "_", name)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "deck.toml").write_text(text)
@@ -113,7 +114,7 @@ def run(arguments, name, text):
 
 
 def lines(out):
-    """The branches of the crack at the end, each an array of places in m."""
+    """The branches of the final crack, each an array of positions, m."""
     branches = {}
     with open(out / "crack_notch.csv", newline="") as file:
         for row in csv.DictReader(file):
@@ -122,7 +123,7 @@ def lines(out):
 
 
 def distance(places, branches):
-    """The largest distance of places that the notch has not from the nearest of all lines, m."""
+    """The largest distance of positions beyond the notch from the nearest line, m."""
     places = places[places[:, 0] > BEYOND_THE_NOTCH]
     nearest = numpy.full(len(places), numpy.inf)
     for branch in branches:
@@ -139,7 +140,7 @@ def has_grown(branches):
 
 
 def apart(one, other):
-    """The largest distance between two cracks, seen from either, m; not a number where there is none."""
+    """The Hausdorff distance of two cracks, m; NaN without a crack."""
     if not has_grown(one) or not has_grown(other):
         return numpy.nan
     return max(distance(numpy.concatenate(one), other), distance(numpy.concatenate(other), one))

@@ -1,10 +1,10 @@
-"""Checks that a result file reads the same through h5py and through VTK's own reader.
+"""Checks that h5py and VTK's reader read a result file equally.
 
 usage: check_result.py RESULT.h5
 
-Every step, every field, the points and the times are compared; the side-car .xdmf, where there is
-one, must be well-formed and point at datasets of the declared shape. Prints one line and exits 0,
-or names the first difference and exits 1.
+Compares all steps, fields, points and times. The side-car .xdmf, if present, must be well-formed and
+refer to datasets of the declared shape. Prints one line and exits with 0, or prints the first
+difference and exits with 1.
 """
 
 import pathlib
@@ -30,11 +30,11 @@ def equal(first, second, what):
 
 
 def check_vtk(path, file):
-    """Compares what VTK reads with what h5py reads; returns (steps, points, fields)."""
+    """Compare the data read by VTK and by h5py; return (steps, points, fields)."""
     root = file["VTKHDF"]
     steps = root["Steps"]
     count = int(steps.attrs["NSteps"])
-    # One number for all steps, or one for each where points are born.
+    # One number for all steps; one per step with adaptive refinement.
     counts = root["NumberOfPoints"][:]
     changing = root["PointData"]["id"].maxshape[0] is None
     names = sorted(root["PointData"])
@@ -69,7 +69,7 @@ def check_vtk(path, file):
 
 
 def check_xdmf(path, file, count):
-    """Every item of the side-car must be a dataset of the shape it declares."""
+    """Check that every item of the side-car is a dataset of the declared shape."""
     tree = xml.parse(path)
     grids = tree.findall("./Domain/Grid/Grid")
     expect(len(grids) == count, f"{path.name} has {len(grids)} steps, the result {count}")
@@ -79,7 +79,7 @@ def check_xdmf(path, file, count):
         name, _, place = item.text.partition(":")
         expect(name == pathlib.Path(file.filename).name, f"{path.name} points to {name}")
         declared = tuple(int(size) for size in item.get("Dimensions").split())
-        # A run that was stopped keeps room for more rows.
+        # A stopped run has allocated space for further rows.
         shape = file[place].shape
         fits = shape[1:] == declared[1:] and shape[0] >= declared[0]
         expect(fits, f"{path.name}: {place} is {shape}, not {declared}")

@@ -1,4 +1,4 @@
-"""Compares all datasets of two results bit for bit; attributes tell of ranks and may differ.
+"""Compares all datasets of two results bit for bit; attributes describe the run and may differ.
 
 usage: compare_results.py FIRST.vtkhdf SECOND.vtkhdf
 """

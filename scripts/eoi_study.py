@@ -81,7 +81,7 @@ def arguments():
     add("--small", action="store_true", help="coarse lattices only")
     add("--laws", type=several_of(LAWS), default=LAWS, metavar="LIST", help="[all]")
     add("--limits", type=several_of(LIMITS), default=list(LIMITS), metavar="LIST", help="[all]")
-    add("--reuse", action="store_true", help="take the histories of earlier runs where they are there")
+    add("--reuse", action="store_true", help="reuse the histories of earlier runs")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
     add("--binary", type=pathlib.Path, default=ROOT / "target/release/fissure", metavar="PATH")
     add("--output", type=pathlib.Path, default=ROOT / "out/eoi_study", metavar="DIR")
@@ -89,7 +89,7 @@ def arguments():
 
 
 def grids(limit, small):
-    """The (spacing in m, horizon in spacings) of a limit, from coarse to fine."""
+    """The pairs (spacing in m, horizon in spacings) of a limit, from coarse to fine."""
     if limit == "local":
         return [(dx, 3.0) for dx in ([2.5e-3, 2e-3, 1.25e-3] if small else [2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3])]
     if limit == "continuum":
@@ -111,9 +111,9 @@ def deck(law, dx):
     if law in ("energy", "diehl2016"):
         replace(table, f'[material.alon.normalised_pmb]\nform = "{law}"')
     elif law == "printed":
-        # c = 9K/(4πδ³/3) of eq. 15 is the prototype's 18K'/(πδ⁴) for K' = 3Kδ/8, the number of δ in metres;
-        # eq. 17 with this c and the tile's thickness gives the critical stretch. So soft a material would
-        # be given a long step.
+        # c = 9K/(4πδ³/3) of eq. 15 is the prototype's 18K'/(πδ⁴) for K' = 3Kδ/8, with δ in metres. Eq. 17 with
+        # this c and the tile's thickness gives the critical stretch. The automatic step of this soft material
+        # would be too long.
         replace("bulk_modulus = 210e9", 'bulk_modulus = "210e9*0.375*m*dx"')
         stretch = "sqrt(15)/4*2e6/(210e9*sqrt(27/(4*pi)*thickness))"
         replace("fracture_toughness = 2e6", f'critical_stretch = "{stretch}"')
@@ -122,7 +122,7 @@ def deck(law, dx):
 
 
 def offsets(ratio):
-    """Neighbours on a lattice of unit spacing."""
+    """Offsets of the neighbours on a lattice of unit spacing."""
     reach = range(-int(ratio) - 1, int(ratio) + 2)
     every = numpy.array([(x, y, z) for x in reach for y in reach for z in reach], dtype=float)
     length = numpy.linalg.norm(every, axis=1)
@@ -131,15 +131,15 @@ def offsets(ratio):
 
 
 def long_waves(law, dx, ratio):
-    """Speeds (m/s) of long waves along an axis of the lattice: in the bulk, and in the tile, whose layers
-    move apart freely across it."""
+    """Speeds (m/s) of long waves along a lattice axis: in the bulk, and in the tile with free lateral
+    displacement of its layers."""
     steps, lengths = offsets(ratio)
     steps, lengths, horizon = steps * dx, lengths * dx, ratio * dx
     volume = dx**3
     layers = round(THICKNESS / dx)
     level = numpy.round(steps[:, 2] / dx).astype(int)
 
-    # The energy of a bond is w = (g/2) s²|ξ|; g at the own end, from the family in each layer.
+    # The energy of a bond is w = (g/2) s²|ξ|, with g of point i from the family in each layer.
     def modulus(inside):
         if law == "pmb":
             return numpy.full(len(lengths), 18 * BULK_MODULUS / (numpy.pi * horizon**4))
@@ -173,7 +173,7 @@ def long_waves(law, dx, ratio):
 
 
 def slope(times, places, start, end):
-    """Speed (m/s) of a front between two places (m); none if it covers too little of the way or leaps."""
+    """Speed (m/s) of a front between two positions (m); None if it covers too little of the distance or jumps."""
     chosen = (places >= start) & (places <= end)
     if chosen.sum() < 3 or numpy.ptp(places[chosen]) < 0.015:
         return None
@@ -184,7 +184,7 @@ def slope(times, places, start, end):
 
 
 def run(options, limit, law, dx, ratio):
-    """Runs the deck; returns the columns of its history."""
+    """Run the deck; return the columns of its history."""
     folder = options.output / f"{limit}-{law}-{dx * 1e3:g}-{ratio:.3g}"
     folder.mkdir(parents=True, exist_ok=True)
     history = folder / "history.csv"
@@ -203,7 +203,7 @@ def run(options, limit, law, dx, ratio):
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
-    # The points themselves are not needed.
+    # Fields are not needed.
     for name in ("result.vtkhdf", "result.xdmf", "checkpoint_0.h5", "checkpoint_1.h5"):
         (folder / name).unlink(missing_ok=True)
     return columns(history)
@@ -217,7 +217,7 @@ def columns(history):
 
 
 def evaluate(history, limit, law, dx, ratio):
-    """What a line of the table says."""
+    """The text of a row of the table."""
     bulk, plate = long_waves(law, dx, ratio)
     result = {"limit": limit, "law": law, "dx": dx, "ratio": ratio, "bulk": bulk, "plate": plate}
     for front, window in (("wave", (0.03, 0.09)), ("damage", (0.02, 0.05))):
@@ -268,7 +268,7 @@ def draw(results, path):
                 continue
             place = [result["ratio"] if limit == "discrete" else result["dx"] * 1e3 for result in chosen]
             for kind, marker, fill in (("wave", "o", "full"), ("damage", "^", "none")):
-                # No front is drawn at 0.
+                # Omit fronts at 0.
                 speeds = [result[kind] or 0.0 for result in chosen]
                 label = f"{names[law]}: {kind}" if axis is axes[0][0] else None
                 axis.plot(place, speeds, marker=marker, fillstyle=fill, color=colours[law], linewidth=0.8, label=label)
@@ -294,7 +294,7 @@ def main():
     for limit in options.limits:
         for dx, ratio in grids(limit, options.small):
             for law in options.laws:
-                # Where there is no wave a few runs are enough.
+                # Without a wave, a few runs suffice.
                 if law == "printed" and (limit != "local" or dx < 1e-3):
                     continue
                 history = run(options, limit, law, dx, ratio)

@@ -1,4 +1,4 @@
-"""Draws what it costs to part a body at any angle, from opening to sliding, by law and criterion.
+"""Draws the separation energy of a body by angle, from opening to sliding, for each law and criterion.
 
 Runs examples/parting.rs, which pulls the halves of a small block apart, and draws its table.
 """
@@ -24,7 +24,7 @@ LABELS = {
 
 
 def table(program):
-    """The rows of the table: law, ratio, criterion, costs by angle (degrees)."""
+    """The rows of the table: law, ratio, criterion, separation energies by angle (degrees)."""
     printed = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     head, *rows = csv.reader(printed.splitlines())
     angles = [float(angle) for angle in head[3:]]

@@ -1,4 +1,4 @@
-"""What a refined patch does to a plane wave, beside table 3 of Dipasquale et al. (2014).
+"""The effect of a refined patch on a plane wave, beside table 3 of Dipasquale et al. (2014).
 
 Runs inputs/plane_wave_refined.toml for both rules of convergence, levels 1 to 3, with bonds between levels that
 have their ends' horizons or the mean of them, with and without the enlarged horizon at interfaces, and the same plate without refinement, and compares energy densities in the
@@ -36,7 +36,7 @@ SPEED = 1.125**0.5  # transverse motion is blocked, m/s
 
 
 def without_section(text, name):
-    """The deck without a section and its tables."""
+    """The deck without a section and its subtables."""
     pattern = rf"(?ms)^\[{name}[^\]]*\]\n.*?(?=^\[(?!{name})|\Z)"
     return re.sub(pattern, "", text)
 
@@ -78,7 +78,7 @@ def run(arguments, name, text):
 
 
 class Energy:
-    """Total energy density (J/m³) of the second output by place, the places, and the time."""
+    """Total energy density (J/m³) of the second output by position, the positions, and the time."""
 
     def __init__(self, file):
         self.places = file["VTKHDF/Points"][:, :2]
@@ -89,7 +89,7 @@ class Energy:
         self.time = file["VTKHDF/Steps/Values"][1]
 
     def profile(self):
-        """The density along the row of nodes through the patch: it is the same in all others."""
+        """The density along the row of nodes through the patch; all other rows are equal."""
         row = np.abs(self.places[:, 1] - CENTRE[1]) < 1e-3 * DX
         order = np.argsort(self.places[row, 0])
         return self.places[row, 0][order], self.density[row][order]
@@ -108,7 +108,7 @@ def main():
     parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "out/plane_wave")
     arguments = parser.parse_args()
 
-    # The crest of the energy is that of the velocity: it lies beside the middle of the displacement.
+    # The energy has its maximum with the velocity, beside the centre of the displacement.
     crest = CENTRE[0] - 0.03 / 2**0.5
     seen = crest / SPEED
     after = (2 * CENTRE[0] - 0.1) / SPEED
@@ -125,7 +125,7 @@ def main():
         name = f"{rule}_{level}_{factor}_{bonds}"
         file = run(arguments, name, deck(rule, level, factor, bonds, seen, after))
         energy = Energy(file)
-        # Steps differ, and with them the moments at which outputs are written.
+        # Time steps differ, and with them the times of the outputs.
         shift = SPEED * (energy.time - uniform.time)
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
         near = np.abs(energy.places - CENTRE).max(axis=1) < 5 * DX

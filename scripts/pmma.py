@@ -139,10 +139,10 @@ def arguments():
     add("--laws", type=several_laws, default=list(LAWS), metavar="LIST", help="[all]")
     add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
     add("--small", action="store_true", help="2 mm and a fast press")
-    add("--relaxation", type=load_steps, metavar="STEPS", help="equilibria, in so many load steps [explicit]")
+    add("--relaxation", type=load_steps, metavar="STEPS", help="relaxation with this number of load steps [explicit]")
     add("--opening", action="store_true", help="bonds of correspondence break so that opening the plate costs G")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
-    add("--reuse", action="store_true", help="take the runs that are there")
+    add("--reuse", action="store_true", help="reuse existing runs")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
     add("--binary", type=pathlib.Path, default=binary, metavar="PATH", help=argparse.SUPPRESS)
     add("--output", type=pathlib.Path, default=ROOT / "out/pmma", metavar="DIR")
@@ -154,7 +154,7 @@ def arguments():
 
 
 def deck(law, load_steps, opening):
-    """The deck's text with another law; with relaxation, if there are load steps."""
+    """The deck's text with another law, and with relaxation if there are load steps."""
     text = DECK.read_text()
 
     def replace(pattern, new):
@@ -175,7 +175,7 @@ def deck(law, load_steps, opening):
 
 
 def run(options, law):
-    """Runs the deck with a law; returns its folder."""
+    """Run the deck with a law; return its folder."""
     way = "-relaxed" if options.relaxation else ""
     way += "-opening" if options.opening and LAWS[law] is None else ""
     folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
@@ -204,7 +204,7 @@ def history(folder):
 
 
 def branches(folder):
-    """The branches of the crack, an array of places (m) each, the longest first."""
+    """The branches of the crack as arrays of positions (m), longest first."""
     with open(folder / "crack_main.csv") as file:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
     numbers = sorted({row[0] for row in rows})
@@ -213,8 +213,8 @@ def branches(folder):
 
 
 def deviation(path):
-    """Largest distance (m) of a path from the measured one, and how far left (m) it was looked at."""
-    # From left to right; where the path turns back, its last way counts.
+    """Largest distance (m) of a path from the measured one, and the leftmost x (m) of the comparison."""
+    # From left to right; where the path turns back, its last part counts.
     left = max(path[:, 0].min(), MEASURED[-1, 0])
     places = numpy.linspace(left, min(path[:, 0].max(), MEASURED[0, 0]), 400)
     order = numpy.argsort(path[:, 0], kind="stable")
@@ -224,7 +224,7 @@ def deviation(path):
 
 
 def damage(folder):
-    """Places (m), damage at each output, times (s) and horizon (m)."""
+    """Positions (m), damage at each output, times (s) and horizon (m)."""
     with h5py.File(folder / "result.vtkhdf") as file:
         places = file["VTKHDF/Points"][:]
         times = file["VTKHDF/Steps/Values"][:]
@@ -234,7 +234,7 @@ def damage(folder):
 
 
 def evaluate(folder, law, dx):
-    """What the table says of a run."""
+    """The row of the table of a run."""
     columns = history(folder)
     way = -columns["probe_right_displacement_x"]
     force, length = columns["force_push"], columns["crack_main_length"]
@@ -251,7 +251,7 @@ def evaluate(folder, law, dx):
     result["peak_at"] = float(way[force.argmax()])
     result["lengths"] = [at(length, displacement) for displacement in LENGTHS_AT]
     result["branches"] = float(columns["crack_main_branches"][-1])
-    # After the first tenth, when there is something to compare with.
+    # Skip the first tenth, where the reference is too small.
     late = way > 0.1 * way[-1]
     result["kinetic_share"] = float((columns["kinetic_energy"][late] / columns["strain_energy"][late]).max())
     result["deviation"] = result["reached"] = None

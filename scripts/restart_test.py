@@ -1,11 +1,10 @@
 """Compares restarted runs with uninterrupted ones, bit for bit.
 
-Each small deck uses one feature that keeps a state from step to step. It runs once without a stop, on one rank. Then
-it runs in parts: each part is stopped by a signal or one of its ranks is killed, and the next part restarts on
-another number of ranks and threads and with another instruction set. All datasets of the result and history.csv
-must be equal to those of the uninterrupted run.
+Each small deck uses one feature with a state. It runs once uninterrupted on one rank. Then it runs in parts: a signal
+stops each part, or one of its ranks is killed. The next part restarts on other numbers of ranks and threads and with
+another instruction set. All datasets of the result and history.csv must equal those of the uninterrupted run.
 
-The instruction sets are those of this machine, chosen by FISSURE_INSTRUCTIONS. Where it has only one, that is printed.
+The instruction sets are those of this machine, chosen by FISSURE_INSTRUCTIONS. If there is only one, that is printed.
 
 The binary is that of the environment variable FISSURE, or target/release/fissure, or else target/debug/fissure.
 """
@@ -23,13 +22,13 @@ from pathlib import Path
 
 from compare_results import datasets
 
-# Code of a run that a signal has stopped.
+# Exit code of a run stopped by a signal.
 STOPPED = 75
-# Longer than any part of a run takes on a slow and busy machine, s.
+# Time-out of a part of a run, s.
 PATIENCE = 300
-# How long mpirun may go on after all of its ranks have ended, s: that of Open MPI 4.1.4 may wait for ever.
+# Time-out of mpirun after all ranks have ended, s: that of Open MPI 4.1.4 can hang.
 LAUNCHER_PATIENCE = 10
-# Parts of a run that are stopped or killed.
+# Number of parts of a run that are stopped or killed.
 INTERRUPTIONS = 2
 
 ELASTIC = "density = 2, youngs_modulus = 5, poisson_ratio = 0.3"
@@ -136,11 +135,11 @@ refinement.trigger = { damage = 0.1, energy = 0.5, every_steps = 5, coarsen_afte
 
 
 class Failure(Exception):
-    """A run that fails, hangs or ends with other bits."""
+    """A run that fails, hangs or ends with other results."""
 
 
 def binary():
-    """The program to test."""
+    """Path of the tested program."""
     named = os.environ.get("FISSURE")
     for path in [named] if named else ["target/release/fissure", "target/debug/fissure"]:
         if Path(path).is_file():
@@ -149,7 +148,7 @@ def binary():
 
 
 def instruction_sets(program):
-    """The instruction sets that this machine has, the largest last."""
+    """The instruction sets of this machine, widest last."""
     printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
     line = next(line for line in printed.splitlines() if line.split()[:1] == ["instructions"])
     largest, built = line.split(maxsplit=1)[1].split(", of ")
@@ -158,7 +157,7 @@ def instruction_sets(program):
 
 
 def start(program, deck, out, layout):
-    """Starts or restarts a run."""
+    """Start or restart a run."""
     ranks, threads, instructions = layout
     flag = "--restart" if has_checkpoint(out) else "--overwrite"
     line = [program, "run", str(deck), "--output", str(out), "--threads", str(threads), "--quiet", flag]
@@ -170,7 +169,7 @@ def start(program, deck, out, layout):
 
 
 def children(process):
-    """Numbers of the processes that a process has started, zombies among them."""
+    """Process ids of the children of a process, zombies included."""
     try:
         return [int(number) for number in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
     except OSError:
@@ -178,7 +177,7 @@ def children(process):
 
 
 def is_running(process):
-    """Whether a process exists and is no zombie."""
+    """Test whether a process exists and is not a zombie."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rsplit(") ", 1)[1][0] not in "ZX"
     except OSError:
@@ -186,7 +185,7 @@ def is_running(process):
 
 
 def wait(run, until=lambda: False):
-    """Waits for the end of a run and returns its code; returns none as soon as `until` holds."""
+    """Wait for the end of a run and return its exit code; return None as soon as `until` holds."""
     begin = with_ranks = time.monotonic()
     while run.poll() is None:
         now = time.monotonic()
@@ -206,7 +205,7 @@ def wait(run, until=lambda: False):
 
 
 def rows(out):
-    """Number of rows of the history so far."""
+    """Current number of rows of the history."""
     try:
         return max(0, (out / "history.csv").read_bytes().count(b"\n") - 1)
     except OSError:
@@ -214,12 +213,12 @@ def rows(out):
 
 
 def printed_by(out):
-    """What the last part of a run has printed."""
+    """The output of the last part of a run."""
     return out.with_suffix(".log").read_text()
 
 
 def has_checkpoint(out):
-    """Whether a run can be restarted."""
+    """Test whether a run can be restarted."""
     return any((out / f"checkpoint_{k}.h5").exists() for k in range(2))
 
 
@@ -233,7 +232,7 @@ def interrupt(program, deck, out, layout, at, kind):
         try:
             os.kill(random.choice(ranks), signal.SIGKILL if kind == "kill" else signal.SIGUSR1)
         except (OSError, IndexError):
-            # The run has just ended.
+            # The run has ended meanwhile.
             pass
         code = wait(run)
     if kind == "stop" and code not in (0, STOPPED):
@@ -242,7 +241,7 @@ def interrupt(program, deck, out, layout, at, kind):
 
 
 def complete(program, deck, out, layout):
-    """Runs a deck to its end."""
+    """Run a deck to its end."""
     code = wait(start(program, deck, out, layout))
     if code != 0:
         raise Failure(f"ends with code {code}:\n{printed_by(out)}")
@@ -251,7 +250,7 @@ def complete(program, deck, out, layout):
 
 
 def compare(whole, out):
-    """Compares all datasets and the tables of two results."""
+    """Compare all datasets and the tables of two results."""
     first, second = datasets(whole / "result.vtkhdf"), datasets(out / "result.vtkhdf")
     if first.keys() != second.keys():
         raise Failure(f"has other datasets: {sorted(first.keys() ^ second.keys())}")
@@ -264,7 +263,7 @@ def compare(whole, out):
 
 
 def changes(whole, column):
-    """Whether a column of the history changes."""
+    """Test whether a column of the history changes."""
     with open(whole / "history.csv", newline="") as file:
         table = list(csv.reader(file))
     names = [name.split(" ")[0] for name in table[0]]
@@ -272,7 +271,7 @@ def changes(whole, column):
 
 
 def layouts(most, sets):
-    """Ranks, threads and instructions without end: each time other ranks than before, all sets in turn."""
+    """An endless sequence of ranks, threads and instruction sets; consecutive ranks differ."""
     before = 1
     number = random.randrange(len(sets))
     while True:
@@ -282,7 +281,7 @@ def layouts(most, sets):
 
 
 def test(program, folder, name, sets, most, trials):
-    """Runs a deck with and without interruptions; returns the number of interruptions."""
+    """Run a deck with and without interruptions; return the number of interruptions."""
     text, column = DECKS[name]
     deck = folder / f"{name}.toml"
     deck.write_text(text)
@@ -318,7 +317,7 @@ def main():
     parser.add_argument("--full", action="store_true", help="10 trials a deck, up to 7 ranks instead of 3")
     parser.add_argument("--trials", type=int, help="trials a deck (1; with --full 10)")
     parser.add_argument("--seed", type=int, default=1, help="of the random choices (1)")
-    parser.add_argument("--only", choices=DECKS, nargs="+", help="these decks alone")
+    parser.add_argument("--only", choices=DECKS, nargs="+", help="run these decks only")
     arguments = parser.parse_args()
     trials, most = arguments.trials or (10 if arguments.full else 1), 7 if arguments.full else 3
     program = binary()

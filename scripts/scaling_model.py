@@ -1,11 +1,11 @@
-"""What a step costs on many ranks, and what would break first: a model with stated inputs.
+"""A model of the time per step on many ranks and of the limits, with stated inputs.
 
-A rank has the points of a cube and swaps a layer of one horizon with the ranks around it. What a
-step needs of a rank, with the interior computed while messages are in flight:
+A rank has the points of a cube and exchanges a layer of one horizon with its neighbours. The time per
+step, with the interior overlapping the messages, is
 
     border bonds + packing + max(interior bonds, messages · latency + bytes / bandwidth)
 
-Dealing out 64³ points to 8 and 27 ranks gives 1.04 and 1.00 times the ghosts of cubes.
+The partition of 64³ points to 8 and 27 ranks has 1.04 and 1.00 times the ghosts of cubes.
 """
 
 import math
@@ -30,25 +30,25 @@ INPUTS = {
 }
 RANKS = [10**3, 10**4, 10**5]
 
-# Bytes of a row of the history that all ranks add up: some 30 exact sums of 69 words.
+# Bytes of the reduction per history row: some 30 exact sums of 69 words.
 HISTORY_BYTES = 30 * 69 * 8
 # METIS: 216 000 cells in 0.24 s on one core.
 METIS_SECONDS = 0.24 / 216_000
-# Bytes of a cell on every rank: occupation twice (the sum wants a copy), owner thrice.
+# Bytes per cell on every rank: occupation twice (the sum needs a copy), owner three times.
 CELL_BYTES = 2 * 8 + 3 * 4
-# Bytes of a cell on rank 0: 26 edges of index, weight and its real value, and METIS's own copies.
+# Bytes per cell on rank 0: 26 edges of index, weight and its real value, and METIS's copies.
 GRAPH_BYTES = 26 * (4 + 4 + 8) + 26 * 2 * 8
-# 2³¹ edges of the graph, 26 a cell.
+# Limit of 2³¹ edges of the graph, 26 per cell.
 GRAPH_CELLS = 2**31 / 26
 
 
 def step(given, points):
-    """Seconds of a step by part, for a rank with so many points, and what it sends."""
+    """Seconds per step by part, for a rank with a number of points, and its messages and bytes."""
     edge = points ** (1 / 3)
     layers = given["layers"]
     ghosts = (edge + 2 * layers) ** 3 - points
     interior = max(0.0, edge - 2 * layers) ** 3 / points
-    # Ranks whose points lie within the layer: more than one deep where cubes are thinner than it.
+    # Number of ranks within the layer; several deep if cubes are thinner than it.
     messages = (2 * math.ceil(layers / edge) + 1) ** 3 - 1
     bonds = given["imbalance"] * points * given["neighbours"] / (given["rate"] * given["cores"])
     size = 8 * given["values"] * ghosts
@@ -81,9 +81,9 @@ def predict(given, points_of):
 
 
 def limits(given, ranks, points):
-    """What stands in the way for so many ranks and points in all: (what, amount, limit), all of
-    them numbers of the same unit, the worst first."""
-    # As src/partition/cells.rs chooses them: no more than one for a horizon in each direction.
+    """The limits for a number of ranks and points: (name, amount, limit) in the same unit, worst
+    first."""
+    # As in src/partition/cells.rs: at most one cell per horizon in each direction.
     cells = min(points / given["layers"] ** 3, max(1e5, 2000 * ranks), max(4e6, 64 * ranks))
     own = points / ranks
     found = [

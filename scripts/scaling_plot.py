@@ -1,4 +1,4 @@
-"""The plots of scripts/scaling as SVG, without any library."""
+"""The plots of scripts/scaling as SVG, without a library."""
 
 import math
 
@@ -48,7 +48,7 @@ class Panel:
         self.parts.append(f'<polyline points="{line}" class="ideal"/>')
 
     def beyond(self, cores):
-        """Marks what lies beyond the cores that there are."""
+        """Mark the range beyond the available cores."""
         if self.most <= cores:
             return
         edge = max(self.left, self.x(max(self.least, cores)) + 8)
@@ -58,7 +58,7 @@ class Panel:
         self.text(self.left + WIDTH - 4, TOP + HEIGHT - 8, "more than the cores", "small", "end")
 
     def line(self, number, name, points):
-        """A line through (count, amount), with its name at the lower left."""
+        """Draw a line through (count, amount), with its name at the lower left."""
         colour = COLOURS[number % len(COLOURS)]
         places = [(self.x(count), self.y(amount)) for count, amount in points]
         line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
@@ -70,7 +70,7 @@ class Panel:
 
 
 def measured(left, runs, title, axis, key, ideal, cores):
-    """A panel of measured layouts, a line for each number of ranks."""
+    """A panel of measured layouts, one line per number of ranks."""
     counts = [run["cores"] for run in runs]
     least = min(counts)
     highest = max([run[key] for run in runs] + [ideal(max(counts) / least)])

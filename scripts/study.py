@@ -1,4 +1,4 @@
-"""A deck over many values of its parameters: a table of them, or a Morris design.
+"""Runs a deck for many values of its parameters: a table, or a Morris design.
 
 Each row of the design is a run of its own, in parallel here or as a Slurm array. What was interrupted is
 continued by the same command: complete rows are left as they are, others go on from their checkpoints.
@@ -84,11 +84,11 @@ KEYS = {
 
 
 class Wrong(Exception):
-    """A mistake in the study, or in how it is called."""
+    """An error in the study or in its arguments."""
 
 
 class Study:
-    """A study file, looked through."""
+    """A validated study file."""
 
     def __init__(self, path):
         self.path = path
@@ -120,7 +120,7 @@ class Study:
         self.names, self.rows = self.design()
 
     def wrong(self, key, message):
-        """The mistake at a key, with the line where its last word stands."""
+        """The error at a key, with the line of its last word."""
         word = re.escape(key.rsplit(".", 1)[-1])
         pattern = re.compile(rf"^\s*(\[[^\]]*\b{word}\]|[^#]*\b{word}\s*=)")
         lines = (number for number, line in enumerate(self.text.splitlines(), 1) if pattern.search(line))
@@ -208,7 +208,7 @@ class Study:
             raise self.wrong("paths.cell", "must be above 0")
 
     def design(self):
-        """The names of the parameters that vary, and their values row by row, as texts."""
+        """The names of the varied parameters, and their values by row, as texts."""
         design = self.values.get("design", {})
         self.check_keys("design", design)
         ranges = self.tables("parameter")
@@ -310,7 +310,7 @@ def arguments():
     add("--threads", type=int, default=1, metavar="N", help="threads of each run [1]")
     add("--rows", metavar="LIST", help="only these rows, such as 1-10,13")
     add("--overwrite", action="store_true", help="replace another study in the output folder")
-    add("--collect", action="store_true", help="run nothing; table and pictures of what is there")
+    add("--collect", action="store_true", help="run nothing; make table and pictures of existing results")
     add("--binary", type=pathlib.Path, default=binary, metavar="PATH", help=argparse.SUPPRESS)
     add("--slurm", nargs=argparse.REMAINDER, metavar="OPTION", help="submit an array; further options are sbatch's")
     options = parser.parse_args()
@@ -335,9 +335,9 @@ def chosen_rows(text, count):
 
 
 def prepare(study, options):
-    """Makes the output folder, unless it holds another study."""
+    """Create the output folder; fail if it has another study."""
     table = options.output / "table.txt"
-    # The values that all runs share belong to the design as well.
+    # Common values are part of the design.
     shared = "".join(f"# {name} = {value}\n" for name, value in study.fixed.items())
     wanted = f"# {study.deck.name}\n{shared}{study.table()}"
     if table.exists() and table.read_text() != wanted:
@@ -353,7 +353,7 @@ def prepare(study, options):
 
 
 class Runner:
-    """Runs rows in parallel, and stops in good order."""
+    """Runs rows in parallel, with an orderly stop."""
 
     def __init__(self, study, options):
         self.study, self.options = study, options
@@ -362,7 +362,7 @@ class Runner:
         self.stopped = False
 
     def stop(self, *_):
-        # A signal handler must not wait for the lock that its own thread may hold.
+        # A signal handler must not wait for a lock that its thread may hold.
         self.stopped = True
         for child in list(self.children):
             child.send_signal(signal.SIGTERM)
@@ -384,7 +384,7 @@ class Runner:
             with self.lock:
                 if self.stopped:
                     return STOPPED
-                # Of a group of its own: a Ctrl-C at the terminal comes once, from here.
+                # In its own process group, so Ctrl-C reaches it once, from here.
                 child = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
                 self.children.add(child)
             if self.stopped:
@@ -400,7 +400,7 @@ class Runner:
         return code
 
     def all(self, rows):
-        """Runs what is not complete; returns the rows that failed."""
+        """Run the incomplete rows; return the rows that failed."""
         started = time.monotonic()
         failed, done = [], 0
         for kind in (signal.SIGINT, signal.SIGTERM):
@@ -437,7 +437,7 @@ def submit(study, options, rows):
 
 
 def history(folder):
-    """The columns of a run's history by name; none if there is none."""
+    """The columns of a run's history by name; None without a history."""
     try:
         with open(folder / "history.csv") as file:
             rows = list(csv.reader(file))
@@ -451,7 +451,7 @@ def history(folder):
 
 
 def value_of(study, name, output, columns):
-    """What a run's history gives for an output; NaN where it does not go so far."""
+    """The value of an output from a run's history; NaN beyond its end."""
 
     def column(wanted):
         if wanted not in columns:
@@ -465,7 +465,7 @@ def value_of(study, name, output, columns):
     if "pick" in output:
         return scale * float(PICKS[output["pick"]](values))
     at, wanted = column(output["at"]["column"]), output["at"]["value"]
-    # Between the first two rows that have the value between them.
+    # Interpolate between the first two rows that bracket the value.
     between = numpy.nonzero((at[:-1] - wanted) * (at[1:] - wanted) <= 0)[0]
     if len(between) == 0:
         return math.nan
@@ -476,7 +476,7 @@ def value_of(study, name, output, columns):
 
 
 def collect(study, options):
-    """Writes results.csv; returns the outputs row by row."""
+    """Write results.csv; return the outputs by row."""
     names = list(study.outputs)
     results = numpy.full((len(study.rows), len(names)), math.nan)
     complete = 0
@@ -501,7 +501,7 @@ def collect(study, options):
 
 
 def sensitivities(study, results):
-    """By output: mean, μ*, its 95 % confidence and σ of each parameter; from whole trajectories only."""
+    """By output: mean, μ*, its 95 % confidence and σ of each parameter; from complete trajectories only."""
     from SALib.analyze import morris as analysis
 
     problem, levels = study.morris
@@ -553,7 +553,7 @@ def write_sensitivities(study, options, found):
 
 
 def branches(path):
-    """The branches of a path's table, an array of places (m) each."""
+    """The branches of a path's table as arrays of positions (m)."""
     with open(path) as file:
         rows = list(csv.reader(file))[1:]
     numbers = sorted({int(row[0]) for row in rows})
@@ -561,7 +561,7 @@ def branches(path):
 
 
 def covered(lines, centres, reach):
-    """Which cells have their centre within reach (m) of a line."""
+    """The cells whose centre is within reach (m) of a line."""
     near = numpy.zeros(centres.shape[:2], dtype=bool)
     for line in lines:
         for start, end in zip(line[:-1], line[1:]):
@@ -574,7 +574,7 @@ def covered(lines, centres, reach):
 
 
 def heat_map(study, options):
-    """In how many runs the crack goes through each cell."""
+    """Number of runs whose crack crosses each cell."""
     rule = study.paths
     cell = rule["cell"]
     xs, ys = (numpy.arange(low + cell / 2, high, cell) for low, high in zip(rule["lower"], rule["upper"]))

@@ -14,7 +14,7 @@ use fissure::survey::speed;
 use super::bench_report::{Figures, Limited, Phase};
 use super::{BenchArguments, Verbosity, launch, machine_limits};
 
-/// The laws that are measured.
+/// The measured laws.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Law {
     /// Prototype microelastic: bond-based, one pass over the bonds.
@@ -39,7 +39,7 @@ impl Law {
         }
     }
 
-    /// Damage that breaks no bond here.
+    /// A damage law under which no bond breaks.
     fn damage(self) -> &'static str {
         match self {
             Self::Pmb | Self::Lps => "critical_stretch = { critical_stretch = 1e3, alpha = 0 }",
@@ -47,7 +47,7 @@ impl Law {
         }
     }
 
-    /// Passes over the bonds in a step.
+    /// Passes over the bonds per step.
     fn passes(self) -> u64 {
         match self {
             Self::Pmb => 1,
@@ -55,26 +55,26 @@ impl Law {
         }
     }
 
-    /// Additions, multiplications, divisions and roots that the equations want for a bond of known
-    /// ξ and |ξ|, seen from one end; docs/performance.md counts them.
+    /// Floating-point operations of the equations per bond and end, for known ξ and |ξ|; see
+    /// docs/performance.md.
     fn operations(self, failure: bool) -> u64 {
         match self {
             Self::Pmb => 23 + u64::from(failure),
             Self::Lps => 41 + 2 * u64::from(failure),
-            // 15 products and sums, 15 sums of both ends' tensors, 18 products and sums with the bond.
+            // 15 products and sums, 15 sums of the tensors of i and j, 18 products and sums with ξ.
             Self::Correspondence => 96 + 7 * u64::from(failure),
         }
     }
 }
 
-/// How bonds are kept.
+/// Storage of the bonds.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Family {
-    /// One bit each, for this block is a lattice.
+    /// Automatic: one bit per bond, as the block is a lattice.
     Auto,
-    /// One bit each.
+    /// One bit per bond.
     Lattice,
-    /// In lists, as those of scattered points.
+    /// Neighbour lists, as for scattered points.
     List,
 }
 
@@ -89,13 +89,14 @@ impl Family {
     }
 }
 
-/// Bytes of a point that a step cannot but read or write beside its bonds, in three dimensions:
-/// motion (displacement, velocity and response read and written, block read, displacement written for the
-/// bonds), and in each pass over the bonds (reference, displacement and volume read, response read and written).
+/// Minimum memory traffic per point and step of the motion in 3-D, bytes: displacement, velocity and
+/// response read and written, block read, displacement written for the bond loops.
 const MOTION_BYTES: u64 = 170;
+/// Minimum memory traffic per point and pass over the bonds in 3-D, bytes: reference, displacement and
+/// volume read, response read and written.
 const PASS_BYTES: u64 = 120;
 
-/// Parses `N` or `X,Y,Z` into the edges of a block in points.
+/// Parse `N` or `X,Y,Z` into the edges of a block, in points.
 pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     let numbers: Option<Vec<u64>> = text
         .split(',')
@@ -110,7 +111,7 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// The deck of the problem. The bonds are stretched a little, so that no time is saved on zeros.
+/// The deck of the problem. Bonds are slightly stretched, because zeros could be faster.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
     let breaking = arguments.law.damage();
@@ -141,12 +142,12 @@ fn deck(arguments: &BenchArguments) -> String {
     )
 }
 
-/// Steps before those that are measured.
+/// Number of warm-up steps.
 fn warm_up(arguments: &BenchArguments) -> u32 {
     arguments.steps.div_ceil(10)
 }
 
-/// Measures and prints on all ranks.
+/// Measure on all ranks and print.
 pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
     launch::on_all_ranks(|world| {
         let threads = launch::threads(arguments.threads);
@@ -190,7 +191,7 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let bonds_bytes = total(speed.bond_bytes);
     let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
-    // Further passes send fewer numbers than the first, which alone was repeated.
+    // Only the first exchange of a step was repeated; those of further passes send less.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let phases = vec![
         phase("bonds", times.forces.bonds),
@@ -258,7 +259,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_are_those_of_the_nearest_cube_or_of_a_block() {
+    fn edges_of_the_nearest_cube_or_of_a_block() {
         assert_eq!(edges("262144"), Ok([64; 3]));
         assert_eq!(edges("1000000"), Ok([100; 3]));
         assert_eq!(edges("4, 3,2"), Ok([4, 3, 2]));

@@ -1,4 +1,4 @@
-//! The figures of `fissure bench`, for people and for scripts.
+//! The figures of `fissure bench`, as a table and as JSON.
 
 use clap::ValueEnum;
 
@@ -8,67 +8,67 @@ use super::bench::{Family, Law};
 use super::format::{bytes, count, si};
 use fissure::lanes::Instructions;
 
-/// Time of a phase of the loop over the ranks, s.
+/// Time of a phase of the time loop, s.
 pub struct Phase {
-    /// What was done.
+    /// Name of the phase.
     pub name: &'static str,
     /// Mean over the ranks.
     pub mean: f64,
-    /// Of the slowest rank.
+    /// Maximum over the ranks.
     pub slowest: f64,
 }
 
-/// Measured limits of all cores, and what the loop reaches of them.
+/// Measured limits of all cores, and the rates of the time loop.
 pub struct Limited {
-    /// Triad, bytes/s.
+    /// Triad bandwidth, bytes/s.
     pub bandwidth: f64,
-    /// What the loop must read and write, bytes/s.
+    /// Minimum memory traffic of the loop, bytes/s.
     pub moved: f64,
-    /// Multiply-adds, operations/s.
+    /// Multiply-add rate, operations/s.
     pub arithmetic: f64,
-    /// What the equations want of the loop, operations/s.
+    /// Operation rate of the loop, operations/s.
     pub done: f64,
 }
 
-/// What was measured, over all ranks; s and bytes.
+/// Measured figures over all ranks; s and bytes.
 pub struct Figures {
     /// The law of the bonds.
     pub law: Law,
-    /// How bonds are kept.
+    /// Storage of the bonds.
     pub family: Family,
-    /// The vector instructions of the loops.
+    /// Instruction set of the bond loops.
     pub instructions: Instructions,
-    /// Whether bonds can break.
+    /// Bonds can break.
     pub failure: bool,
     /// Points along each edge.
     pub edges: [u64; 3],
-    /// Points.
+    /// Number of points.
     pub points: f64,
-    /// Neighbours of all points.
+    /// Number of neighbours of all points.
     pub bonds: f64,
-    /// Ranks.
+    /// Number of ranks.
     pub ranks: usize,
     /// Threads of rank 0.
     pub threads: usize,
     /// Threads of all ranks.
     pub cores: f64,
-    /// Steps measured.
+    /// Number of measured steps.
     pub steps: f64,
-    /// Steps before.
+    /// Number of warm-up steps.
     pub warm_up: f64,
-    /// Set-up of the slowest rank.
+    /// Set-up time of the slowest rank.
     pub set_up: f64,
-    /// Phases of the loop; the last is all of it.
+    /// Phases of the loop; the last is the total.
     pub phases: Vec<Phase>,
     /// Memory of all ranks; the last is the peak.
     pub memory: Vec<(&'static str, f64)>,
-    /// Sent in a step.
+    /// Bytes sent per step.
     pub halo_bytes: f64,
-    /// Time that the messages of a step take of a rank beside its work, mean of the ranks, s.
+    /// Communication time per step that is not overlapped, mean over the ranks, s.
     pub messages_time: f64,
-    /// Time that they take where there is no work meanwhile, s.
+    /// Communication time per step without overlap, s.
     pub messages_time_alone: f64,
-    /// Messages in a step.
+    /// Messages per step.
     pub messages: f64,
     /// Those of the rank that sends most.
     pub most_messages: f64,
@@ -86,13 +86,13 @@ impl Figures {
         self.phases.last().map_or(f64::NAN, |phase| phase.slowest)
     }
 
-    /// Neighbours visited in a second.
+    /// Neighbours visited per second.
     fn updates(&self) -> f64 {
         self.bonds * self.steps / self.seconds()
     }
 
-    /// The share of the messages' time that is hidden behind the interior bonds; NaN without messages.
-    /// Ranks that wait for one another may take longer than the messages alone.
+    /// Fraction of the communication time that overlaps with interior bonds; NaN without messages. Waiting
+    /// for other ranks can make it negative.
     fn hidden(&self) -> f64 {
         if self.messages > 0.0 {
             (1.0 - self.messages_time / self.messages_time_alone).max(0.0)
@@ -106,7 +106,7 @@ impl Figures {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Prints a table, or one line of JSON.
+    /// Print a table, or one line of JSON.
     pub fn print(&self, json: bool) {
         if json {
             outln!("{}", self.json())
@@ -193,7 +193,7 @@ impl Figures {
         }
     }
 
-    /// One object; names say the unit.
+    /// One JSON object; names include the unit.
     fn json(&self) -> String {
         let [x, y, z] = self.edges;
         let mut entries = vec![

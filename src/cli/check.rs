@@ -1,4 +1,4 @@
-//! `fissure check`: what a deck would do.
+//! `fissure check`: validation and figures of a deck.
 
 use std::path::Path;
 
@@ -11,20 +11,20 @@ use fissure::solver::size::is_feasible;
 use fissure::solver::steps::{choose_steps, even_clock};
 use fissure::survey::{Cost, Interior, Size, dry_run, interior, size};
 
-use super::check_report as say;
+use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
-/// More lattice cells, points or bonds than these, counted from both ends, are not made to check a deck:
-/// it would take more than some seconds and 1 GB.
-const MOST_CELLS: f64 = 1e7;
-const MOST_POINTS: f64 = 2e6;
-const MOST_BONDS: f64 = 1.5e8;
+/// Limits of a dry run, which keep it within some seconds and 1 GB: lattice cells, points, and bonds
+/// counted at both ends.
+const MAX_CELLS: f64 = 1e7;
+const MAX_POINTS: f64 = 2e6;
+const MAX_BONDS: f64 = 1.5e8;
 
-/// Validates the decks and prints their figures.
+/// Validate the decks and print their figures.
 ///
 /// # Errors
-/// When a deck is wrong or the output is full.
+/// If a deck is invalid or the output cannot be written.
 pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     launch::start_threads(launch::threads(None))?;
     each(&arguments.decks, |deck| {
@@ -34,98 +34,98 @@ pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
 
 fn check_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     let deck = deck::read(path, &arguments.set)?;
-    let asked = Asked {
+    let request = Request {
         path,
         deck: &deck,
         ranks: arguments.ranks,
-        // Nobody reads the speed of a deck that is only to be right.
-        trial: verbosity != Verbosity::Quiet,
+        // With --quiet, nothing is printed.
+        measure: verbosity != Verbosity::Quiet,
     };
-    let report = report(&asked).map_err(|error| deck.locate(error))?;
+    let report = report(&request).map_err(|error| deck.locate(error))?;
     if verbosity == Verbosity::Quiet {
         return Ok(());
     }
     print(&report.text)
 }
 
-/// What is asked about a deck.
-struct Asked<'a> {
+/// The deck and the options of a check.
+struct Request<'a> {
     path: &'a Path,
     deck: &'a Deck,
     ranks: u32,
-    /// Whether some steps are made to know their speed.
-    trial: bool,
+    /// Measure the time per step and the separation energies.
+    measure: bool,
 }
 
-/// The figures of a deck; errors name places in it by spans.
-fn report(asked: &Asked) -> Result<Report> {
-    let problem = asked.deck.problem()?;
-    let ranks = asked.ranks as usize;
+/// The report on a deck; errors name places in it by spans.
+fn report(request: &Request) -> Result<Report> {
+    let problem = request.deck.problem()?;
+    let ranks = request.ranks as usize;
     is_feasible(&problem, &cutoffs(&problem), ranks)?;
     let problem = calibrated(&problem)?;
     let size = size(&problem)?;
-    let few = size.cells <= MOST_CELLS
-        && size.all_points() <= MOST_POINTS
-        && size.directed_bonds() <= MOST_BONDS;
+    let few = size.cells <= MAX_CELLS
+        && size.all_points() <= MAX_POINTS
+        && size.directed_bonds() <= MAX_BONDS;
     if few {
-        look_at(&problem, asked)
+        simulate(&problem, request)
     } else {
-        estimate(&problem, asked, &size)
+        estimate(&problem, request, &size)
     }
 }
 
-/// What a point inside each body is like, where that can be found.
+/// The interior of each body, where it can be computed.
 fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
     (0..problem.bodies.len())
         .map(|body| interior(problem, body))
         .collect()
 }
 
-/// Makes points and bonds and looks at them.
-fn look_at(problem: &Problem, asked: &Asked) -> Result<Report> {
-    let run = dry_run(problem, asked.ranks, asked.trial)?;
+/// Report a dry run.
+fn simulate(problem: &Problem, request: &Request) -> Result<Report> {
+    let run = dry_run(problem, request.ranks, request.measure)?;
     let (survey, dimension) = (&run.survey, problem.dimension.count());
     let interiors = interiors(problem);
     let mut report = Report::default();
-    say::heading(&mut report, problem, asked.path);
+    section::heading(&mut report, problem, request.path);
     for (index, body) in problem.bodies.iter().enumerate() {
-        say::body(&mut report, problem, body);
-        say::figures(&mut report, body, &survey.bodies[index], dimension);
-        say::interior(&mut report, problem, interiors[index].as_ref());
-        if asked.trial {
-            say::parting(&mut report, problem, index);
+        section::body(&mut report, problem, body);
+        section::figures(&mut report, body, &survey.bodies[index], dimension);
+        section::interior(&mut report, problem, interiors[index].as_ref());
+        if request.measure {
+            section::parting(&mut report, problem, index);
         }
     }
-    say::joints(&mut report, problem, survey);
-    say::places(&mut report, problem, survey, dimension);
-    say::sets(&mut report, problem, survey);
-    report.say("size");
-    say::size(&mut report, problem, run.points, run.bonds);
+    section::joints(&mut report, problem, survey);
+    section::places(&mut report, problem, survey, dimension);
+    section::sets(&mut report, problem, survey);
+    report.heading("size");
+    section::size(&mut report, problem, run.points, run.bonds);
     report.line(
         "of them as lattice",
         super::format::count(run.lattice_bonds),
     );
-    say::cost(&mut report, &run.cost, asked.ranks, run.ghosts);
-    say::time(&mut report, problem, run.stable_step);
-    say::steps(&mut report, problem, &run.steps);
+    section::cost(&mut report, &run.cost, request.ranks, run.ghosts);
+    section::time(&mut report, problem, run.stable_step);
+    section::steps(&mut report, problem, &run.steps);
     if let Some(seconds) = run.seconds {
-        say::run_time(&mut report, problem, &run.steps, seconds, asked.ranks);
+        section::run_time(&mut report, problem, &run.steps, seconds, request.ranks);
     }
-    say::warnings(&mut report, asked.deck, &survey.warnings);
+    section::warnings(&mut report, request.deck, &survey.warnings);
     Ok(report)
 }
 
-/// Says by formula what there is too much of to make.
-fn estimate(problem: &Problem, asked: &Asked, size: &Size) -> Result<Report> {
+/// Report estimates for a run that is too large for a dry run.
+fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<Report> {
     let interiors = interiors(problem);
     let mut report = Report::default();
-    say::heading(&mut report, problem, asked.path);
+    section::heading(&mut report, problem, request.path);
     for (index, body) in problem.bodies.iter().enumerate() {
-        say::body(&mut report, problem, body);
+        section::body(&mut report, problem, body);
         report.line("points", format_args!("about {:.3e}", size.points[index]));
-        say::interior(&mut report, problem, interiors[index].as_ref());
+        section::interior(&mut report, problem, interiors[index].as_ref());
     }
-    report.say("size, estimated: there is too much of it to be made here");
+    report.heading("size, estimated: too large to build here");
     report.line("points", format_args!("{:.3e}", size.all_points()));
     report.line("bonds", format_args!("{:.3e}", 0.5 * size.directed_bonds()));
     let stable = interiors
@@ -133,16 +133,16 @@ fn estimate(problem: &Problem, asked: &Asked, size: &Size) -> Result<Report> {
         .flatten()
         .map(|interior| interior.stable_step)
         .fold(f64::INFINITY, f64::min);
-    // Where all points come from files nothing is known of the step.
+    // Without a lattice body, the stable step is unknown.
     if stable.is_finite() {
         let steps = choose_steps(problem, stable)?;
         let clock = even_clock(problem, &steps);
         let cost = Cost::estimate(problem, size, &clock);
-        say::cost(&mut report, &cost, asked.ranks, 0.0);
-        say::time(&mut report, problem, stable);
-        say::steps(&mut report, problem, &steps);
+        section::cost(&mut report, &cost, request.ranks, 0.0);
+        section::time(&mut report, problem, stable);
+        section::steps(&mut report, problem, &steps);
     }
-    report.say("sets, cracks and probes are not looked at");
-    say::warnings(&mut report, asked.deck, &problem.warnings);
+    report.heading("sets, cracks and probes are not checked");
+    section::warnings(&mut report, request.deck, &problem.warnings);
     Ok(report)
 }

@@ -1,4 +1,4 @@
-//! The parts of what `fissure check` prints.
+//! The sections of the report of `fissure check`.
 
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
@@ -16,9 +16,9 @@ use fissure::survey::{BodyFigures, Cost, Interior, Survey};
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
-/// The deck as a whole.
+/// Title, dimension and files of the deck.
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
-    report.say(format_args!(
+    report.heading(format_args!(
         "{} is a valid deck: {}",
         deck.display(),
         problem.title
@@ -30,17 +30,17 @@ pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.line("horizon", si(problem.horizon, "m"));
 }
 
-/// What is allowed but most likely not meant.
+/// Warnings of likely mistakes.
 pub fn warnings(report: &mut Report, deck: &Deck, warnings: &[Warning]) {
     for warning in warnings {
         let warning = deck.locate_warning(warning.clone());
-        report.say(format_args!("warning: {warning}"));
+        report.heading(format_args!("warning: {warning}"));
     }
 }
 
-/// What the deck says of a body.
+/// Material and laws of a body.
 pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
-    report.say(format_args!("body {}", body.name));
+    report.heading(format_args!("body {}", body.name));
     report.line("material", &body.material_name);
     report.line("density", format_args!("{} kg/m³", body.material.density));
     let elastic = body.material.elastic;
@@ -84,7 +84,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     }
 }
 
-/// What the points of a body come to.
+/// Figures of a body's points.
 pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimension: usize) {
     report.line("points", count(figures.points));
     let of_shape = figures.shape_volume.map(|volume| {
@@ -102,19 +102,19 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
     report.line("centre", place(&figures.centre[..dimension]));
 }
 
-/// A place in metres.
+/// Format a position, m.
 fn place(position: &[f64]) -> String {
     let entries: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
     format!("[{}] m", entries.join(", "))
 }
 
-/// What a point within a body has, beside what is wanted.
+/// Properties of the interior of a body, beside the exact values.
 pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interior>) {
     let Some(interior) = interior else {
         return;
     };
     report.line("neighbours inside", interior.neighbours);
-    let share = |found: f64, wanted: f64| format!("{:+.1} %", 100.0 * (found / wanted - 1.0));
+    let deviation = |found: f64, exact: f64| format!("{:+.1} %", 100.0 * (found / exact - 1.0));
     let [bulk, shear] = interior.exact;
     let name = match problem.dimension {
         Dimension::Space => "bulk modulus inside",
@@ -126,7 +126,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
             "{}, wanted {} ({})",
             si(interior.bulk, "Pa"),
             si(bulk, "Pa"),
-            share(interior.bulk, bulk)
+            deviation(interior.bulk, bulk)
         ),
     );
     if let Some([axes, diagonals]) = interior.shear {
@@ -137,14 +137,14 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
                 si(axes, "Pa"),
                 si(diagonals, "Pa"),
                 si(shear, "Pa"),
-                share(axes, shear),
-                share(diagonals, shear)
+                deviation(axes, shear),
+                deviation(diagonals, shear)
             ),
         );
     }
 }
 
-/// What it costs to part a body whose bonds break by their work.
+/// Separation energy of a body with energy-based damage.
 pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
@@ -152,13 +152,13 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let DamageRule::Energy { work, .. } = damage.rule else {
         return;
     };
-    let mut ways = vec![("cost of opening", 0.0)];
+    let mut modes = vec![("cost of opening", 0.0)];
     if work.sense == Sense::Either && problem.dimension.count() > 1 {
-        ways.push(("cost of sliding", FRAC_PI_2));
+        modes.push(("cost of sliding", FRAC_PI_2));
     }
-    for (name, angle) in ways {
-        if let Some(cost) = separation_energy_ratio(problem, body, angle) {
-            report.line(name, format_args!("{cost:.3} of the fracture energy"));
+    for (name, angle) in modes {
+        if let Some(ratio) = separation_energy_ratio(problem, body, angle) {
+            report.line(name, format_args!("{ratio:.3} of the fracture energy"));
         }
     }
 }
@@ -168,7 +168,7 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;
     }
-    report.say("bonds between bodies");
+    report.heading("bonds between bodies");
     if survey.joints.is_empty() {
         report.line("none", "");
     }
@@ -181,13 +181,13 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
 /// Cracks and probes.
 pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
     if !problem.cracks.is_empty() {
-        report.say("cracks");
+        report.heading("cracks");
     }
     for (crack, cut) in problem.cracks.iter().zip(&survey.cuts) {
         report.line(&crack.name, format_args!("cuts {} bonds", count(*cut)));
     }
     if !problem.history.probes.is_empty() {
-        report.say("probes");
+        report.heading("probes");
     }
     for (probe, found) in problem.history.probes.iter().zip(&survey.probes) {
         report.line(
@@ -204,14 +204,14 @@ pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension
 
 /// The sets.
 pub fn sets(report: &mut Report, problem: &Problem, survey: &Survey) {
-    report.say("sets");
+    report.heading("sets");
     for (set, size) in problem.sets.iter().zip(&survey.sets) {
         let note = if *size == 0 { "  (empty!)" } else { "" };
         report.line(&set.name, format_args!("{} points{note}", count(*size)));
     }
 }
 
-/// Points and bonds.
+/// Numbers of points and bonds.
 pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     let trigger = problem
         .refinement
@@ -226,7 +226,7 @@ pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     report.line("bonds", count(bonds));
 }
 
-/// Memory and files; `ghosts` as a share of a rank's own points.
+/// Memory and disk space; `ghosts` is relative to owned points.
 pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     let memory = bytes(cost.memory_of_a_rank(ranks, ghosts));
     report.line(
@@ -247,9 +247,9 @@ pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     );
 }
 
-/// End and stable step.
+/// End time and stable step.
 pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
-    report.say("time");
+    report.heading("time");
     report.line("end", si(problem.time.end, "s"));
     report.line("stable step", si(stable, "s"));
 }
@@ -285,7 +285,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     }
 }
 
-/// The largest step of a stage, where it is above the first one (s).
+/// The largest step of a stage, if above the first one (s).
 fn largest_step(time: &Time, first: f64) -> String {
     match time.adaptive.and_then(|rule| rule.largest) {
         Some(largest) if largest > first => format!(" at first, then up to {}", si(largest, "s")),
@@ -300,7 +300,7 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Run time of the steps, and of an iteration of a load step, from the wall-clock time (s) of one on this rank.
+/// Estimated run time of the steps and of an iteration of a load step, from the measured time per step (s).
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

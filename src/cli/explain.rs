@@ -1,14 +1,14 @@
-//! `fissure explain`: a deck with every default filled in.
+//! `fissure explain`: a deck with all defaults.
 
 use fissure::deck;
 use fissure::error::Result;
 
 use super::{DeckArguments, each, print};
 
-/// Prints the decks.
+/// Print the decks with all defaults.
 ///
 /// # Errors
-/// When a deck is wrong or the output is full.
+/// If a deck is invalid or the output cannot be written.
 pub fn explain(arguments: &DeckArguments) -> Result<()> {
     each(&arguments.decks, |deck| {
         print(&deck::read(deck, &arguments.set)?.explain()?)

@@ -1,9 +1,9 @@
-//! LaneTuple for people.
+//! Formatting of numbers, times and sizes.
 
-/// Values from here on have no prefix.
+/// Values from here on are formatted without prefix.
 const TOO_LARGE: f64 = 1e16;
 
-/// A value with an SI prefix and its unit, such as `50.0 µs`.
+/// Format a value with an SI prefix and its unit, such as `50.0 µs`.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 9] = [
         (1e12, "T"),
@@ -20,7 +20,7 @@ pub fn si(value: f64, unit: &str) -> String {
     if !value.is_finite() || size >= TOO_LARGE {
         return format!("{value:.3e} {unit}");
     }
-    // Half a unit of the last digit shown, so that 999.96 is not shown as 1000.0.
+    // Include rounding of the last digit, so 999.96 is not printed as 1000.0.
     let prefix = PREFIXES.iter().find(|(factor, _)| size >= 0.99995 * factor);
     match prefix {
         Some((factor, prefix)) => format!("{:.4} {prefix}{unit}", Digits(value / factor)),
@@ -29,7 +29,7 @@ pub fn si(value: f64, unit: &str) -> String {
     }
 }
 
-/// A number shown with so many significant digits as its precision says.
+/// A number with the format precision as its number of significant digits.
 struct Digits(f64);
 
 impl std::fmt::Display for Digits {
@@ -40,7 +40,7 @@ impl std::fmt::Display for Digits {
     }
 }
 
-/// A count with thin separation, such as `1 234 567`.
+/// Format a count with separators, such as `1 234 567`.
 pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
@@ -53,7 +53,7 @@ pub fn count(value: u64) -> String {
     text
 }
 
-/// A time for people, such as `3 h 20 min`.
+/// Format a duration, such as `3 h 20 min`.
 pub fn duration(seconds: f64) -> String {
     const UNITS: [(f64, &str); 4] = [
         (31_557_600.0, "a"),
@@ -74,7 +74,7 @@ pub fn duration(seconds: f64) -> String {
     format!("{whole} {name} {rest} {smaller_name}")
 }
 
-/// Bytes in binary units.
+/// Format bytes in binary units.
 pub fn bytes(value: f64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
     let power = (value.max(1.0).log2() / 10.0).floor().min(4.0) as usize;
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_for_people() {
+    fn formatted_numbers() {
         assert_eq!(si(5e-5, "s"), "50.00 µs");
         assert_eq!(si(9.99996e-4, "s"), "1.000 ms");
         assert_eq!(si(-2.5e9, "Pa"), "-2.500 GPa");

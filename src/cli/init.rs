@@ -9,10 +9,10 @@ use fissure::error::{Error, Result};
 
 use super::{InitArguments, Verbosity, file_error};
 
-/// Writes the deck; never over a file that is there.
+/// Write the example deck to a new file.
 ///
 /// # Errors
-/// When the file exists or cannot be written.
+/// If the file exists or cannot be written.
 pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
     let mut path = arguments.name.clone();
     if path.extension().is_none() {

@@ -1,4 +1,4 @@
-//! How this process was launched: its rank before MPI has started, its cores and its threads.
+//! Launch environment: rank before MPI starts, cores and threads.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -11,12 +11,12 @@ use fissure::run::start_mpi;
 
 use super::{errln, finish};
 
-/// Threads that no host is asked too much with.
-const MOST_THREADS: usize = 64;
+/// Number of threads that is accepted on any host.
+const ALWAYS_ALLOWED_THREADS: usize = 64;
 
-/// Starts MPI, runs `body` on all ranks, and ends MPI. Its errors must be the same on all ranks.
+/// Start MPI, run `body` on all ranks and finalise MPI. Errors of `body` must be equal on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
-    // MPI may set such variables for a process that it finds alone.
+    // Read first: MPI may set these variables for a single process.
     let (started, rank) = (started(), rank_from_environment());
     let world = match start_mpi() {
         Ok(world) => world,
@@ -25,22 +25,22 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
     if let Err(error) = joined(started, world.size()) {
         let speaks = rank.unwrap_or(0) == 0;
         if !speaks {
-            // The launcher ends all processes as soon as one has failed.
-            std::thread::sleep(TIME_TO_SPEAK);
+            // The launcher kills all processes as soon as one fails.
+            std::thread::sleep(EXIT_DELAY);
         }
         return finish(Err(error), speaks);
     }
     let speaks = world.rank() == 0;
-    // A panic on one rank would leave the others waiting; its message has been printed.
+    // A panic on one rank would make the others hang; its message has been printed.
     catch_unwind(AssertUnwindSafe(|| body(&world)))
         .unwrap_or_else(|_| world.abort(1))
         .unwrap_or_else(|error| finish(Err(error), speaks))
 }
 
-/// How long the other processes of a launcher wait for the first one to print an error.
-const TIME_TO_SPEAK: Duration = Duration::from_secs(1);
+/// Delay of the other processes, so that the first one can print an error.
+const EXIT_DELAY: Duration = Duration::from_secs(1);
 
-/// Where launchers say how many processes they have started, the innermost launcher first.
+/// Environment variables with the number of launched processes, innermost launcher first.
 const SIZES: [&str; 5] = [
     "OMPI_COMM_WORLD_SIZE",
     "MV2_COMM_WORLD_SIZE",
@@ -49,17 +49,17 @@ const SIZES: [&str; 5] = [
     "SLURM_STEP_NUM_TASKS",
 ];
 
-/// How many processes the launcher has started, and which variable says so; `None` without a launcher.
+/// The number of launched processes and its variable; `None` without a launcher.
 fn started() -> Option<(&'static str, usize)> {
     SIZES
         .iter()
         .find_map(|name| Some((*name, number(&[name])?)))
 }
 
-/// Refuses a launcher that MPI does not know, whose processes would each run alone.
+/// Reject a launcher of another MPI, whose processes would run independently.
 ///
 /// # Errors
-/// MPI sees one rank, and the launcher says that it has started several.
+/// If MPI has one rank but the launcher started several processes.
 fn joined(started: Option<(&str, usize)>, ranks: usize) -> Result<()> {
     match started {
         Some((name, started)) if ranks == 1 && started > 1 => {
@@ -76,14 +76,14 @@ fn joined(started: Option<(&str, usize)>, ranks: usize) -> Result<()> {
     }
 }
 
-/// The first of some environment variables that holds a number.
+/// The value of the first of some environment variables that is a number.
 fn number(names: &[&str]) -> Option<usize> {
     names
         .iter()
         .find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
-/// This process's rank as the launcher tells it before MPI has started; `None` without a launcher.
+/// The rank of this process, from the launcher's environment; `None` without a launcher.
 pub fn rank_from_environment() -> Option<usize> {
     number(&[
         "OMPI_COMM_WORLD_RANK",
@@ -93,7 +93,7 @@ pub fn rank_from_environment() -> Option<usize> {
     ])
 }
 
-/// The number of ranks on this host as the launcher tells it.
+/// Number of ranks on this host, from the launcher's environment.
 pub fn ranks_on_host() -> usize {
     number(&[
         "OMPI_COMM_WORLD_LOCAL_SIZE",
@@ -104,13 +104,13 @@ pub fn ranks_on_host() -> usize {
     .max(1)
 }
 
-/// The cores that this process may use.
+/// Number of cores available to this process.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// The number of threads: as asked for, or as Slurm gives cores to a task, or an even share of the
-/// cores that this process may use.
+/// Number of threads: as requested, else Slurm's cores per task, else an even share of the available
+/// cores.
 pub fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
@@ -122,18 +122,18 @@ pub fn threads(asked: Option<u16>) -> usize {
         .unwrap_or_else(share)
 }
 
-/// Whether the launcher has bound this process to fewer cores than the host has.
+/// The launcher has bound this process to a part of the host's cores.
 fn is_bound() -> bool {
     cores() < cores_of_host()
 }
 
-/// The cores of this host, as far as the system tells.
+/// Number of cores of this host.
 fn cores_of_host() -> usize {
     let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
     cores_in(&list).max(cores())
 }
 
-/// The number of cores in a list such as `0-3,8`, as Linux writes them; 0 of an empty one.
+/// Number of cores in a Linux CPU list such as `0-3,8`.
 pub fn cores_in(list: &str) -> usize {
     let range = |range: &str| match range.split_once('-') {
         Some((first, last)) => match (first.parse::<usize>(), last.parse::<usize>()) {
@@ -146,7 +146,7 @@ pub fn cores_in(list: &str) -> usize {
     ranges.map(range).sum()
 }
 
-/// Says what is wrong with the way that threads and cores fit together, if anything.
+/// Print a warning if threads and cores do not match.
 pub fn warn(threads: usize) {
     if let Some(warning) = warning(threads) {
         errln!("warning: {warning}");
@@ -169,19 +169,19 @@ fn warning(threads: usize) -> Option<String> {
     None
 }
 
-/// Sets up the threads of this rank.
+/// Start the threads of this rank.
 ///
 /// # Errors
-/// When there are far more than cores, or the system refuses.
+/// If there are far more threads than cores, or the system refuses.
 pub fn start_threads(threads: usize) -> Result<()> {
-    let most = MOST_THREADS.max(4 * cores_of_host());
+    let most = ALWAYS_ALLOWED_THREADS.max(4 * cores_of_host());
     if threads > most {
         return Err(Error::input(format!(
             "--threads {threads}: this host has {} cores; {most} threads at most",
             cores_of_host()
         )));
     }
-    // This thread is one of them: work that it hands out and then waits for would begin some microseconds later.
+    // This thread is one of the pool: handing work to another thread would add some microseconds.
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .use_current_thread()

@@ -1,7 +1,6 @@
-//! What this machine can do at most: bytes per second to and from memory, and floating-point
-//! operations per second, on all threads of all ranks at once.
+//! Limits of this machine: memory bandwidth and floating-point rate of all threads of all ranks at once.
 //!
-//! Each figure is the best of some repetitions, since whatever else runs can only make one slower.
+//! Each figure is the best of several repetitions, because other processes can only slow one down.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -10,16 +9,16 @@ use fissure::comm::Communicator;
 
 use super::launch;
 
-/// Rates of all threads of this rank's process while those of the other ranks do the same.
+/// Rates of the threads of this rank, measured on all ranks at once.
 #[derive(Clone, Copy)]
 pub struct Limits {
-    /// Triad a = b + s c, 24 bytes an entry as STREAM counts it (McCalpin 1995), bytes/s.
+    /// Triad a = b + s c, 24 bytes per entry as in STREAM (McCalpin 1995), bytes/s.
     pub bandwidth: f64,
-    /// Fused multiply-adds in the widest vectors, two operations each, 1/s.
+    /// Fused multiply-adds with the widest vectors, two operations each, 1/s.
     pub arithmetic: f64,
 }
 
-/// Measures both; collective.
+/// Measure both rates. Collective.
 pub fn measure(comm: &dyn Communicator, threads: usize) -> Limits {
     Limits {
         bandwidth: bandwidth(comm, threads),
@@ -30,11 +29,11 @@ pub fn measure(comm: &dyn Communicator, threads: usize) -> Limits {
 /// Repetitions of each measurement.
 const REPETITIONS: usize = 10;
 
-/// Seconds that `work` takes on the slowest rank when all threads of all ranks do it at once; the
-/// best of some repetitions.
+/// Time of `work` on the slowest rank, with all threads of all ranks at once, s; the best of several
+/// repetitions.
 fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     let once = |_| {
-        // All ranks begin together.
+        // A barrier.
         comm.sum(&mut [0]);
         let start = Instant::now();
         rayon::broadcast(|_| work());
@@ -45,7 +44,7 @@ fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     (0..REPETITIONS).map(once).fold(f64::INFINITY, f64::min)
 }
 
-/// Arrays are this many times as large as the cache that they must not fit in.
+/// Size of the arrays over that of the last-level cache.
 const CACHES: usize = 4;
 
 fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
@@ -55,7 +54,7 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
             std::cell::RefCell::new([const { Vec::new() }; 3])
         };
     }
-    // Each thread writes to its own first, so that they lie in the memory next to it.
+    // First touch: each thread's arrays are allocated in its local memory.
     rayon::broadcast(|_| {
         ARRAYS.with_borrow_mut(|arrays| *arrays = [0.0, 1.0, 2.0].map(|value| vec![value; length]));
     });
@@ -71,7 +70,7 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
     24.0 * length as f64 * rayon::current_num_threads() as f64 / seconds
 }
 
-/// The share of the last cache that a thread has when all are at work, bytes.
+/// Last-level cache per thread, bytes.
 fn share_of_cache(threads: usize) -> usize {
     let read = |name: &str| {
         let path = format!("/sys/devices/system/cpu/cpu0/cache/index3/{name}");
@@ -90,7 +89,7 @@ fn triad(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the machine has the instructions.
+            // SAFETY: the instruction set is available.
             return unsafe { triad_avx512(a, b, c, s) };
         }
         if is_x86_feature_detected!("avx2") {
@@ -120,11 +119,11 @@ fn triad_any(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
     }
 }
 
-/// Sums that do not wait for one another: more than the latency of a multiply-add (4 or 5 cycles)
-/// times how many can start in a cycle (2).
+/// Number of independent sums: above the latency of a multiply-add (4 or 5 cycles) × throughput (2 per
+/// cycle).
 const SUMS: usize = 12;
 
-/// Multiply-adds to each sum in one repetition: some 30 ms.
+/// Multiply-adds per sum and repetition, which take some 30 ms.
 const LENGTH: u32 = 8_000_000;
 
 fn arithmetic(comm: &dyn Communicator) -> f64 {
@@ -134,13 +133,12 @@ fn arithmetic(comm: &dyn Communicator) -> f64 {
     operations * rayon::current_num_threads() as f64 / seconds
 }
 
-/// What makes [`LENGTH`] × [`SUMS`] multiply-adds with the widest vectors of this machine, and their
-/// width.
+/// A function with [`LENGTH`] × [`SUMS`] multiply-adds in the widest vectors, and their width.
 fn multiply_adds() -> (fn(f64, f64), usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        /// A version for one set of instructions.
+        /// A version for one instruction set.
         macro_rules! version {
             ($feature:literal, $splat:ident, $multiply_add:ident) => {{
                 #[target_feature(enable = $feature)]
@@ -154,7 +152,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
                     }
                     black_box(sums);
                 }
-                // SAFETY: only handed out where the machine has the instructions.
+                // SAFETY: returned only if the instruction set is available.
                 |factor, term| unsafe { work(factor, term) }
             }};
         }
@@ -168,7 +166,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     (multiply_adds_any, 2)
 }
 
-/// As two operations, for machines that have no more: pairs of doubles fill their vectors.
+/// Separate multiplications and additions, for instruction sets without fused ones.
 fn multiply_adds_any(factor: f64, term: f64) {
     let mut sums = [[term; 2]; SUMS];
     for _ in 0..LENGTH {

@@ -1,4 +1,4 @@
-//! The command line: one subcommand a file.
+//! The command line, one file per subcommand.
 
 mod bench;
 mod bench_report;
@@ -18,7 +18,7 @@ mod summary;
 mod version;
 mod wall_time;
 
-/// Prints a line. A reader that has closed the output must not end a run.
+/// Print a line; write errors, such as a closed pipe, are ignored so that they do not end a run.
 macro_rules! outln {
     ($($words:tt)*) => {{
         use std::io::Write as _;
@@ -123,7 +123,7 @@ struct RunArguments {
     #[arg(long)]
     overwrite: bool,
 
-    /// Go on from the newest checkpoint in the output folder, on any number of ranks.
+    /// Continue from the newest checkpoint in the output folder, on any number of ranks.
     #[arg(long, conflicts_with = "overwrite")]
     restart: bool,
 
@@ -131,12 +131,12 @@ struct RunArguments {
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
-    /// Give a parameter of the deck another value; may be repeated.
+    /// Override a parameter of the deck; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
 
-/// Splits `NAME=VALUE`.
+/// Split `NAME=VALUE`.
 fn assignment(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
@@ -159,11 +159,11 @@ Examples:
   fissure check plate.toml --ranks 256          memory estimated for 256 ranks
   fissure check -q *.toml                       whether decks are right")]
 struct CheckArguments {
-    /// The deck, or several, all of which are looked at.
+    /// One or more decks; all are checked.
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Give a parameter of the deck another value; may be repeated.
+    /// Override a parameter of the deck; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 
@@ -231,7 +231,7 @@ struct DeckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Give a parameter of the deck another value; may be repeated.
+    /// Override a parameter of the deck; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
@@ -251,7 +251,7 @@ struct InitArguments {
 /// A cubic lattice with 122 neighbours within the horizon, a fixed step, no output. Prints the bond
 /// updates per second and core, the time by phase, the memory of the whole process, the halo, and
 /// which part of what the machine can do that is: its bandwidth and its rate of arithmetic are
-/// measured on the same threads. docs/performance.md says what each figure means.
+/// measured on the same threads. docs/performance.md explains the figures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -267,7 +267,7 @@ struct BenchArguments {
     #[arg(long, value_enum, default_value_t = bench::Law::Pmb)]
     law: bench::Law,
 
-    /// How bonds are kept.
+    /// Storage of the bonds.
     #[arg(long, value_enum, default_value_t = bench::Family::Auto)]
     family: bench::Family,
 
@@ -279,7 +279,7 @@ struct BenchArguments {
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 
-    /// Time steps that are measured; a tenth as many go before them.
+    /// Measured time steps, after 10 % warm-up steps.
     #[arg(short, long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
 
@@ -287,16 +287,16 @@ struct BenchArguments {
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Leave out the limits of the machine, which take some 100 MiB and seconds of their own.
+    /// Skip the measurement of the machine's limits, which takes some 100 MiB and seconds.
     #[arg(long)]
     no_limits: bool,
 
-    /// Print one line of JSON with every figure in SI units.
+    /// Print the figures as one line of JSON in SI units.
     #[arg(long)]
     json: bool,
 }
 
-/// How much is printed.
+/// Amount of printed output.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Verbosity {
     Quiet,
@@ -304,7 +304,7 @@ enum Verbosity {
     Verbose,
 }
 
-/// Parses the command line, runs the command and turns its outcome into an exit code.
+/// Parse the command line, run the command and return its exit code.
 pub fn main() -> ExitCode {
     let rank = launch::rank_from_environment();
     let speaks = rank.unwrap_or(0) == 0;
@@ -317,11 +317,11 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            // A rank that fails first has the launcher kill rank 0 before it has spoken; within
-            // MPI they leave together.
+            // Under a launcher, a rank that exits early makes it kill rank 0 before rank 0 prints the
+            // error; inside MPI, all ranks exit together.
             let _together = (error.exit_code() != 0 && rank.is_some()).then(World::start);
             if speaks {
-                // Nothing can be done about an output that is closed.
+                // A closed output is ignored.
                 let _ = error.print();
             }
             return ExitCode::from(error.exit_code() as u8);
@@ -335,7 +335,7 @@ pub fn main() -> ExitCode {
     let outcome = match line.command {
         Command::Run(arguments) => return run::run(&arguments, verbosity),
         Command::Bench(arguments) => return bench::bench(&arguments, verbosity),
-        // Under mpirun these are done once.
+        // Under mpirun, only rank 0 runs these commands.
         _ if !speaks => Ok(()),
         Command::Check(arguments) => check::check(&arguments, verbosity),
         Command::Plot(arguments) => plot::plot(&arguments, verbosity),
@@ -345,11 +345,10 @@ pub fn main() -> ExitCode {
     finish(outcome, true)
 }
 
-/// Works on one deck after the other. An error of one does not keep the others from being looked at: it is
-/// printed, but for the last one, which is returned.
+/// Run `work` on all decks, also after an error. All errors but the last are printed.
 ///
 /// # Errors
-/// The last error of a deck.
+/// The last error.
 fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<()> {
     let mut latest = Ok(());
     for deck in decks {
@@ -363,10 +362,10 @@ fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<
     latest
 }
 
-/// Prints what a command was asked for. A reader that has closed the output has had enough.
+/// Print the output of a command; a closed pipe is not an error.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If the output cannot be written.
 fn print(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     let written = output
@@ -381,12 +380,12 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// The exit code of an outcome; prints an error if `speaks`.
-fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
+/// The exit code of an outcome; an error is printed if `prints`.
+fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            if speaks {
+            if prints {
                 let label = if error.is_stop() { "" } else { "error: " };
                 errln!("{label}{error}");
             }
@@ -395,7 +394,7 @@ fn finish(outcome: Result<()>, speaks: bool) -> ExitCode {
     }
 }
 
-/// An error about a file that the command itself reads or writes.
+/// The error of a file that the command reads or writes.
 fn file_error(path: &std::path::Path, doing: &str, error: &std::io::Error) -> Error {
     Error::run(format!("cannot {doing} {}: {error}", path.display()))
 }

@@ -11,13 +11,13 @@ use super::format::si;
 use super::plot_paths::{self, Line};
 use super::{PlotArguments, Verbosity, file_error};
 
-/// The largest drawn displacement for `--deform auto`, as a share of the body's size.
-const AUTOMATIC_SHARE: f64 = 0.04;
+/// Largest drawn displacement for `--deform auto`, relative to the body's size.
+const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 
-/// Draws one picture, or one for each output.
+/// Draw one picture, or one per output.
 ///
 /// # Errors
-/// When the file is no result, or has no such field or time.
+/// If the file is not a result, or the field or time is missing.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let result = ResultReader::open(&arguments.result)?;
     let times = result.times()?;
@@ -27,9 +27,9 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
             .result
             .with_file_name(format!("{}.png", arguments.field))
     });
-    let look = Look::new(arguments, &result)?;
+    let style = PlotStyle::new(arguments, &result)?;
     let factor = match arguments.deform.as_str() {
-        "auto" => look.automatic_factor(chosen.last().copied().unwrap_or(0))?,
+        "auto" => style.automatic_factor(chosen.last().copied().unwrap_or(0))?,
         text => number(text, "--deform must be `auto` or a number")?,
     };
     for index in &chosen {
@@ -37,7 +37,7 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
             1 => path.clone(),
             _ => numbered(&path, *index),
         };
-        look.draw(*index, times[*index], factor, &path)?;
+        style.draw(*index, times[*index], factor, &path)?;
         if verbosity > Verbosity::Quiet {
             outln!("wrote {}", path.display());
         }
@@ -54,7 +54,7 @@ fn number(text: &str, wanted: &str) -> Result<f64> {
     value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
 }
 
-/// Indices of the outputs to draw.
+/// The indices of the outputs to draw.
 fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
         return Err(Error::input("the result holds no output yet"));
@@ -77,8 +77,8 @@ fn numbered(path: &Path, index: usize) -> PathBuf {
     path.with_file_name(format!("{stem}_{index:04}.png"))
 }
 
-/// What is the same in every picture.
-struct Look<'a> {
+/// Settings of all pictures.
+struct PlotStyle<'a> {
     result: &'a ResultReader,
     arguments: &'a PlotArguments,
     dimension: usize,
@@ -89,11 +89,11 @@ struct Look<'a> {
     section: f64,
     range: Option<(f64, f64)>,
     view: View,
-    /// Lines over the picture, file by file.
+    /// Lines over the picture, by file.
     paths: Vec<Vec<Line>>,
 }
 
-impl<'a> Look<'a> {
+impl<'a> PlotStyle<'a> {
     fn new(arguments: &'a PlotArguments, result: &'a ResultReader) -> Result<Self> {
         let attributes = result.attributes()?;
         let attribute = |name: &str| {
@@ -153,7 +153,7 @@ impl<'a> Look<'a> {
                 along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
             })
             .fold(0.0, f64::max);
-        let wanted = AUTOMATIC_SHARE * extent / largest;
+        let wanted = AUTOMATIC_DISPLACEMENT * extent / largest;
         if !wanted.is_finite() || wanted <= 1.0 {
             return Ok(1.0);
         }
@@ -212,9 +212,8 @@ impl<'a> Look<'a> {
     }
 }
 
-impl Look<'_> {
-    /// The lines to draw, each with the number of its file: every vertex moves with the point that is
-    /// nearest to it.
+impl PlotStyle<'_> {
+    /// The lines to draw, with the numbers of their files. Each vertex is displaced with its nearest point.
     fn moved_paths(
         &self,
         positions: &[[f64; 3]],

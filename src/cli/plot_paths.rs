@@ -6,14 +6,15 @@ use fissure::error::{Error, Result};
 
 use super::file_error;
 
-/// A line through places in the plane, m.
+/// A line through positions in the plane, m.
 pub type Line = Vec<[f64; 2]>;
 
-/// Reads lines from a table whose first row names the columns, among them `x` and `y` (m), with or without
-/// units. Rows with the same `branch` that follow one another make a line; without such a column all do.
+/// Read lines from a CSV file with columns `x` and `y` (m), named in the first row.
+///
+/// Consecutive rows with the same `branch` form a line; without that column, all rows do.
 ///
 /// # Errors
-/// When the file cannot be read, has no such columns, or a row is no row of numbers.
+/// If the file cannot be read, a column is missing, or a row has an invalid number.
 pub fn read(path: &Path) -> Result<Vec<Line>> {
     let text = std::fs::read_to_string(path).map_err(|error| file_error(path, "read", &error))?;
     let wrong = |line: usize, message: String| {

@@ -1,5 +1,4 @@
-//! How far a run has come: a moving bar on a terminal, a line now and then elsewhere (mpirun and Slurm
-//! pass output through pipes and files).
+//! Progress display: a bar on a terminal, periodic lines otherwise, as under mpirun and Slurm.
 
 use crate::cli::errln;
 use std::io::IsTerminal;
@@ -9,30 +8,31 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::format::si;
 
-/// The first line comes after so many seconds, the others a minute apart and, in long runs, a tenth of
-/// the time that has gone by: some sixty lines a day.
+/// Time of the first line, s.
 const FIRST_LINE: f64 = 5.0;
+/// Minimum interval between lines, s.
 const MINUTE: f64 = 60.0;
-const SHARE: f64 = 0.1;
+/// Minimum interval relative to the elapsed time; a day has some sixty lines.
+const RELATIVE_INTERVAL: f64 = 0.1;
 
 /// Width of the bar in characters.
 const WIDTH: usize = 30;
 
 /// A progress display.
 pub enum Progress {
-    /// Nothing is shown.
+    /// No display.
     Silent,
-    /// A moving bar.
+    /// A progress bar.
     Bar(ProgressBar),
-    /// A line now and then.
+    /// Periodic lines.
     Lines {
-        /// When the display began.
+        /// Start of the display.
         start: Instant,
-        /// Number of the step that it began after.
+        /// Number of the step at the start.
         first: u64,
         /// Number of the last step.
         last: u64,
-        /// When the next line is due, s.
+        /// Time of the next line, s.
         due: f64,
     },
 }
@@ -60,8 +60,8 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Shows that a step, ending at `time` (s), has been made, of so many as now seems.
-    pub fn show(&mut self, step: u64, steps: u64, time: f64) {
+    /// Update after a step that ends at `time` (s); `steps` is the current estimate of their number.
+    pub fn update(&mut self, step: u64, steps: u64, time: f64) {
         match self {
             Self::Silent => {}
             Self::Bar(bar) => {
@@ -94,7 +94,7 @@ impl Progress {
         }
     }
 
-    /// Prints something else, clear of the bar.
+    /// Print other output without disturbing the bar.
     pub fn aside(&self, print: impl FnOnce()) {
         match self {
             Self::Bar(bar) => bar.suspend(print),
@@ -102,7 +102,7 @@ impl Progress {
         }
     }
 
-    /// Ends the display, of a run that came to its end or not.
+    /// End the display; `complete` at the end of the run.
     pub fn finish(&self, complete: bool) {
         match self {
             Self::Bar(bar) if complete => bar.finish(),
@@ -112,12 +112,12 @@ impl Progress {
     }
 }
 
-/// When the line after one that is printed now is due, s.
+/// Time of the next line after one at `elapsed`, s.
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE
     } else {
-        elapsed + MINUTE.max(SHARE * elapsed)
+        elapsed + MINUTE.max(RELATIVE_INTERVAL * elapsed)
     }
 }
 

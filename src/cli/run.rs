@@ -9,7 +9,7 @@ use fissure::comm::mpi::World;
 use fissure::comm::{Communicator, agree};
 use fissure::deck;
 use fissure::error::Result;
-use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Signals, View};
+use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, RunState, Signals};
 use fissure::solver::refinement::Regridded;
 use fissure::solver::repartition::Repartition;
 
@@ -17,14 +17,13 @@ use super::format::{count, si};
 use super::progress::Progress;
 use super::{RunArguments, Verbosity, launch, summary};
 
-/// Exit code of a run that stopped before its end and can be continued with --restart (that of
-/// sysexits.h for "try again").
+/// Exit code of a stopped run that can be restarted: EX_TEMPFAIL of sysexits.h.
 const STOPPED: u8 = 75;
 
-/// Runs a deck on all ranks and ends MPI.
+/// Run a deck on all ranks and finalise MPI.
 pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
     let started = Instant::now();
-    // Before MPI, whose start takes a while: until then a signal ends the process.
+    // Before MPI, whose start takes a while; until then, a signal ends the process.
     let signals = Signals::listen();
     launch::on_all_ranks(|world| {
         let signals = agree(world, signals)?;
@@ -46,8 +45,8 @@ fn run_deck(
     let problem = agree(world, deck.problem())?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;
-    let speaks = world.rank() == 0 && verbosity > Verbosity::Quiet;
-    if speaks {
+    let prints = world.rank() == 0 && verbosity > Verbosity::Quiet;
+    if prints {
         launch::warn(threads);
     }
     let stem = arguments.deck.file_stem().unwrap_or_default();
@@ -76,7 +75,7 @@ fn run_deck(
     let constraint = constraint.map_or(String::new(), |words| format!("1-D, {words}\n"));
     let mut log = Log {
         rank: world.rank(),
-        speaks,
+        prints,
         verbose: verbosity == Verbosity::Verbose,
         title: format!(
             "{}\n{constraint}{} ranks × {threads} threads on {hosts} host(s)",
@@ -92,24 +91,24 @@ fn run_deck(
         progress: Progress::Silent,
     };
     let outcome = fissure::run(&problem, world, options, &mut log)?;
-    if speaks {
+    if prints {
         report(&outcome, threads, verbosity);
     }
     if let (Some(reason), 0) = (outcome.stopped, world.rank()) {
-        tell_stopped(&outcome, reason);
+        print_stop(&outcome, reason);
     }
     Ok(outcome)
 }
 
-/// Prints what a run tells, and how far it has come.
+/// Prints the messages and the progress of a run.
 struct Log {
     rank: usize,
-    /// Whether this rank prints more than errors and warnings.
-    speaks: bool,
-    /// Whether that is a lot.
+    /// This rank prints more than errors and warnings.
+    prints: bool,
+    /// This rank prints verbose messages too.
     verbose: bool,
     title: String,
-    /// Their names.
+    /// Names of the bodies.
     bodies: Vec<String>,
     started: Instant,
     progress: Progress,
@@ -118,8 +117,8 @@ struct Log {
 impl Observer for Log {
     fn message(&mut self, message: &Message) {
         match message {
-            Message::Started if self.speaks => outln!("{}", self.title),
-            Message::SetUp { survey, .. } if self.speaks => {
+            Message::Started if self.prints => outln!("{}", self.title),
+            Message::SetUp { survey, .. } if self.prints => {
                 for (pair, bonds) in &survey.joints {
                     let [a, b] = pair.map(|body| &self.bodies[body]);
                     outln!("{} bonds join {a} and {b}", count(*bonds));
@@ -132,33 +131,35 @@ impl Observer for Log {
                 number,
                 time,
                 complete,
-            } if self.speaks => {
+            } if self.prints => {
                 outln!("continued after step {number} (t = {})", si(*time, "s"));
                 if *complete {
                     outln!("the run was complete already");
                 }
             }
-            Message::SetAside { why, kept } if self.rank == 0 => {
-                let kept: Vec<String> =
-                    kept.iter().map(|path| path.display().to_string()).collect();
-                let kept = if kept.is_empty() {
+            Message::SetAside { reason, renamed } if self.rank == 0 => {
+                let renamed: Vec<String> = renamed
+                    .iter()
+                    .map(|path| path.display().to_string())
+                    .collect();
+                let renamed = if renamed.is_empty() {
                     String::new()
                 } else {
-                    format!("; it is kept as {}", kept.join(" and "))
+                    format!("; it is kept as {}", renamed.join(" and "))
                 };
-                errln!("warning: {why}: a new result begins here{kept}");
+                errln!("warning: {reason}: a new result begins here{renamed}");
             }
-            Message::Decided(decided) if self.speaks && self.verbose => {
+            Message::Decided(decisions) if self.prints && self.verbose => {
                 outln!("decided");
-                for (name, what) in decided {
-                    outln!("  {name:<17}{what}");
+                for (name, value) in decisions {
+                    outln!("  {name:<17}{value}");
                 }
             }
             Message::Refined {
                 number,
                 regridded: Regridded { born, left },
                 points,
-            } if self.speaks && self.verbose => {
+            } if self.prints && self.verbose => {
                 let (born, points) = (count(*born), count(*points));
                 let left = if *left > 0 {
                     format!(", {} removed", count(*left))
@@ -169,12 +170,15 @@ impl Observer for Log {
                     outln!("after step {number}: {born} new points{left}, {points} in all");
                 });
             }
-            Message::Repartitioned { number, what } if self.speaks && self.verbose => {
+            Message::Repartitioned {
+                number,
+                repartition,
+            } if self.prints && self.verbose => {
                 let Repartition {
                     imbalance,
                     moved,
                     seconds,
-                } = what;
+                } = repartition;
                 let (moved, seconds) = (count(*moved), si(*seconds, "s"));
                 self.progress.aside(|| {
                     outln!(
@@ -190,18 +194,18 @@ impl Observer for Log {
         }
     }
 
-    fn begin(&mut self, now: &mut dyn View) {
+    fn begin(&mut self, now: &mut dyn RunState) {
         let left = now.last() - now.number();
-        if self.speaks && left > 0 {
+        if self.prints && left > 0 {
             let step = si(now.step(), "s");
             let set_up = si(self.started.elapsed().as_secs_f64(), "s");
             outln!("{} steps of {step} to go, after {set_up}", count(left));
         }
-        self.progress = Progress::new(self.speaks, now.number(), now.last());
+        self.progress = Progress::new(self.prints, now.number(), now.last());
     }
 
-    fn step(&mut self, now: &mut dyn View) {
-        self.progress.show(now.number(), now.last(), now.time());
+    fn step(&mut self, now: &mut dyn RunState) {
+        self.progress.update(now.number(), now.last(), now.time());
     }
 
     fn end(&mut self, complete: bool) {
@@ -209,7 +213,7 @@ impl Observer for Log {
     }
 }
 
-/// Prints what a run did and where the result is.
+/// Print the figures of a run and the paths of its files.
 fn report(outcome: &Outcome, threads: usize, verbosity: Verbosity) {
     if outcome.summary.steps > 0 {
         summary::print(outcome, threads);
@@ -226,7 +230,7 @@ fn report(outcome: &Outcome, threads: usize, verbosity: Verbosity) {
     outln!("picture  fissure plot {result}");
 }
 
-fn tell_stopped(outcome: &Outcome, reason: Reason) {
+fn print_stop(outcome: &Outcome, reason: Reason) {
     let because = match reason {
         Reason::Signal => "by a signal",
         Reason::WallTime => "as the wall-clock limit is near",

@@ -1,11 +1,11 @@
-//! What a run did, for the reader of the log.
+//! Printed figures of a completed run.
 
 use crate::cli::outln;
 use fissure::run::{Outcome, Phases, Summary};
 
 use super::format::{count, si};
 
-/// Prints the figures of a run that made at least one step; for rank 0.
+/// Print the figures of a run with at least one step; for rank 0.
 pub fn print(outcome: &Outcome, threads: usize) {
     let summary = &outcome.summary;
     let (energies, broken) = match &outcome.last_row {
@@ -29,7 +29,7 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    // With other points it would be that of the last ones.
+    // With refinement, the number is that of the last points only.
     let regrids = summary.seconds.regridding > 0.0;
     if !regrids {
         line("bond updates", si(bond_updates(summary), "/s"));
@@ -61,7 +61,7 @@ pub fn print(outcome: &Outcome, threads: usize) {
     );
 }
 
-/// The phase that most runs have not.
+/// The phase that is omitted if 0.
 const REGRIDDING: &str = "other points";
 
 /// Names and times (s) of the phases.
@@ -79,7 +79,7 @@ fn phases(seconds: &Phases) -> [(&'static str, f64); 9] {
     ]
 }
 
-/// Directed bonds evaluated in a second of the time loop.
+/// Bond updates per second of the time loop, counted at both ends.
 fn bond_updates(summary: &Summary) -> f64 {
     let seconds = &summary.seconds;
     let time_loop = seconds.bonds + seconds.halo + seconds.motion;

@@ -1,11 +1,11 @@
-//! `fissure --version`: what this program is made of, for the reader of a bug report.
+//! `fissure --version`: versions of program and libraries, for bug reports.
 
 use crate::cli::outln;
 use fissure::comm::mpi;
 use fissure::lanes::instructions::{BUILT, Instructions};
 use fissure::output;
 
-/// Prints version, libraries and vector instructions.
+/// Print version, libraries and instruction sets.
 pub fn print() {
     let best = Instructions::of_this_machine();
     let all = BUILT.join(", ");

@@ -1,11 +1,11 @@
-//! Wall-clock times as Slurm writes them.
+//! Wall-clock limits in Slurm's format.
 
 use std::time::Duration;
 
-/// Reads `HH:MM`, `HH:MM:SS` or, with days, `D-HH:MM:SS`.
+/// Parse `HH:MM`, `HH:MM:SS` or `D-HH:MM:SS`.
 ///
 /// # Errors
-/// With what would be right.
+/// If the format differs; the message names the allowed ones.
 pub fn wall_time(text: &str) -> std::result::Result<Duration, String> {
     let wrong = || format!("`{text}` must be HH:MM, HH:MM:SS or D-HH:MM:SS");
     let (days, clock) = match text.split_once('-') {
@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wall_times_as_slurm_writes_them() {
+    fn wall_times_in_the_format_of_slurm() {
         let seconds = |text| wall_time(text).map(|time| time.as_secs());
         assert_eq!(seconds("23:50"), Ok(85_800));
         assert_eq!(seconds("0:00:07"), Ok(7));

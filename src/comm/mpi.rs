@@ -39,7 +39,7 @@ const OF_OPEN_MPI: bool = {
 #[allow(dead_code)]
 const OMPI_MAJOR_VERSION: u32 = 0;
 
-/// Whether MPI has been started in this process.
+/// Test whether MPI is running in this process.
 pub fn is_running() -> bool {
     mpi::environment::is_initialized()
 }

@@ -186,7 +186,7 @@ impl BondLattice {
         self.vectors.len()
     }
 
-    /// Whether there is no bond.
+    /// The lattice has no bonds.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }

@@ -85,7 +85,7 @@ impl BondList {
         self.neighbours.len().div_ceil(self.points.len().max(1))
     }
 
-    /// Whether j is no bond.
+    /// The list has no bonds.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
@@ -288,7 +288,7 @@ impl<'a> Rows<'a> {
         self.points.len()
     }
 
-    /// Whether j is no row.
+    /// The range has no rows.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }

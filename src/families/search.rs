@@ -28,14 +28,14 @@ pub fn cutoff(horizon: f64) -> f64 {
     horizon * (1.0 + HORIZON_TOLERANCE)
 }
 
-/// The points of a domain sorted by block, then by global id. The search returns ranks in this order,
-/// so sorting the ranks sorts a row.
+/// The points of a domain sorted by block, then by global id. The search returns indices into this
+/// order, so sorting them sorts a row.
 struct Order {
     /// Local index of each sorted index.
     local: Vec<u32>,
     /// First sorted index of each block, then the number of points.
     first: Vec<u32>,
-    /// Bins of each block, by sorted index relative to the block's first. A block per set of bins: where
+    /// Bins of each block, by sorted index relative to the block's first. One set of bins per block: where
     /// few points have bonds to a block, the others search no bins of it.
     bins: Vec<Bins>,
 }

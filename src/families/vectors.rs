@@ -96,7 +96,7 @@ impl<'a> Vectors<'a> {
         self.vectors.len()
     }
 
-    /// Whether there is no vector.
+    /// The range has no vectors.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }

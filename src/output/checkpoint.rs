@@ -132,8 +132,7 @@ impl Checkpoints {
     /// Collective.
     ///
     /// # Errors
-    /// When there is none, or the system does not let one be read: it may be the newest, and the next checkpoint
-    /// would replace it.
+    /// If there is none, or one is unreadable: it may be the newest, which the next checkpoint would replace.
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,

@@ -83,7 +83,7 @@ impl SideCar {
         }
     }
 
-    /// Add a step at a time (s) with a number of points, and write the side-car if [`MIN_INTERVAL`] allows.
+    /// Add a step at a time (s) with a number of points, and write the side-car if `MIN_INTERVAL` allows.
     ///
     /// # Errors
     /// If it cannot be written.

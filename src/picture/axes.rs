@@ -8,7 +8,7 @@ use super::projection::Projection;
 use super::scale::Scale;
 use super::scene::Axis;
 
-/// What annotations are drawn with.
+/// Drawing state of annotations.
 pub struct Pen<'a> {
     /// The picture.
     pub image: &'a mut Image,
@@ -32,9 +32,9 @@ pub struct Ruler<'a> {
     pub name: &'a str,
 }
 
-/// The place `distance` further along `direction`.
-fn moved(place: [f64; 2], direction: [f64; 2], distance: f64) -> [f64; 2] {
-    [0, 1].map(|axis| place[axis] + distance * direction[axis])
+/// The position at `distance` along `direction`.
+fn moved(position: [f64; 2], direction: [f64; 2], distance: f64) -> [f64; 2] {
+    [0, 1].map(|axis| position[axis] + distance * direction[axis])
 }
 
 /// Half the extent of a text in a direction, measured from its middle.
@@ -48,7 +48,7 @@ impl Pen<'_> {
         (self.text / 15.0).max(1.0)
     }
 
-    /// Writes a line of text centred on a place.
+    /// Writes a line of text centred on a position.
     pub fn write(&mut self, text: &str, centre: [f64; 2], running: Running) {
         self.lettering
             .draw(self.image, text, self.text, centre, running, INK);
@@ -153,8 +153,8 @@ impl Pen<'_> {
                 moved(base, aside, -0.2 * self.text),
             ];
             self.image.fill_polygon(&head, INK);
-            let place = moved(tip, direction, 0.65 * self.text);
-            self.write(axis.letter(), place, Running::Across);
+            let position = moved(tip, direction, 0.65 * self.text);
+            self.write(axis.letter(), position, Running::Across);
         }
     }
 }

@@ -1,23 +1,23 @@
-//! Colour maps: numbers to colours.
+//! Colour maps.
 
 use super::canvas::Colour;
 
 /// Colour of points without a value.
 pub const NO_VALUE: Colour = [140, 142, 146];
 
-/// How the numbers of a field become colours.
+/// A colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColourMap {
     /// Dark violet over green to yellow, perceptually uniform ("viridis").
     General,
-    /// Light grey over orange and red to almost black: what is intact recedes,
-    /// what is broken stands out even where it is only one point wide.
+    /// Light grey over orange and red to almost black: a crack stands out even if
+    /// it is one point wide.
     Damage,
 }
 
 impl ColourMap {
-    /// The map for a field, chosen by its name alone so that all pictures of
-    /// a series look alike whatever their values are.
+    /// The map for a field, chosen by its name so that all pictures of a series
+    /// use the same map.
     pub fn for_field(field: &str) -> Self {
         if field.to_lowercase().contains("damage") {
             Self::Damage
@@ -27,7 +27,7 @@ impl ColourMap {
     }
 
     /// The colour at `fraction` of the way from the low to the high end.
-    /// What is beyond an end gets the colour of that end, NaN is grey.
+    /// Fractions beyond an end are clamped; NaN is grey.
     pub fn colour(self, fraction: f64) -> Colour {
         if fraction.is_nan() {
             return NO_VALUE;

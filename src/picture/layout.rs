@@ -1,4 +1,4 @@
-//! Where on the picture everything goes.
+//! Layout of a picture: frame, title, labels and colour bar.
 
 use super::projection::Projection;
 
@@ -19,18 +19,18 @@ pub struct Layout {
     pub bar: Bar,
     /// Pixels per metre.
     pub scale: f64,
-    /// The place in the drawing plane at the lower left corner of the frame (m).
+    /// Position of the lower left corner of the frame in the drawing plane, m.
     origin: [f64; 2],
 }
 
-/// The place of the colour bar.
+/// The position of the colour bar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
     /// Left and right edge.
     pub columns: [f64; 2],
     /// Top and bottom edge.
     pub rows: [f64; 2],
-    /// Whether it stands to the right of the frame instead of lying below it.
+    /// It is vertical at the right of the frame, instead of horizontal below it.
     pub upright: bool,
 }
 
@@ -44,7 +44,7 @@ const BOTTOM: f64 = 4.2;
 const UPRIGHT_BAR: f64 = 8.0;
 /// Room in text sizes for a lying colour bar and its labels.
 const LYING_BAR: f64 = 5.4;
-/// Margin in text sizes where there is nothing.
+/// Margin in text sizes without labels.
 const EMPTY: f64 = 2.2;
 /// Least height of the frame in text sizes.
 const LEAST_HEIGHT: f64 = 3.4;

@@ -41,7 +41,7 @@ use points::Colouring;
 use projection::{Bounds, Projection};
 use scale::Scale;
 
-/// Draws a scene.
+/// Render a scene.
 pub fn render(scene: &Scene) -> Image {
     let marks = scene.marks();
     let projection = Projection::of(scene);
@@ -83,7 +83,7 @@ pub fn render(scene: &Scene) -> Image {
     image
 }
 
-/// Colours of lines, told apart by colour-blind readers too (Okabe & Ito 2008).
+/// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
 /// Draws the lines of a scene.
@@ -102,16 +102,16 @@ fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) 
 /// Writes the title above the frame, smaller if it is too long.
 fn title(pen: &mut Pen, layout: &Layout, title: &str) {
     let size = 1.15 * layout.text;
-    let room = layout.width - 2.0 * layout.text;
+    let available = layout.width - 2.0 * layout.text;
     let length = pen.lettering.length(title, size);
-    let size = size * (room / length).min(1.0);
-    let half = (length / 2.0).min(room / 2.0);
+    let size = size * (available / length).min(1.0);
+    let half = (length / 2.0).min(available / 2.0);
     let middle = (layout.columns[0] + layout.columns[1]) / 2.0;
     let middle = middle.clamp(layout.text + half, layout.width - layout.text - half);
     let centre = [middle, layout.rows[0] - 1.5 * layout.text];
-    let usual = std::mem::replace(&mut pen.text, size);
+    let previous = std::mem::replace(&mut pen.text, size);
     pen.write(title, centre, Running::Across);
-    pen.text = usual;
+    pen.text = previous;
 }
 
 /// Number of ticks that fit on a ruler whose labels need `spacing` text sizes.

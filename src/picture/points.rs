@@ -34,7 +34,7 @@ const TOLERANCE: f64 = 0.01;
 /// Height of the strip that shows a bar, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Least edge in pixels of a cube whose faces are told apart.
+/// Least edge in pixels of a cube with distinct faces.
 const LEAST_CUBE: f64 = 2.0;
 
 /// Brightness of the top, the left and the right face of a cube.

@@ -1,8 +1,8 @@
-//! From space to the drawing plane, still in metres.
+//! Projection of positions to the drawing plane, in metres.
 
 use super::scene::{Axis, Mark, Scene, View};
 
-/// How positions in space become positions in the drawing plane.
+/// The projection to the drawing plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Projection {
     /// The first coordinate only: a bar, drawn as a strip.
@@ -76,7 +76,7 @@ impl Bounds {
             .fold(0.0, |farthest: f64, coordinate| {
                 farthest.max(coordinate.abs())
             });
-        // Points that all lie in one place still need a frame with a width.
+        // Coincident points still need a frame with a width.
         let margin = match largest.max(1e-9 * farthest) {
             0.0 => 0.5,
             extent => 0.025 * extent,

@@ -1,4 +1,4 @@
-//! What is to be drawn: points with values, and the view of them.
+//! The input of a picture: points with values, and the view.
 
 use super::colours::ColourMap;
 
@@ -34,10 +34,8 @@ impl Axis {
     }
 }
 
-/// The way a scene is looked at.
-///
-/// Only bodies of three dimensions have a choice: those of one are drawn as
-/// a strip, those of two in their plane.
+/// The view of a 3-D scene. 1-D scenes are drawn as a strip, 2-D scenes in
+/// their plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
     /// Along z onto the x-y plane.
@@ -54,10 +52,10 @@ pub enum View {
     Orthographic,
 }
 
-/// A point cloud with everything that is written beside it.
+/// A point cloud with values, labels and view.
 ///
-/// The slices are read as far as the shortest of them; points with positions
-/// that are not finite are left out.
+/// The shortest slice sets the number of points; points with non-finite
+/// positions are omitted.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
     /// Dimension of the body: 1, 2 or 3.
@@ -77,7 +75,7 @@ pub struct Scene<'a> {
     pub title: &'a str,
     /// Values at the ends of the colour bar; `None` for those that occur.
     pub range: Option<(f64, f64)>,
-    /// The way the points are looked at.
+    /// The view of the points.
     pub view: View,
     /// Width of the picture in pixels, from 200 to 16384.
     pub width: u32,
@@ -88,7 +86,7 @@ pub struct Scene<'a> {
 /// One point that is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mark {
-    /// Where it is (m).
+    /// Its position (m).
     pub position: [f64; 3],
     /// Edge length of its cell (m), zero if the given one was unusable.
     pub size: f64,
@@ -96,11 +94,11 @@ pub struct Mark {
     pub value: f64,
 }
 
-/// Coordinates beyond this are taken for the debris of a failed computation.
+/// Largest coordinate; points beyond it are omitted as results of a failed run.
 const LARGEST_COORDINATE: f64 = 1e100;
 
 impl Scene<'_> {
-    /// The view after what the dimension allows.
+    /// The view, limited by the dimension.
     pub fn effective_view(&self) -> View {
         if self.dimension < 3 {
             View::Plane
@@ -138,8 +136,8 @@ impl Scene<'_> {
             }
             View::Plane => {}
             View::Slice { axis, position } => {
-                // Deformed layers may gape: the reach is a little more than
-                // half a cell, and the nearest points are painted last.
+                // Deformed layers can have gaps, so the reach exceeds half a cell;
+                // the nearest points are painted last.
                 let distance = |mark: &Mark| (mark.position[axis.index()] - position).abs();
                 marks.retain(|mark| distance(mark) <= 0.75 * mark.size);
                 sort_by_key(&mut marks, |mark| -distance(mark));
@@ -177,7 +175,7 @@ impl Scene<'_> {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
                     (low.min(value), high.max(value))
                 });
-            // Damage is a share of what was there: undamaged is always the low end.
+            // The low end of damage is always 0.
             match self.colours() {
                 ColourMap::Damage => (low.min(0.0), high.max(0.0)),
                 ColourMap::General => (low, high),
@@ -188,7 +186,7 @@ impl Scene<'_> {
     }
 }
 
-/// Sorts in ascending order of a number, equal ones staying as they are.
+/// Sort stably by a number.
 fn sort_by_key(marks: &mut [Mark], key: impl Fn(&Mark) -> f64) {
     marks.sort_by(|one, other| key(one).total_cmp(&key(other)));
 }

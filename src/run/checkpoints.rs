@@ -1,4 +1,4 @@
-//! Checkpoints of a run.
+//! Writing of checkpoints.
 
 use std::time::{Duration, Instant};
 
@@ -11,10 +11,10 @@ use crate::solver::Simulation;
 use super::files::Files;
 use super::recorder::Recorder;
 
-/// Writes checkpoints and keeps account of them.
+/// Writes checkpoints, and counts them and their time.
 pub struct CheckpointWriter {
     checkpoints: Checkpoints,
-    /// What tells the physics of this run from that of another.
+    /// Description of the physics, to compare at a restart.
     physics: String,
     fingerprint: u64,
     /// Number of checkpoints written.
@@ -24,10 +24,10 @@ pub struct CheckpointWriter {
 }
 
 impl CheckpointWriter {
-    /// For a run that starts anew; earlier checkpoints in the folder are removed. Collective.
+    /// For a new run; removes existing checkpoints from the folder. Collective.
     ///
     /// # Errors
-    /// When one cannot be removed.
+    /// If one cannot be removed.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         files: &Files,
@@ -42,7 +42,7 @@ impl CheckpointWriter {
         Ok(Self::after(checkpoints, physics, fingerprint(simulation)))
     }
 
-    /// For a run that goes on with the checkpoints of a folder.
+    /// For a restarted run, with the checkpoints of its folder.
     pub fn after(checkpoints: Checkpoints, physics: String, fingerprint: u64) -> Self {
         Self {
             checkpoints,
@@ -53,10 +53,10 @@ impl CheckpointWriter {
         }
     }
 
-    /// Makes the recorded safe and writes a checkpoint; returns what that cost. Collective.
+    /// Fsync the result and write a checkpoint; return the time spent. Collective.
     ///
     /// # Errors
-    /// When the disc is full; the checkpoints that were there stay.
+    /// If the disk is full; existing checkpoints are kept.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -88,13 +88,13 @@ impl CheckpointWriter {
     }
 }
 
-/// A sum over all points that changes with any id, place, volume or block. Collective.
+/// Hash of the ids, positions, volumes and blocks of all points. Collective.
 pub fn fingerprint<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
     let model = &simulation.model;
     let own = (0..model.owned()).fold(0_u64, |sum, point| {
-        let place = model.position(point).map(f64::to_bits);
+        let position = model.position(point).map(f64::to_bits);
         let others = [model.volume[point].to_bits(), u64::from(model.block[point])];
-        let words = place.into_iter().chain(others);
+        let words = position.into_iter().chain(others);
         sum.wrapping_add(words.fold(mix(model.ids[point]), |hash, word| mix(hash ^ word)))
     });
     comm::total(simulation.comm, own)

@@ -1,4 +1,4 @@
-//! The paths of cracks as tables beside the history, one file a crack, as they are at the latest output.
+//! Crack paths at the latest output as CSV files, one per crack.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -8,16 +8,17 @@ use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::solver::observers::Branch;
 
-/// Writes `crack_NAME.csv` for each crack, in place of the one of an earlier output: a row for each vertex
-/// of each branch, with the length of the crack from its start to there. Collective; rank 0 writes.
+/// Write `crack_NAME.csv` for each crack, replacing that of an earlier output. Collective.
+///
+/// Each row is a vertex of a branch, with the length of the crack up to it.
 ///
 /// # Errors
-/// When the disc is full.
+/// If the disk is full.
 pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[(&str, Vec<Branch>)]) -> Result<()> {
     let write_all = || {
         for (name, branches) in cracks {
             let path = folder.join(format!("crack_{name}.csv"));
-            // A reader never sees half of it.
+            // A rename, so readers never see a partial file.
             let part = folder.join(format!("crack_{name}.csv.part"));
             let written = fs::write(&part, table(branches)).and_then(|()| fs::rename(&part, &path));
             written.map_err(|error| {

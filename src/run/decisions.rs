@@ -1,10 +1,10 @@
-//! What a run has decided by itself, for the reader of a log.
+//! Automatic choices of a run, for the log.
 
 use crate::comm;
 use crate::problem::{Method, StepRule};
 use crate::solver::Simulation;
 
-/// Names and what was decided; the same on all ranks. Collective.
+/// Names and values of the automatic choices; equal on all ranks. Collective.
 pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'static str, String)> {
     let problem = simulation.problem;
     let lower = |rule: &dyn std::fmt::Debug| format!("{rule:?}").to_lowercase();
@@ -44,15 +44,15 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
         simulation.forces.halo().neighbours(),
     ]
     .map(|count| count as f64);
-    let (mut most, mut least) = (own, own);
-    comm.max(&mut most);
-    comm::min(comm, &mut least);
+    let (mut max, mut min) = (own, own);
+    comm.max(&mut max);
+    comm::min(comm, &mut min);
     let interior = comm::total(comm, model.interior as u64) as f64 / model.total as f64;
     let range = |k: usize| {
-        if least[k] == most[k] {
-            most[k].to_string()
+        if min[k] == max[k] {
+            max[k].to_string()
         } else {
-            format!("{} to {}", least[k], most[k])
+            format!("{} to {}", min[k], max[k])
         }
     };
     format!(

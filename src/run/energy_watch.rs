@@ -1,4 +1,4 @@
-//! Whether the energy of a run grows by more than is done on it: then the steps are not stable.
+//! Detection of unstable steps by the energy balance.
 
 use crate::comm::Communicator;
 use crate::comm::ExactSum;
@@ -8,41 +8,41 @@ use crate::solver::Simulation;
 use crate::solver::motion::Clock;
 use crate::solver::observers::HistoryRow;
 
-/// A gain of so many times the energy that was put in is told. Stable steps gain and lose less: near the
-/// largest stable one the energy of the shortest waves, found at full steps, goes up and down several
-/// times over.
-const TOLD: f64 = 1.0;
+/// Gain over energy input above which a warning is printed. Near the stable step, the energy of the
+/// shortest waves at full steps oscillates by several times its mean.
+const WARNING_GAIN: f64 = 1.0;
 
-/// A gain of so many times the energy that was put in ends the run, if it is seen twice in a row.
-const FATAL: f64 = 100.0;
+/// Gain over energy input that ends the run, if found at two consecutive rows.
+const FATAL_GAIN: f64 = 100.0;
 
-/// A gain that is seen once and ends the run.
-const BEYOND_DOUBT: f64 = 1e9;
+/// Gain over energy input that ends the run at once.
+const CERTAIN_GAIN: f64 = 1e9;
 
-/// The share of the energy put in that breaking bonds may add without a warning.
-const ADDED_SHARE: f64 = 0.01;
+/// Energy added by breaking bonds, over energy input, above which a warning is printed.
+const MAX_ADDED_FRACTION: f64 = 0.01;
 
-/// The strain below which an energy may be rounding: with it, solids in bulk are at rest.
-const STRAIN_AT_REST: f64 = 1e-9;
+/// Strain whose energy may be round-off.
+const ROUNDOFF_STRAIN: f64 = 1e-9;
 
-/// Compares the energy of a run with what was put in.
+/// Compares the energy of a run with the energy input.
 pub struct EnergyWatch {
-    /// What rounding may come to, J.
+    /// Bound on round-off, J.
     floor: f64,
-    /// The most that has been put in so far, at the start and by loads and supports, J.
-    put_in: f64,
-    told: bool,
-    /// The largest energy that breaking bonds had freed at any row, J.
-    most_freed: f64,
-    /// Whether it was said that breaking bonds add energy.
-    told_of_breaking: bool,
-    /// Whether the gain was fatal when it was last looked at.
+    /// Maximum energy input so far, initially and by loads and supports, J.
+    input: f64,
+    /// The growth has been reported.
+    warned: bool,
+    /// Maximum energy freed by breaking bonds at any row, J.
+    max_freed: f64,
+    /// The energy added by breaking bonds has been reported.
+    warned_of_breaking: bool,
+    /// The gain was fatal at the last row.
     suspected: bool,
     steps: String,
 }
 
 impl EnergyWatch {
-    /// For a run that stands before a step. Collective.
+    /// For a run before its first step. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (problem, model) = (simulation.problem, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
@@ -53,66 +53,65 @@ impl EnergyWatch {
         }
         let (step, stable) = (simulation.clock.step(), simulation.stable_step);
         Self {
-            floor: STRAIN_AT_REST * STRAIN_AT_REST * reduce(comm, &mut stiffness)[0],
-            put_in: 0.0,
-            told: false,
-            most_freed: 0.0,
-            told_of_breaking: false,
+            floor: ROUNDOFF_STRAIN * ROUNDOFF_STRAIN * reduce(comm, &mut stiffness)[0],
+            input: 0.0,
+            warned: false,
+            max_freed: 0.0,
+            warned_of_breaking: false,
             suspected: false,
             steps: format!("time step {step:.3e} s, stable {stable:.3e} s"),
         }
     }
 
-    /// Looks at a row of the history of the present step; returns a warning the first time that the energy has
-    /// grown. The same on all ranks, as rows are.
+    /// Check a row of the history; return a warning at the first growth. Equal on all ranks.
     ///
     /// # Errors
-    /// When the energy has grown beyond doubt, or is not finite.
-    pub fn look(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
+    /// If the growth is fatal or the energy is not finite.
+    pub fn check(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
-        // Bonds that were seen to give energy by breaking hide what has been gained.
+        // Bonds that added energy when they broke hide part of the gain.
         let gain = row.energies.error - row.energies.fracture.min(0.0);
-        let put_in = start.abs() + work.abs() + row.step_energy;
-        self.put_in = self.put_in.max(put_in);
-        let share = gain / self.put_in.max(self.floor);
+        let input = start.abs() + work.abs() + row.step_energy;
+        self.input = self.input.max(input);
+        let relative_gain = gain / self.input.max(self.floor);
         let text = || {
             format!(
                 "step {} (t = {:.6e} s): the energy has grown by {gain:.3e} J beyond the {:.3e} J that were \
                  put in at the start, by loads and by supports",
                 clock.number(),
                 clock.time(),
-                self.put_in,
+                self.input,
             )
         };
-        let fatal = share > FATAL;
-        let sure = share.is_nan() || share > BEYOND_DOUBT;
-        if sure || (fatal && (self.suspected || clock.is_over())) {
+        let fatal = relative_gain > FATAL_GAIN;
+        let certain = relative_gain.is_nan() || relative_gain > CERTAIN_GAIN;
+        if certain || (fatal && (self.suspected || clock.is_over())) {
             let message = format!("{}; are the steps too large? ({})", text(), self.steps);
             return Err(Error::run(message));
         }
         self.suspected = fatal;
-        if share <= TOLD || self.told {
+        if relative_gain <= WARNING_GAIN || self.warned {
             return Ok(None);
         }
-        self.told = true;
+        self.warned = true;
         Ok(Some(format!("{} ({})", text(), self.steps)))
     }
 
-    /// Looks at a row of the history; returns a warning the first time that breaking bonds have added more than a share
-    /// of the energy put in. A point whose law depends on the mean motion of its family can store more with fewer bonds.
-    pub fn look_at_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
+    /// Check a row of the history; return a warning the first time that breaking bonds have added energy. A
+    /// correspondence law can store more energy with fewer bonds.
+    pub fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
-        self.most_freed = self.most_freed.max(freed);
-        let added = self.most_freed - freed;
-        if self.told_of_breaking || added <= ADDED_SHARE * self.put_in {
+        self.max_freed = self.max_freed.max(freed);
+        let added = self.max_freed - freed;
+        if self.warned_of_breaking || added <= MAX_ADDED_FRACTION * self.input {
             return None;
         }
-        self.told_of_breaking = true;
+        self.warned_of_breaking = true;
         Some(format!(
             "t = {:.4e} s: breaking bonds have added {added:.3e} J to the body, {:.0} % of the energy put in. Families of \
              correspondence laws can store more with fewer bonds; compare with a smaller step, a finer grid, or `ordinary`",
             clock.time(),
-            100.0 * added / self.put_in,
+            100.0 * added / self.input,
         ))
     }
 }

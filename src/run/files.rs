@@ -1,4 +1,4 @@
-//! The files of a run's folder.
+//! The output files of a run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,17 @@ use std::time::{Duration, Instant};
 use crate::error::{Error, Result};
 use crate::output::checkpoint::{Checkpoints, is_taken};
 
-/// How long a run waits for another one that writes to its folder.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Maximum wait for the lock of the folder.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Where a run writes to.
+/// Paths of the output files.
 #[derive(Debug, Clone)]
 pub struct Files {
     /// The folder.
     pub folder: PathBuf,
     /// The result.
     pub result: PathBuf,
-    /// The history as a table.
+    /// The history, as CSV.
     pub history: PathBuf,
 }
 
@@ -31,10 +31,10 @@ impl Files {
         }
     }
 
-    /// Looks whether a new run may write here. For rank 0.
+    /// Check that a new run may write to the folder. For rank 0.
     ///
     /// # Errors
-    /// When a result or a checkpoint is there that must not be replaced.
+    /// If there is a result or checkpoint that must not be replaced.
     pub fn prepare(&self, overwrite: bool) -> Result<()> {
         let files = [self.result.clone(), self.history.clone()];
         let existing = files
@@ -55,10 +55,10 @@ impl Files {
         Ok(())
     }
 
-    /// Makes the folder and takes it for this run, until the returned file is dropped. For rank 0.
+    /// Create the folder and lock it until the returned file is dropped. For rank 0.
     ///
     /// # Errors
-    /// When the folder cannot be made, its path is not UTF-8, or another run writes to it.
+    /// If the folder cannot be created, its path is not UTF-8, or another run has locked it.
     pub fn lock(&self) -> Result<fs::File> {
         if self.folder.to_str().is_none() {
             return Err(Error::input(format!(
@@ -73,8 +73,8 @@ impl Files {
         let begin = Instant::now();
         loop {
             match file.try_lock() {
-                // The ranks of a run that was killed take a moment to end.
-                Err(fs::TryLockError::WouldBlock) if begin.elapsed() < PATIENCE => {
+                // The ranks of a killed run take a moment to end.
+                Err(fs::TryLockError::WouldBlock) if begin.elapsed() < LOCK_TIMEOUT => {
                     std::thread::sleep(Duration::from_millis(100));
                 }
                 Err(fs::TryLockError::WouldBlock) => {
@@ -89,11 +89,10 @@ impl Files {
         }
     }
 
-    /// Renames what there is of result and history, so that others can take their names; returns the new
-    /// names. For rank 0.
+    /// Rename an existing result and history, so new ones can be created; return the new names. For rank 0.
     ///
     /// # Errors
-    /// When one cannot be renamed.
+    /// If a file cannot be renamed.
     pub fn set_aside(&self, number: u64) -> Result<Vec<PathBuf>> {
         let named = |file: &Path, count: u32| {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy();
@@ -110,15 +109,15 @@ impl Files {
         };
         let count = (0..).find(is_free).unwrap_or(u32::MAX);
         let aside = |file: &Path| named(file, count);
-        let mut kept = Vec::new();
+        let mut renamed = Vec::new();
         for file in [&self.result, &self.history] {
             if is_taken(file) {
                 fs::rename(file, aside(file))
                     .map_err(|error| file_error(file, "rename", &error))?;
-                kept.push(aside(file));
+                renamed.push(aside(file));
             }
         }
-        Ok(kept)
+        Ok(renamed)
     }
 }
 

@@ -1,16 +1,16 @@
-//! What a result consists of.
+//! Fields and static data of a result.
 
 use crate::comm::{self, IdOrder};
 use crate::output::{Contents, FieldData, FieldDescription, Piece};
 use crate::problem::Field;
 use crate::solver::Simulation;
 
-/// The fields that do not change while the points are the same.
+/// Names of the fields that change only with the points.
 pub const FIXED: [&str; 4] = ["id", "block", "volume", "level"];
 
-/// What a result consists of, whether it is new or continued.
-pub struct Layout<'a> {
-    places: Vec<f64>,
+/// Fields and static data of a new or resumed result.
+pub struct ResultLayout<'a> {
+    positions: Vec<f64>,
     ids: Vec<u64>,
     blocks: Vec<u32>,
     volumes: Vec<f64>,
@@ -23,18 +23,18 @@ pub struct Layout<'a> {
     steps: u64,
 }
 
-impl<'a> Layout<'a> {
-    /// From all ranks.
+impl<'a> ResultLayout<'a> {
+    /// Redistribute the static data by id; `rows` are those in the result. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
-        (order, kept): (&IdOrder, &Option<Vec<usize>>),
+        (order, rows): (&IdOrder, &Option<Vec<usize>>),
         steps: u64,
         metadata: &'a [(&'a str, String)],
     ) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let owned = model.owned();
         let problem = simulation.problem;
-        let places: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
+        let positions: Vec<f64> = (0..owned).flat_map(|k| model.position(k)).collect();
         let body = |block: &u16| problem.body_of(usize::from(*block)) as u32;
         let blocks: Vec<u32> = model.block.iter().map(body).collect();
         let level = |block: &u16| problem.block(usize::from(*block)).level;
@@ -46,15 +46,15 @@ impl<'a> Layout<'a> {
             unit: field.unit(),
             components: field.components(),
         };
-        let ids = pick(kept, order.collect(comm, &model.ids[..owned], 1), 1);
+        let ids = select(rows, order.collect(comm, &model.ids[..owned], 1), 1);
         let (first, total) = comm::scan(comm, ids.len() as u64);
         let volumes: Vec<f64> = model.volume.iter().take(owned).collect();
         Self {
-            places: pick(kept, order.collect(comm, &places, 3), 3),
-            blocks: pick(kept, order.collect(comm, &blocks, 1), 1),
-            volumes: pick(kept, order.collect(comm, &volumes, 1), 1),
+            positions: select(rows, order.collect(comm, &positions, 3), 3),
+            blocks: select(rows, order.collect(comm, &blocks, 1), 1),
+            volumes: select(rows, order.collect(comm, &volumes, 1), 1),
             ids,
-            levels: levels.map(|levels| pick(kept, order.collect(comm, &levels, 1), 1)),
+            levels: levels.map(|levels| select(rows, order.collect(comm, &levels, 1), 1)),
             changing: simulation.may_refine(),
             moving: output.fields.iter().map(describe).collect(),
             metadata,
@@ -64,7 +64,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The fields that do not change while the points are the same.
+    /// The fields that change only with the points.
     pub fn fixed(&self) -> Vec<(FieldDescription, FieldData<'_>)> {
         let scalar = |name, unit| FieldDescription {
             name,
@@ -83,12 +83,12 @@ impl<'a> Layout<'a> {
         fixed
     }
 
-    /// With the fields that [`Self::fixed`] gives.
+    /// The description of the result; `fixed` is [`Self::fixed`].
     pub fn contents<'b>(&'b self, fixed: &'b [(FieldDescription, FieldData<'b>)]) -> Contents<'b> {
         Contents {
             piece: self.piece,
             changing: self.changing,
-            positions: bytemuck::cast_slice(&self.places),
+            positions: bytemuck::cast_slice(&self.positions),
             fixed,
             moving: &self.moving,
             metadata: self.metadata,
@@ -98,11 +98,11 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The rows that are kept of values with `width` numbers a row.
-pub fn pick<T: Copy>(kept: &Option<Vec<usize>>, values: Vec<T>, width: usize) -> Vec<T> {
-    let Some(kept) = kept else {
+/// Select rows of `values`, which has `width` numbers per row; `None` selects all.
+pub fn select<T: Copy>(rows: &Option<Vec<usize>>, values: Vec<T>, width: usize) -> Vec<T> {
+    let Some(rows) = rows else {
         return values;
     };
     let row = |row: &usize| &values[row * width..(row + 1) * width];
-    kept.iter().flat_map(row).copied().collect()
+    rows.iter().flat_map(row).copied().collect()
 }

@@ -1,5 +1,4 @@
-//! A run: from a problem to a result, with history, checkpoints and restart. What `fissure run` does, for
-//! Rust.
+//! Runs of a problem with result, history, checkpoints and restart: the library form of `fissure run`.
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -17,8 +16,7 @@
 //! # }
 //! ```
 //!
-//! `examples/` holds whole programs: one that runs a deck under MPI, and one that has no deck but builds
-//! its problem.
+//! `examples/` has complete programs: one runs a deck under MPI, one builds its problem in Rust.
 
 mod checkpoints;
 mod crack_files;
@@ -37,7 +35,7 @@ mod warnings;
 mod watch;
 
 pub use files::Files;
-pub use observer::{Message, Observer, Row, Unobserved, View};
+pub use observer::{Message, Observer, Row, RunState, Unobserved};
 pub use options::{Existing, Options};
 pub use signals::Signals;
 pub use summary::{Phases, Summary};
@@ -60,16 +58,16 @@ use crate::survey::Survey;
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
 use energy_watch::EnergyWatch;
-use recorder::{Recorder, Start, damage, why_not_continued};
+use recorder::{Recorder, Start, damage, reason_for_new_result};
 use restart::{Restart, restart};
 use watch::{Decision, Watch};
 
-/// How a run ended, and what it did; the same on all ranks.
+/// The outcome of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Why it stopped before its end, if it did; a checkpoint has been written then.
+    /// Reason of a stop before the end, after which a checkpoint was written.
     pub stopped: Option<Reason>,
-    /// Number of steps made since the time 0.
+    /// Number of the step reached.
     pub number: u64,
     /// Number of the last step.
     pub last: u64,
@@ -77,30 +75,37 @@ pub struct Outcome {
     pub time: f64,
     /// The last row of the history, if this run has written any.
     pub last_row: Option<HistoryRow>,
-    /// Where everything is.
+    /// The output files.
     pub files: Files,
-    /// Figures.
+    /// Figures of the run.
     pub summary: Summary,
-    /// Why not all writes to the result were collective, in bits of HDF5; 0 if they were.
+    /// Causes of non-collective writes to the result, as HDF5's bits; 0 if all were collective.
     pub no_collective_cause: u32,
 }
 
-/// Starts MPI for runs on all ranks that `mpirun` started; on one rank without it.
+/// Initialise HDF5 and MPI, for all ranks that `mpirun` started, or for one rank.
 ///
 /// # Errors
-/// When MPI was started before in this process or has no support for threads.
+/// If MPI is already running in this process or lacks support for threads.
 pub fn start_mpi() -> Result<World> {
-    // HDF5 must be there before MPI.
+    // HDF5 must be initialised before MPI.
     output::initialise();
     World::start()
 }
 
-/// Runs a problem to its end, or until it is stopped, and writes the result. Threads are those of Rayon's
-/// global pool. Collective; without MPI there must be one rank.
+/// Run a problem to its end or to a stop, and write the result. Collective.
+///
+/// Threads are those of Rayon's global pool. Without MPI, there must be one rank.
 ///
 /// # Errors
-/// When the problem cannot be run, a signal has come before the first step, the folder holds what must not be replaced, the checkpoint to go on from
-/// is none of this problem, the disc is full, or the motion of a point is not finite; the same on all ranks.
+/// Equal on all ranks:
+///
+/// - the problem cannot be run;
+/// - a signal stopped the run before the first step;
+/// - the folder has files that must not be replaced;
+/// - the checkpoint is missing or belongs to another problem;
+/// - the disk is full;
+/// - the motion of a point is not finite.
 pub fn run(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -125,7 +130,7 @@ fn run_unlocated(
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
     let files = Files::new(options.folder.clone());
-    // Taken before anything is looked at, and kept until the end.
+    // Locked first, and until the end.
     let prepared = match comm.rank() {
         0 => files.lock().and_then(|lock| {
             if options.existing != Existing::Continue {
@@ -151,15 +156,15 @@ fn run_unlocated(
     }
 }
 
-/// Why the time loop was left.
-enum Left {
+/// How the time loop ended.
+enum LoopEnd {
     Complete,
     Stopped(Reason),
-    /// The motion of a point is not finite, or the energy grows without bound.
+    /// The motion of a point is not finite, or the energy grows without limit.
     Failed(Error),
 }
 
-/// Everything that a run needs beside the points.
+/// The inputs of a run.
 struct Job<'a> {
     problem: &'a Problem,
     comm: &'a dyn Communicator,
@@ -172,9 +177,9 @@ struct Job<'a> {
 impl<'a> Job<'a> {
     fn run<const D: usize>(&mut self) -> Result<Outcome> {
         self.observer.message(&Message::Started);
-        self.look_before_the_first_step()?;
-        let mut look = || self.look_before_the_first_step();
-        let mut simulation = Simulation::<D>::set_up(self.problem, self.comm, &mut look)?;
+        self.check_signals()?;
+        let mut interrupt = || self.check_signals();
+        let mut simulation = Simulation::<D>::set_up(self.problem, self.comm, &mut interrupt)?;
         simulation.check()?;
         let mut survey = Survey::new(&mut simulation);
         if let Some(deck) = &self.options.deck {
@@ -188,9 +193,9 @@ impl<'a> Job<'a> {
             stable_step: simulation.scaled_stable_step(),
             survey,
         });
-        let decided = decisions(&simulation);
-        self.observer.message(&Message::Decided(decided));
-        self.look_before_the_first_step()?;
+        let decisions = decisions(&simulation);
+        self.observer.message(&Message::Decided(decisions));
+        self.check_signals()?;
         let mut stepper = Stepper::new(simulation);
         let (mut checkpoints, mut recorder) = match self.options.existing {
             Existing::Continue => self.continue_run(stepper.at_full_step())?,
@@ -198,16 +203,16 @@ impl<'a> Job<'a> {
         };
         let first = stepper.clock().number();
         self.observer.begin(&mut stepper);
-        let left = self.make_steps(&mut stepper, &mut checkpoints, &mut recorder)?;
-        self.observer.end(matches!(left, Left::Complete));
+        let end = self.make_steps(&mut stepper, &mut checkpoints, &mut recorder)?;
+        self.observer.end(matches!(end, LoopEnd::Complete));
         let no_collective_cause = recorder.file.no_collective_cause();
         let last_row = recorder.last_row.take();
         let spent = (recorder.spent, recorder.spent_on_rows);
-        recorder.close(matches!(left, Left::Stopped(_)))?;
-        let stopped = match left {
-            Left::Complete => None,
-            Left::Stopped(reason) => Some(reason),
-            Left::Failed(error) => return Err(error),
+        recorder.close(matches!(end, LoopEnd::Stopped(_)))?;
+        let stopped = match end {
+            LoopEnd::Complete => None,
+            LoopEnd::Stopped(reason) => Some(reason),
+            LoopEnd::Failed(error) => return Err(error),
         };
         let whole = self.options.started.elapsed();
         let spent = [spent.0, spent.1, checkpoints.spent, whole];
@@ -225,11 +230,11 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Whether a signal has come that stops the run while nothing is computed yet. Collective.
+    /// Stop the run if a signal was received during the set-up. Collective.
     ///
     /// # Errors
-    /// It has.
-    fn look_before_the_first_step(&self) -> Result<()> {
+    /// If any rank received a stop signal.
+    fn check_signals(&self) -> Result<()> {
         let stop = self.options.signals.as_ref().is_some_and(Signals::stop);
         if comm::total(self.comm, u64::from(stop)) == 0 {
             return Ok(());
@@ -249,7 +254,7 @@ impl<'a> Job<'a> {
         stepper: &mut Stepper<'a, D>,
         checkpoints: &mut CheckpointWriter,
         recorder: &mut Recorder<'a>,
-    ) -> Result<Left> {
+    ) -> Result<LoopEnd> {
         let signals = self.options.signals.clone();
         let started = self.options.started;
         let limit = self.options.wall_time.map(|limit| (started, limit));
@@ -265,7 +270,7 @@ impl<'a> Job<'a> {
                 && let Some(regridded) = stepper.at_full_step().refine()?
             {
                 let simulation = stepper.at_full_step();
-                recorder.follow(simulation)?;
+                recorder.update_points(simulation)?;
                 stable = stable.min(self.warn_of_step(simulation, stable));
                 self.observer.message(&Message::Refined {
                     number: simulation.clock.number(),
@@ -278,23 +283,23 @@ impl<'a> Job<'a> {
             let complete = stepper.is_over();
             let step = stepper.load_step().is_settled.then_some(&clock);
             let due = step.is_some_and(|clock| recorder.is_due(clock));
-            let shows = due || complete || stepper.load_step().has_failed;
-            let looks = watch.end_turn(step) || shows;
-            let decision = if looks {
-                watch.look(self.comm, step)
+            let is_checked = due || complete || stepper.load_step().has_failed;
+            let is_agreed = watch.end_iteration(step) || is_checked;
+            let decision = if is_agreed {
+                watch.decide(self.comm, step)
             } else {
                 Decision::default()
             };
             let saves = complete || decision.checkpoint || decision.stop.is_some();
-            if shows || saves {
-                // What the second half kick finds is checked, too.
+            if is_checked || saves {
+                // The check includes velocities at the full step.
                 stepper.at_full_step();
             }
-            if looks {
+            if is_agreed {
                 if let Err(error) = stepper.check() {
-                    // The reader of the result should see where it went wrong.
+                    // Output the failed state for analysis.
                     recorder.write(stepper.at_full_step(), true, true)?;
-                    return Ok(Left::Failed(error));
+                    return Ok(LoopEnd::Failed(error));
                 }
                 if due {
                     let simulation = stepper.at_full_step();
@@ -306,8 +311,8 @@ impl<'a> Job<'a> {
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
                 if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
-                    let growth = energy.look(row, &clock);
-                    let of_breaking = energy.look_at_breaking(row, &clock);
+                    let growth = energy.check(row, &clock);
+                    let of_breaking = energy.check_breaking(row, &clock);
                     match growth {
                         Ok(text) => {
                             for text in text.into_iter().chain(of_breaking) {
@@ -316,29 +321,29 @@ impl<'a> Job<'a> {
                         }
                         Err(error) => {
                             recorder.write_failure(stepper.at_full_step())?;
-                            return Ok(Left::Failed(error));
+                            return Ok(LoopEnd::Failed(error));
                         }
                     }
                 }
                 if saves {
                     let cost = checkpoints.write(stepper.at_full_step(), recorder)?;
-                    watch.wrote_checkpoint(cost);
+                    watch.record_checkpoint(cost);
                 }
             }
             self.observer.step(stepper);
             if let (Some(reason), false) = (decision.stop, complete) {
-                return Ok(Left::Stopped(reason));
+                return Ok(LoopEnd::Stopped(reason));
             }
-            if !complete && let Some(done) = balance.look(stepper)? {
-                recorder.follow(stepper.at_full_step())?;
+            if !complete && let Some(repartition) = balance.look(stepper)? {
+                recorder.update_points(stepper.at_full_step())?;
                 self.observer.message(&Message::Repartitioned {
                     number: clock.number(),
-                    what: done,
+                    repartition,
                 });
             }
         }
         self.warn_of_overshoot(recorder);
-        Ok(Left::Complete)
+        Ok(LoopEnd::Complete)
     }
 
     fn begin_run<const D: usize>(
@@ -370,11 +375,11 @@ impl<'a> Job<'a> {
             time: simulation.clock.time(),
             complete: simulation.is_over(),
         });
-        self.tell_kept_step(simulation)?;
+        self.warn_of_resumed_step(simulation)?;
         let metadata = self.metadata(simulation);
-        let why = why_not_continued(simulation, &self.files, &header, &self.physics)?;
-        let why = match why {
-            Some(why) => why,
+        let reason = reason_for_new_result(simulation, &self.files, &header, &self.physics)?;
+        let reason = match reason {
+            Some(reason) => reason,
             None => {
                 let start = Start::After(header.outputs, header.rows);
                 match Recorder::new(simulation, &self.files, start, &metadata) {
@@ -382,48 +387,49 @@ impl<'a> Job<'a> {
                         recorder.observer.continue_from(header.start);
                         return Ok((checkpoints, recorder));
                     }
-                    // The checkpoint is intact: a damaged result must not keep the run from going on. Other
-                    // failures, such as a full disc, leave the result in its place.
+                    // The checkpoint is intact, so a damaged result is replaced by a new one. Other errors,
+                    // such as a full disk, leave the result in place.
                     Err(error) => match damage(self.comm, &self.files, header.outputs)? {
-                        Some(why) => why,
+                        Some(reason) => reason,
                         None => return Err(error),
                     },
                 }
             }
         };
-        let kept = match self.comm.rank() {
+        let renamed = match self.comm.rank() {
             0 => self.files.set_aside(simulation.clock.number()),
             _ => Ok(Vec::new()),
         };
-        let kept: Vec<String> = agree(self.comm, kept)?
+        let renamed: Vec<String> = agree(self.comm, renamed)?
             .iter()
             .map(|path| path.to_string_lossy().into_owned())
             .collect();
-        let kept = self.text_of_rank_0(&kept.join("\n"));
-        let kept = kept.lines().map(PathBuf::from).collect();
-        self.observer.message(&Message::SetAside { why, kept });
+        let renamed = self.text_of_rank_0(&renamed.join("\n"));
+        let renamed = renamed.lines().map(PathBuf::from).collect();
+        self.observer
+            .message(&Message::SetAside { reason, renamed });
         let start = Start::New(Creation::Exclusive);
         let mut recorder = Recorder::new(simulation, &self.files, start, &metadata)?;
         recorder.observer.continue_from(header.start);
         recorder.write(simulation, true, true)?;
-        // The checkpoint counts the outputs of the file that was set aside.
+        // The previous checkpoint counts the outputs of the renamed file.
         checkpoints.write(simulation, &mut recorder)?;
         Ok((checkpoints, recorder))
     }
 
-    /// Rank 0's text on all ranks.
+    /// Broadcast the text of rank 0.
     fn text_of_rank_0(&self, text: &str) -> String {
         let mut bytes = text.as_bytes().to_vec();
         self.comm.broadcast(0, &mut bytes);
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Attributes of the result: how it was made.
+    /// Attributes of the result: provenance.
     fn metadata<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
     ) -> Vec<(&'static str, String)> {
-        // All ranks must write the same; what differs between them is told by rank 0.
+        // Attributes are written collectively, so values that can differ come from rank 0.
         let [text, in_full, path] = match self.options.deck.as_ref().map(Deck::source) {
             Some(Source { path, text }) => [
                 text.clone(),

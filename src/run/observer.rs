@@ -1,4 +1,4 @@
-//! What the caller of a run gets to see of it.
+//! Callbacks from a run to its caller.
 
 use std::path::PathBuf;
 
@@ -8,22 +8,21 @@ use crate::solver::refinement::Regridded;
 use crate::solver::repartition::Repartition;
 use crate::survey::Survey;
 
-/// Looks on while a run goes on. Its methods are called on all ranks alike; each does nothing unless
-/// it is given something to do.
+/// Callbacks from a run. Each is called on all ranks at the same point; the defaults do nothing.
 pub trait Observer {
-    /// The run has something to tell.
+    /// A message of the run.
     fn message(&mut self, _message: &Message) {}
 
-    /// The steps begin after the one that is shown: 0, or that of a checkpoint.
-    fn begin(&mut self, _now: &mut dyn View) {}
+    /// The time loop starts after the given state: step 0, or that of a checkpoint.
+    fn begin(&mut self, _now: &mut dyn RunState) {}
 
-    /// A step has been made, and what was due after it has been written.
-    fn step(&mut self, _now: &mut dyn View) {}
+    /// A step is complete, and its due output is written.
+    fn step(&mut self, _now: &mut dyn RunState) {}
 
-    /// A row of the history has been found.
-    fn row(&mut self, _now: &mut dyn View, _row: &Row) {}
+    /// A new row of the history.
+    fn row(&mut self, _now: &mut dyn RunState, _row: &Row) {}
 
-    /// The steps are over, at the end of the run or, if not `complete`, before it.
+    /// The time loop has ended; `complete` at the end of the run.
     fn end(&mut self, _complete: bool) {}
 }
 
@@ -32,62 +31,62 @@ pub struct Unobserved;
 
 impl Observer for Unobserved {}
 
-/// What a run tells, most of it before its first step.
+/// A message of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
-    /// The folder is taken, and points and bonds are about to be made.
+    /// The folder is locked; the set-up starts.
     Started,
-    /// Points and bonds are made.
+    /// The set-up of points and bonds is complete.
     SetUp {
         /// The time step, s.
         step: f64,
-        /// The largest step that is known to be stable, s.
+        /// Stable step × `safety`, s.
         stable_step: f64,
-        /// What there is, and what is most likely not meant.
+        /// Figures and warnings.
         survey: Survey,
     },
-    /// What the run has decided by itself, such as the partition: names and what was decided.
+    /// Automatic choices, such as the partition: names and values.
     Decided(Vec<(&'static str, String)>),
-    /// The run goes on from a checkpoint.
+    /// The run continues from a checkpoint.
     Continued {
-        /// Number of the step that it was written after.
+        /// Number of the checkpoint's step.
         number: u64,
         /// Its time, s.
         time: f64,
-        /// Whether that was the last step, so that nothing is left to do.
+        /// That was the last step.
         complete: bool,
     },
-    /// The result so far does not fit what is to be written now, and a new one begins.
+    /// The existing result cannot be continued, and a new one is created.
     SetAside {
-        /// What does not fit.
-        why: String,
-        /// What there is of the result so far, under its new names.
-        kept: Vec<PathBuf>,
+        /// Why it cannot be continued.
+        reason: String,
+        /// New names of the existing files.
+        renamed: Vec<PathBuf>,
     },
-    /// The grid has been refined, or made coarser.
+    /// The grid was refined or coarsened.
     Refined {
-        /// Number of the step after which.
+        /// Number of the last step before.
         number: u64,
-        /// Points that came and went.
+        /// Numbers of added and removed points.
         regridded: Regridded,
-        /// Number of points that there are now.
+        /// New number of points.
         points: u64,
     },
-    /// The points have been dealt out anew among the ranks.
+    /// The points were rebalanced between the ranks.
     Repartitioned {
-        /// Number of the step after which.
+        /// Number of the last step before.
         number: u64,
-        /// What was found and done.
-        what: Repartition,
+        /// Imbalance and migrated points.
+        repartition: Repartition,
     },
-    /// Something that may not be as the user thinks.
+    /// A warning.
     Warning(String),
 }
 
-/// A run between two steps, in one, two or three dimensions. Points are those that this rank owns, in
-/// an order of its own, which may change from step to step; see [`View::ids`].
-pub trait View {
-    /// Number of steps made.
+/// The state of a run between two steps. Points are those owned by this rank; their order may change from
+/// step to step, see [`RunState::ids`].
+pub trait RunState {
+    /// Number of the step reached.
     fn number(&self) -> u64;
 
     /// Number of the last step.
@@ -99,11 +98,10 @@ pub trait View {
     /// Length of a step, s.
     fn step(&self) -> f64;
 
-    /// Number of dimensions: components are numbered from 0 up to it.
+    /// Number of dimensions, which is the number of components.
     fn dimension(&self) -> usize;
 
-    /// Global ids of the points: 0 up to the number of points of level 0 over all ranks, and more with
-    /// refinement.
+    /// Global ids of the points. Ids of level 0 are below the number of level-0 points of all ranks.
     fn ids(&self) -> &[u64];
 
     /// A component of the reference positions, m.
@@ -112,12 +110,12 @@ pub trait View {
     /// A component of the displacements, m.
     fn displacement(&self, component: usize) -> &[f64];
 
-    /// A component of the velocities, m/s. They are computed if nobody has asked for them after this step; that goes
-    /// over the points once, so ask only where you need them.
+    /// A component of the velocities, m/s. Computed on request: one pass over the points for each step
+    /// in which they are read.
     fn velocity(&mut self, component: usize) -> &[f64];
 }
 
-impl<const D: usize> View for Stepper<'_, D> {
+impl<const D: usize> RunState for Stepper<'_, D> {
     fn number(&self) -> u64 {
         self.clock().number()
     }
@@ -155,7 +153,7 @@ impl<const D: usize> View for Stepper<'_, D> {
     }
 }
 
-/// A row of the history; the same on all ranks.
+/// A row of the history; equal on all ranks.
 pub struct Row<'a> {
     /// Name and unit of each column.
     pub columns: &'a [(String, &'static str)],
@@ -179,7 +177,7 @@ impl Row<'_> {
         self.row.energies
     }
 
-    /// Number of bonds that have broken since the start.
+    /// Number of bonds broken since the start.
     pub fn broken_bonds(&self) -> u64 {
         self.row.broken
     }

@@ -1,4 +1,4 @@
-//! How a problem is run: what does not belong to the problem itself.
+//! Options of a run.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -6,40 +6,40 @@ use std::time::{Duration, Instant};
 use super::signals::Signals;
 use crate::deck::Deck;
 
-/// How a problem is run. Must be the same on all ranks, but for `signals`.
+/// Options of a run; equal on all ranks, except `signals`.
 pub struct Options {
-    /// Folder of the result, the history and the checkpoints; it is made if it is not there.
+    /// Folder of the result, the history and the checkpoints; it is created if missing.
     pub folder: PathBuf,
-    /// What happens to a run that is in the folder already.
+    /// Handling of existing files in the folder.
     pub existing: Existing,
-    /// Stop, with a checkpoint, before so much time has gone by since `started`. Without it, the end of
-    /// the Slurm job that this process is part of, if any, counts.
+    /// Write a checkpoint and stop before this wall-clock time since `started`. The default inside a Slurm
+    /// job is the job's limit.
     pub wall_time: Option<Duration>,
-    /// When the run began.
+    /// Start of the run.
     pub started: Instant,
-    /// Signals of this process that stop the run or ask for a checkpoint.
+    /// Signals that stop the run or request a checkpoint.
     pub signals: Option<Signals>,
-    /// The problem's deck; `None` for a problem that was built in Rust. Errors and warnings name places in it, the result
-    /// holds its text, and a restart compares it with that of the checkpoint.
+    /// The deck; `None` for a problem built in Rust. Errors and warnings name places in it, the result contains its text,
+    /// and a restart compares it with that of the checkpoint.
     pub deck: Option<Deck>,
-    /// More attributes of the result: name and text, such as the command line. Rank 0's texts count.
+    /// Additional attributes of the result: name and text, such as the command line. Those of rank 0 are used.
     pub attributes: Vec<(&'static str, String)>,
 }
 
-/// What happens to a run that is in the folder already.
+/// Handling of existing files in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
-    /// It is an error that there is one.
+    /// Fail.
     Refuse,
-    /// It is replaced.
+    /// Replace them.
     Replace,
-    /// It goes on from its newest checkpoint, which may have been written on other numbers of ranks
-    /// and threads; it is an error that there is none.
+    /// Continue from the newest checkpoint, which may be from other numbers of ranks and threads; fail
+    /// without one.
     Continue,
 }
 
 impl Options {
-    /// A run that starts now in a folder that must not hold one.
+    /// A new run that starts now, in a folder without one.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self {
             folder: folder.into(),

@@ -1,4 +1,4 @@
-//! Writing result and history when they are due.
+//! Output of result and history at their scheduled steps.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -19,54 +19,53 @@ use crate::solver::{Simulation, Stepper};
 
 use super::crack_files;
 use super::files::Files;
-use super::layout::{FIXED, Layout, pick};
+use super::layout::{FIXED, ResultLayout, select};
 use super::observer::{Observer, Row};
 use super::restart_compatibility::history_differences;
 
-/// History rows that are held back before they are written.
-const ROWS_HELD: usize = 256;
+/// Number of history rows buffered before a write.
+const BUFFERED_ROWS: usize = 256;
 
 /// The open result and history of a run.
 pub struct Recorder<'a> {
     /// The result file.
     pub file: ResultFile<'a>,
-    /// What the history is made of.
+    /// Computes the rows of the history.
     pub observer: HistoryObserver,
-    /// The way from points to the rows of checkpoints, and, but for those that `kept` leaves out, of the
-    /// result.
+    /// Redistribution from owned points to blocks of ids, for checkpoints and the result.
     pub order: IdOrder,
-    /// Which of this rank's block of ids the result holds; `None` for all.
-    kept: Option<Vec<usize>>,
+    /// The rows of this rank's block that are in the result; `None` for all.
+    output_rows: Option<Vec<usize>>,
     /// The last row of the history.
     pub last_row: Option<HistoryRow>,
     /// Time spent on the result.
     pub spent: Duration,
     /// Time spent on the history.
     pub spent_on_rows: Duration,
-    /// Where the paths of cracks go.
+    /// Folder of the crack files.
     folder: PathBuf,
     fields: Vec<Field>,
     outputs: Schedule,
     rows: Schedule,
-    held: Vec<Vec<f64>>,
-    /// On rank 0.
+    buffered: Vec<Vec<f64>>,
+    /// The side-car; on rank 0 only.
     side_car: Option<SideCar>,
 }
 
-/// How a recorder starts.
+/// Start of a recorder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// With new files; older ones may be replaced or not.
+    /// Create new files.
     New(Creation),
-    /// After so many outputs and history rows of files that are there.
+    /// Resume existing files after a number of outputs and history rows.
     After(u64, u64),
 }
 
 impl<'a> Recorder<'a> {
-    /// Creates or reopens the files. Collective.
+    /// Create or resume the files. Collective.
     ///
     /// # Errors
-    /// When they cannot be written, or a set of the history is empty.
+    /// If they cannot be written, or a set of the history is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         files: &Files,
@@ -76,13 +75,14 @@ impl<'a> Recorder<'a> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let mut observer = HistoryObserver::new(simulation)?;
         let order = simulation.id_order();
-        let kept = kept(simulation, &order)?;
+        let output_rows = output_rows(simulation, &order)?;
         let clock = &simulation.expected_clock();
         let (outputs, rows) = (
             Schedule(problem.output.every),
             Schedule(problem.row_interval()),
         );
-        let layout = Layout::new(simulation, (&order, &kept), outputs.count(clock), metadata);
+        let selection = (&order, &output_rows);
+        let layout = ResultLayout::new(simulation, selection, outputs.count(clock), metadata);
         let fixed = layout.fixed();
         let contents = layout.contents(&fixed);
         let history = HistoryContents {
@@ -103,16 +103,15 @@ impl<'a> Recorder<'a> {
                     .err()
                     .is_some_and(|error| error.kind == ErrorKind::Run);
                 if begun && comm.rank() == 0 {
-                    // Without its first output it is of no use; that it cannot be removed either
-                    // changes nothing.
+                    // Best effort: a result without outputs only takes space.
                     let _ = std::fs::remove_file(&files.result);
                 }
                 made?
             }
             Start::After(outputs, rows) => {
-                let kept = (outputs, rows);
+                let retained = (outputs, rows);
                 let (file, past) =
-                    ResultFile::resume(&files.result, comm, &contents, &history, kept)?;
+                    ResultFile::resume(&files.result, comm, &contents, &history, retained)?;
                 observer.recall::<D>(&past);
                 file
             }
@@ -123,7 +122,7 @@ impl<'a> Recorder<'a> {
             file,
             observer,
             order,
-            kept,
+            output_rows,
             last_row: None,
             spent: Duration::ZERO,
             spent_on_rows: Duration::ZERO,
@@ -131,31 +130,30 @@ impl<'a> Recorder<'a> {
             fields: problem.output.fields.clone(),
             outputs,
             rows,
-            held: Vec::new(),
+            buffered: Vec::new(),
             side_car,
         })
     }
 
-    /// Follows the points after they have been dealt out anew, or others have come. Collective.
+    /// Update after a rebalancing or refinement. Collective.
     ///
     /// # Errors
-    /// As those of [`HistoryObserver::new`].
-    pub fn follow<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
+    /// As [`HistoryObserver::new`].
+    pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
-        self.kept = kept(simulation, &self.order)?;
+        self.output_rows = output_rows(simulation, &self.order)?;
         self.observer.follow(simulation)
     }
 
-    /// Whether something is due after a step.
+    /// Test whether an output or row is due after a step.
     pub fn is_due(&self, clock: &Clock) -> bool {
         self.outputs.is_due(clock) || self.rows.is_due(clock)
     }
 
-    /// Writes what is due after the present step, and shows `observer` the row of the history.
-    /// Collective.
+    /// Write the due output and history row, and pass the row to `observer`. Collective.
     ///
     /// # Errors
-    /// When the disc is full.
+    /// If the disk is full.
     pub fn record<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -175,10 +173,10 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Writes an output, a history row or both. Collective.
+    /// Write an output, a history row or both. Collective.
     ///
     /// # Errors
-    /// When the disc is full.
+    /// If the disk is full.
     pub fn write<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -195,54 +193,55 @@ impl<'a> Recorder<'a> {
         } else {
             Snapshot::without_energies(simulation)
         };
-        // What both need is the output's, if there is one.
-        let found = if output { Instant::now() } else { start };
+        // The time of a shared snapshot counts as output.
+        let rows_start = if output { Instant::now() } else { start };
         if row {
             let row = self.observer.row(simulation, &snapshot);
-            self.held.push(row.values.clone());
+            self.buffered.push(row.values.clone());
             self.last_row = Some(row);
         }
-        if output || self.held.len() >= ROWS_HELD {
+        if output || self.buffered.len() >= BUFFERED_ROWS {
             self.write_rows()?;
         }
-        let for_rows = found.elapsed();
-        self.spent_on_rows += for_rows;
+        let row_time = rows_start.elapsed();
+        self.spent_on_rows += row_time;
         if output {
             if simulation.may_refine() {
-                let layout = Layout::new(simulation, (&self.order, &self.kept), 0, &[]);
+                let layout =
+                    ResultLayout::new(simulation, (&self.order, &self.output_rows), 0, &[]);
                 let fixed = layout.fixed();
                 self.file.set_points(&layout.contents(&fixed))?;
             }
             let (time, number) = (simulation.clock.time(), simulation.clock.number());
-            let (fields, order, kept) = (&self.fields, &self.order, &self.kept);
+            let (fields, order, rows) = (&self.fields, &self.order, &self.output_rows);
             self.file.write_step(time, number, |k| {
                 let (field, width) = (fields[k], fields[k].components());
                 let values = snapshot.field(simulation, field);
-                pick(kept, order.collect(simulation.comm, &values, width), width)
+                select(rows, order.collect(simulation.comm, &values, width), width)
             })?;
             let cracks = self.observer.crack_paths(simulation, &snapshot);
             crack_files::write(simulation.comm, &self.folder, &cracks)?;
-            let told = match &mut self.side_car {
+            let written = match &mut self.side_car {
                 Some(side_car) => side_car.add(simulation.clock.time(), self.file.points()),
                 None => Ok(()),
             };
-            agree(simulation.comm, told)?;
+            agree(simulation.comm, written)?;
             simulation.fields.forget_newly_broken();
         }
-        self.spent += start.elapsed() - for_rows;
+        self.spent += start.elapsed() - row_time;
         Ok(())
     }
 
-    /// The row of the history that is of the present step, if there is one.
+    /// The row of the history of the current step, if any.
     pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
         let is_now = |row: &&HistoryRow| row.number == clock.number();
         self.last_row.as_ref().filter(is_now)
     }
 
-    /// Writes the present step for those who want to see where a run has failed. Collective.
+    /// Output the state of a failed run. Collective.
     ///
     /// # Errors
-    /// When the disc is full.
+    /// If the disk is full.
     pub fn write_failure<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -254,39 +253,39 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Closes the result; `goes_on` if another run is to continue it. Collective.
+    /// Close the result; `will_resume` keeps its unused space. Collective.
     ///
     /// # Errors
-    /// When the disc is full, or writing has failed before.
-    pub fn close(self, goes_on: bool) -> Result<()> {
+    /// If the disk is full, or an earlier write failed.
+    pub fn close(self, will_resume: bool) -> Result<()> {
         let comm = self.file.communicator();
-        self.file.close(goes_on)?;
+        self.file.close(will_resume)?;
         agree(comm, self.side_car.map_or(Ok(()), SideCar::finish))
     }
 
-    /// Makes all that has been recorded safe from a loss of power. Collective.
+    /// Write buffered rows and fsync the result. Collective.
     ///
     /// # Errors
-    /// When the disc is full.
+    /// If the disk is full.
     pub fn sync(&mut self) -> Result<()> {
         self.write_rows()?;
         self.file.sync()
     }
 
     fn write_rows(&mut self) -> Result<()> {
-        if !self.held.is_empty() {
-            self.file.append_history(&self.held)?;
-            self.held.clear();
+        if !self.buffered.is_empty() {
+            self.file.append_history(&self.buffered)?;
+            self.buffered.clear();
         }
         Ok(())
     }
 }
 
-/// Which of this rank's block of ids the result holds; `None` for all. Collective.
+/// The rows of this rank's block that are in the result; `None` for all. Collective.
 ///
 /// # Errors
-/// When it would hold none.
-fn kept<const D: usize>(
+/// If the output set is empty.
+fn output_rows<const D: usize>(
     simulation: &Simulation<'_, D>,
     order: &IdOrder,
 ) -> Result<Option<Vec<usize>>> {
@@ -302,13 +301,12 @@ fn kept<const D: usize>(
     ))
 }
 
-/// Why the result that a checkpoint belongs to cannot be continued, if it cannot: it is not there, damaged or
-/// another one, or the problem asks for other fields or columns. Collective.
+/// The reason why the result of a checkpoint cannot be continued, if any: it is missing, damaged, of other
+/// points, or has other fields or columns. Collective.
 ///
 /// # Errors
-/// When a set of the history is empty, or a deck cannot be parsed; when another program has locked the result, or
-/// the system does not let it be read.
-pub fn why_not_continued<const D: usize>(
+/// If a set of the history is empty, a deck cannot be parsed, or the result is locked or unreadable.
+pub fn reason_for_new_result<const D: usize>(
     simulation: &Simulation<'_, D>,
     files: &Files,
     header: &Header,
@@ -318,16 +316,16 @@ pub fn why_not_continued<const D: usize>(
     let observer = HistoryObserver::new(simulation)?;
     let changed = agree(comm, history_differences(&header.deck, physics))?;
     let order = simulation.id_order();
-    let kept = kept(simulation, &order)?;
+    let rows = output_rows(simulation, &order)?;
     let owned = &simulation.model.ids[..simulation.model.owned()];
-    let ids = pick(&kept, order.collect(comm, owned, 1), 1);
+    let ids = select(&rows, order.collect(comm, owned, 1), 1);
     let own = ids.into_iter().map(mix).fold(0, u64::wrapping_add);
     let points = comm::total(comm, own);
-    let look = || -> Result<Option<String>> {
+    let compare = || -> Result<Option<String>> {
         if !is_taken(&files.result) {
             return Ok(Some("the result so far is gone".to_owned()));
         }
-        // A link to a disc that is not mounted is no damage.
+        // A link to an unmounted file system is an error, not damage.
         std::fs::metadata(&files.result).map_err(|error| {
             let path = files.result.display();
             Error::run(format!("{path}: cannot read the result so far: {error}"))
@@ -348,23 +346,24 @@ pub fn why_not_continued<const D: usize>(
             .iter()
             .filter(|field| field.dynamic && !FIXED.contains(&&field.name[..]));
         let found: Vec<&str> = moving.map(|field| &field.name[..]).collect();
-        let mut wanted: Vec<&str> = wanted_fields(simulation.problem);
-        wanted.sort_unstable();
+        let mut requested: Vec<&str> = requested_fields(simulation.problem);
+        requested.sort_unstable();
         let names = columns.iter().map(|column| &column.name);
         let expected = observer.columns().iter().map(|(name, _)| name);
         let single = |field: &StoredField| field.number == Number::F32;
         let changing = simulation.may_refine();
         if reader.is_changing() != changing {
-            return Ok(Some("points are born now or were then".to_owned()));
+            let text = "adaptive refinement was switched on or off";
+            return Ok(Some(text.to_owned()));
         }
         let found_points = reader.ids(0)?.into_iter().map(mix);
         if !changing && found_points.fold(0, u64::wrapping_add) != points {
             return Ok(Some("other points are asked for".to_owned()));
         } else if fields.iter().any(single)
-            != (simulation.problem.output.single && !wanted.is_empty())
+            != (simulation.problem.output.single && !requested.is_empty())
         {
             return Ok(Some("numbers of another length are asked for".to_owned()));
-        } else if found != wanted {
+        } else if found != requested {
             return Ok(Some("other fields are asked for".to_owned()));
         } else if !names.eq(expected) {
             return Ok(Some(
@@ -373,13 +372,13 @@ pub fn why_not_continued<const D: usize>(
         }
         Ok(changed.map(|lines| format!("columns of the history mean something else: {lines}")))
     };
-    found_by_root(comm, look)
+    found_by_root(comm, compare)
 }
 
-/// The damage for which the first outputs of a result cannot be read; none where they can. Collective.
+/// The damage of a result, if its first outputs cannot be read. Collective.
 ///
 /// # Errors
-/// When another program has locked the result, or the system does not let it be read.
+/// If the result is locked or unreadable.
 pub fn damage(comm: &dyn Communicator, files: &Files, outputs: u64) -> Result<Option<String>> {
     found_by_root(comm, || {
         ResultReader::open(&files.result)?.check(outputs as usize)?;
@@ -387,14 +386,14 @@ pub fn damage(comm: &dyn Communicator, files: &Files, outputs: u64) -> Result<Op
     })
 }
 
-/// Why rank 0 finds that a result cannot be continued. A result that is damaged is such a reason, a failure of
-/// the system to read it is an error. Collective.
+/// Run `check` on rank 0 and broadcast the reason that it returns. Damage of the result is a reason; a
+/// failure to read it is an error. Collective.
 fn found_by_root(
     comm: &dyn Communicator,
-    look: impl FnOnce() -> Result<Option<String>>,
+    check: impl FnOnce() -> Result<Option<String>>,
 ) -> Result<Option<String>> {
     let found = match comm.rank() {
-        0 => match look() {
+        0 => match check() {
             Err(error) if error.kind == ErrorKind::Input => {
                 let text = format!("the result so far is damaged ({})", error.message);
                 Ok(Some(text))
@@ -403,13 +402,13 @@ fn found_by_root(
         },
         _ => Ok(None),
     };
-    let mut why = agree(comm, found)?.unwrap_or_default().into_bytes();
-    comm.broadcast(0, &mut why);
-    let why = String::from_utf8_lossy(&why).into_owned();
-    Ok((!why.is_empty()).then_some(why))
+    let mut reason = agree(comm, found)?.unwrap_or_default().into_bytes();
+    comm.broadcast(0, &mut reason);
+    let reason = String::from_utf8_lossy(&reason).into_owned();
+    Ok((!reason.is_empty()).then_some(reason))
 }
 
-fn wanted_fields(problem: &Problem) -> Vec<&'static str> {
+fn requested_fields(problem: &Problem) -> Vec<&'static str> {
     problem
         .output
         .fields

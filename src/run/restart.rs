@@ -1,4 +1,4 @@
-//! Going on from a checkpoint.
+//! Restart from a checkpoint.
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
@@ -10,18 +10,18 @@ use super::files::Files;
 use super::observer::{Message, Observer};
 use super::restart_compatibility;
 
-/// What a restart begins with.
+/// The state of a restart.
 pub struct Restart {
-    /// What goes on with the same checkpoint files.
+    /// The writer of further checkpoints.
     pub checkpoints: CheckpointWriter,
     /// The checkpoint's header.
     pub header: Header,
 }
 
-/// Takes a simulation back to the newest intact checkpoint. Collective.
+/// Restore a simulation from the newest intact checkpoint. Collective.
 ///
 /// # Errors
-/// When there is none, or it belongs to another deck or other points; the differences are listed.
+/// If there is none, or it is of another deck or other points; the message lists the differences.
 pub fn restart<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     files: &Files,

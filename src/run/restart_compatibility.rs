@@ -1,28 +1,28 @@
-//! What must be the same for a run to be continued.
+//! Comparison of the physics of a run with that of its checkpoint.
 
 use crate::deck::{self, Source};
 use crate::error::Result;
 use crate::problem::{Interval, Output, Problem};
 
-/// The first line of the physics of a problem without a deck.
+/// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
 
-/// What parts the physics of such a problem from the definitions of its history.
+/// Separator between its physics and its history definitions.
 const HISTORY: &str = "# its history\n";
 
-/// The longest part of a line that a message shows.
-const SHOWN: usize = 100;
+/// Maximum length of a line in a message.
+const MAX_LINE: usize = 100;
 
-/// How many of the differences a message shows.
-const MOST_SHOWN: usize = 5;
+/// Maximum number of differences in a message.
+const MAX_DIFFERENCES: usize = 5;
 
-/// The physics of a run as text: its deck with every default filled in, or else a listing of the problem.
+/// Describe the physics of a run: its deck with all defaults, or a listing of the problem.
 pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     if let Some(deck) = deck {
         return deck.to_owned();
     }
     let mut problem = problem.clone();
-    // What may change between the parts of a run.
+    // Clear all that may change at a restart.
     problem.warnings.clear();
     problem.title.clear();
     if let Some(last) = problem.stages.last_mut() {
@@ -49,10 +49,10 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")
 }
 
-/// What differs in the meaning of the history's columns, in one line; nothing if it is the same.
+/// Differences in the definitions of the history's columns, in one line; `None` if equal.
 ///
 /// # Errors
-/// When a deck cannot be parsed.
+/// If a deck cannot be parsed.
 pub fn history_differences(old: &str, new: &str) -> Result<Option<String>> {
     let lines = if old.starts_with(WITHOUT_DECK) {
         let [old, new] = [old, new].map(|text| text.split_once(HISTORY).unwrap_or_default().1);
@@ -60,8 +60,8 @@ pub fn history_differences(old: &str, new: &str) -> Result<Option<String>> {
     } else {
         deck::history_differences(&source("the checkpoint", old), &source("the deck", new))?
     };
-    let short = |line: &String| line.chars().take(SHOWN).collect::<String>();
-    let shown: Vec<String> = lines.iter().take(MOST_SHOWN).map(short).collect();
+    let short = |line: &String| line.chars().take(MAX_LINE).collect::<String>();
+    let shown: Vec<String> = lines.iter().take(MAX_DIFFERENCES).map(short).collect();
     Ok((!shown.is_empty()).then(|| shown.join("; ")))
 }
 
@@ -72,10 +72,10 @@ fn source(name: &str, text: &str) -> Source {
     }
 }
 
-/// What differs, a line each.
+/// Differences in the physics, one per line.
 ///
 /// # Errors
-/// When a deck cannot be parsed.
+/// If a deck cannot be parsed.
 pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
     let [old_listed, new_listed] = [old, new].map(|text| text.starts_with(WITHOUT_DECK));
     if old_listed != new_listed {
@@ -89,9 +89,9 @@ pub fn differences(old: &str, new: &str) -> Result<Vec<String>> {
     deck::differences(&source("the checkpoint", old), &source("the deck", new))
 }
 
-/// The first line that differs, if any.
+/// The first differing line of two listings.
 fn listed_differences(old: &str, new: &str) -> Vec<String> {
-    let short = |line: &str| line.trim().chars().take(SHOWN).collect::<String>();
+    let short = |line: &str| line.trim().chars().take(MAX_LINE).collect::<String>();
     let mut lines = old.lines().zip(new.lines());
     let differs = lines.find(|(old, new)| old != new);
     match differs {

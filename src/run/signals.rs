@@ -1,4 +1,4 @@
-//! Signals that stop a run or ask it for a checkpoint.
+//! Signals that stop a run or request a checkpoint.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,15 +7,16 @@ use std::time::{Duration, Instant};
 use crate::error::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 
-/// Exit code after a second signal.
-const ENDED_AT_ONCE: i32 = 130;
+/// Exit code of an immediate exit after a second signal.
+const IMMEDIATE_EXIT: i32 = 130;
 
-/// The same signal may come twice, from the launcher and from the batch system; only one that comes this
-/// much later is a second one.
-const ONE_SIGNAL: Duration = Duration::from_secs(1);
+/// Signals within this interval count as one, because launcher and batch system may both send it.
+const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
-/// The signals of this process: SIGTERM, SIGINT and SIGUSR1 stop a run after its present step, a second
-/// one ends the process at once; SIGUSR2 asks for a checkpoint.
+/// The signals of this process.
+///
+/// - SIGTERM, SIGINT, SIGUSR1: stop after the current step; the second one exits at once.
+/// - SIGUSR2: write a checkpoint.
 #[derive(Clone)]
 pub struct Signals {
     stop: Arc<AtomicBool>,
@@ -23,10 +24,10 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Starts to listen, in a thread of its own.
+    /// Start a thread that receives the signals.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// If the system refuses.
     pub fn listen() -> Result<Self> {
         let signals = Self {
             stop: Arc::default(),
@@ -47,8 +48,8 @@ impl Signals {
                             stop.store(true, Ordering::Relaxed);
                             first = Some(Instant::now());
                         }
-                        (_, Some(first)) if first.elapsed() > ONE_SIGNAL => {
-                            signal_hook::low_level::exit(ENDED_AT_ONCE);
+                        (_, Some(first)) if first.elapsed() > SAME_SIGNAL => {
+                            signal_hook::low_level::exit(IMMEDIATE_EXIT);
                         }
                         _ => {}
                     }
@@ -58,12 +59,12 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Whether the run shall stop.
+    /// A stop was requested.
     pub(super) fn stop(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Whether a checkpoint has been asked for since the last time.
+    /// A checkpoint was requested since the last call.
     pub(super) fn take_request(&self) -> bool {
         self.request.swap(false, Ordering::Relaxed)
     }

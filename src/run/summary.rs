@@ -1,47 +1,47 @@
-//! What a run did.
+//! Figures of a completed run.
 
 use std::time::Duration;
 
 use crate::comm;
 use crate::solver::Simulation;
 
-/// The figures of a run; the same on all ranks.
+/// The figures of a run; equal on all ranks.
 #[derive(Debug, Clone)]
 pub struct Summary {
     /// Number of points.
     pub points: u64,
-    /// Number of bonds that there were or are, each counted once.
+    /// Number of bonds, intact or broken.
     pub bonds: u64,
-    /// Number of steps that this run made.
+    /// Number of steps of this run.
     pub steps: u64,
-    /// Number of force evaluations: one a step, or one an iteration of a load step.
+    /// Number of force evaluations: one per step, or one per iteration of a load step.
     pub evaluations: u64,
-    /// Length of a step of the last stage, s.
+    /// Time step of the last stage, s.
     pub step: f64,
-    /// The largest step that is known to be stable in the last stage, s; none where that is a relaxation.
+    /// Stable step × `safety` in the last stage, s; `None` for a relaxation.
     pub stable_step: Option<f64>,
     /// Number of ranks.
     pub ranks: usize,
-    /// The vector instructions that were used.
+    /// Instruction set of the bond loops.
     pub instructions: &'static str,
-    /// Number of checkpoints that were written.
+    /// Number of checkpoints written.
     pub checkpoints: u64,
     /// Wall-clock time of the slowest rank by phase, s.
     pub seconds: Phases,
 }
 
-/// A time for each phase of a run, s.
+/// Wall-clock time per phase, s.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Phases {
     /// Points, partition and bonds.
     pub set_up: f64,
     /// Loops over bonds.
     pub bonds: f64,
-    /// Exchange with other ranks that no work hides.
+    /// Halo exchange that is not overlapped.
     pub halo: f64,
-    /// Integration and conditions, and showing the bonds where points are.
+    /// Integration, conditions, and copies of positions to the bond loops.
     pub motion: f64,
-    /// Refinements of the grid, and points that were dealt out anew.
+    /// Refinement and rebalancing.
     pub regridding: f64,
     /// Result.
     pub output: f64,
@@ -49,13 +49,13 @@ pub struct Phases {
     pub history: f64,
     /// Checkpoints.
     pub checkpoints: f64,
-    /// All, from the start of the process on if the caller says when that was.
+    /// Total since `Options::started`.
     pub whole: f64,
 }
 
 impl Summary {
-    /// Gathers the figures of `steps` steps with so many checkpoints; `spent` is the time of output,
-    /// of the history, of checkpoints and in all. Collective.
+    /// Gather the figures of a run. The durations are those of output, history, checkpoints and the total.
+    /// Collective.
     pub(super) fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         steps: u64,

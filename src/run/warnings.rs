@@ -1,4 +1,4 @@
-//! What a run warns of while it goes on.
+//! Warnings during a run.
 
 use super::Job;
 use super::observer::Message;
@@ -9,31 +9,31 @@ use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
 use crate::solver::{Simulation, Stepper};
 
-/// Kinetic energy as a share of the strain energy above which loading is not slow.
-const INERTIA_SHARE: f64 = 0.05;
+/// Kinetic over strain energy above which loading is not quasi-static.
+const MAX_INERTIA: f64 = 0.05;
 
-/// The share of the fracture energy above which bonds have broken late.
-const OVERSHOOT_SHARE: f64 = 0.1;
+/// Overshoot over fracture energy above which bonds break too late.
+const MAX_OVERSHOOT: f64 = 0.1;
 
-/// The share of a run at its start in which little strain energy is there to compare with.
-const START_SHARE: f64 = 0.1;
+/// Initial fraction of a run that is not checked, because its strain energy is small.
+const UNCHECKED_FRACTION: f64 = 0.1;
 
 impl<'a> Job<'a> {
-    /// Says that bodies go through one another.
+    /// Warn of interpenetrating bodies.
     pub(super) fn warn_of_contact(&mut self, contact: &Contact, time: f64) {
         let [a, b] = contact.bodies.map(|body| &self.problem.bodies[body].name);
-        let place = &contact.place[..self.problem.dimension.count()];
-        let place: Vec<String> = place.iter().map(|x| format!("{x:.4e}")).collect();
+        let position = &contact.place[..self.problem.dimension.count()];
+        let position: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
         let text = format!(
             "at t = {time:.4e} s points of `{a}` and `{b}` have come nearer than their spacing, at ({}) m; \
              there is no contact between bodies: where no bond joins them they go through one another",
-            place.join(", ")
+            position.join(", ")
         );
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Says of a step (s) that was stable until points were born that it no longer is. Returns the step that
-    /// is known to be stable now, s.
+    /// Warn of a fixed step that refinement has made unstable; `before` is the stable step before the
+    /// refinement (s). Return the stable step, s.
     pub(super) fn warn_of_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
@@ -51,7 +51,7 @@ impl<'a> Job<'a> {
         stable
     }
 
-    /// Says, of a run with another density, that it is not slow; returns whether it was said.
+    /// Warn of a run with scaled density that is not quasi-static. Return true if a warning was sent.
     pub(super) fn warn_of_inertia<const D: usize>(
         &mut self,
         stepper: &Stepper<'a, D>,
@@ -63,26 +63,26 @@ impl<'a> Job<'a> {
             return false;
         };
         let (kinetic, strain) = (row.energies.kinetic, row.energies.strain);
-        if time < START_SHARE * end || kinetic <= INERTIA_SHARE * strain {
+        if time < UNCHECKED_FRACTION * end || kinetic <= MAX_INERTIA * strain {
             return false;
         }
         let text = format!(
             "at t = {time:.4e} s the kinetic energy is {:.1} % of the strain energy, above {} %: with \
              this density_scale the loading is not slow",
             100.0 * kinetic / strain,
-            100.0 * INERTIA_SHARE
+            100.0 * MAX_INERTIA
         );
         self.observer.message(&Message::Warning(text));
         true
     }
 
-    /// Says of a run whose steps are those of the equation of motion that they were long for bonds that break.
+    /// Warn of steps of the equation of motion that are too long for breaking bonds.
     pub(super) fn warn_of_overshoot(&mut self, recorder: &Recorder<'a>) {
         let Some(row) = recorder.last_row.as_ref() else {
             return;
         };
         let (overshoot, fracture) = (row.energies.overshoot, row.energies.fracture);
-        if self.problem.relaxes() || fracture <= 0.0 || overshoot <= OVERSHOOT_SHARE * fracture {
+        if self.problem.relaxes() || fracture <= 0.0 || overshoot <= MAX_OVERSHOOT * fracture {
             return;
         }
         let text = format!(
@@ -90,14 +90,13 @@ impl<'a> Job<'a> {
              energy and more than {:.0} %: the steps are long for them; a smaller `safety` or \
              [time.adaptive] shortens them",
             100.0 * overshoot / fracture,
-            100.0 * OVERSHOOT_SHARE
+            100.0 * MAX_OVERSHOOT
         );
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Says so if the steps keep the size of the first ones, where a new run to the same end would have
-    /// others.
-    pub(super) fn tell_kept_step<const D: usize>(
+    /// Warn if a restarted run retains another step than a new run to the same end would have.
+    pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
     ) -> Result<()> {

@@ -1,4 +1,4 @@
-//! When a run must write a checkpoint or stop: signals, the clock, the deck.
+//! Decisions on checkpoints and stops, from signals, wall clock and deck.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -9,35 +9,37 @@ use crate::solver::observers::Schedule;
 
 use super::signals::Signals;
 
-/// The ranks look at signals and clocks together, at most this many turns of the time loop (steps, or
-/// iterations of a load step) and about this long apart.
-const MOST_TURNS: u64 = 10;
-const SECONDS_APART: f64 = 0.2;
+/// Maximum number of iterations of the time loop between collective decisions. An iteration is a step, or
+/// an iteration of a load step.
+const MAX_ITERATIONS: u64 = 10;
+/// Target interval between collective decisions, s.
+const INTERVAL: f64 = 0.2;
 
-/// Part of a wall-clock limit that is kept for the last checkpoint, at least and at most so long.
-const RESERVED_SHARE: f64 = 0.05;
-const LEAST_RESERVE: f64 = 0.5;
-const MOST_RESERVE: f64 = 60.0;
+/// Fraction of the wall-clock limit reserved for the last checkpoint.
+const RESERVED_FRACTION: f64 = 0.05;
+/// Bounds of the reserved time, s.
+const MIN_RESERVE: f64 = 0.5;
+const MAX_RESERVE: f64 = 60.0;
 
-/// What the ranks have agreed to do after the present step.
+/// The ranks' common decision after an iteration.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Decision {
     /// Write a checkpoint.
     pub checkpoint: bool,
-    /// Leave, and why.
+    /// Stop, with the reason.
     pub stop: Option<Reason>,
 }
 
-/// Why a run stops before its end.
+/// Reason of a stop before the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// A signal came on some rank.
+    /// A rank received a signal.
     Signal,
     /// The wall-clock limit is near.
     WallTime,
 }
 
-/// The signals and clocks that decide what a rank wants.
+/// The signals and clocks of a rank.
 pub struct Watch<'a> {
     signals: Option<&'a Signals>,
     rule: CheckpointRule,
@@ -45,15 +47,16 @@ pub struct Watch<'a> {
     limit: Option<(Instant, f64)>,
     last_checkpoint: Instant,
     cost: Duration,
-    /// Turns so far.
-    turns: u64,
-    last_look: (Instant, u64),
-    next_look: u64,
+    /// Number of iterations.
+    iterations: u64,
+    /// Time and iteration of the last decision.
+    last_decision: (Instant, u64),
+    /// Iteration of the next decision.
+    next_decision: u64,
 }
 
 impl<'a> Watch<'a> {
-    /// For the rest of a run. `limit` is a wall-clock time and when it began; without it that of the
-    /// Slurm job counts.
+    /// `limit` is a wall-clock limit and its start; the default inside a Slurm job is the job's limit.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
@@ -63,7 +66,7 @@ impl<'a> Watch<'a> {
             CheckpointRule::WallClock(_) => None,
             CheckpointRule::Simulation(interval) => Some(Schedule(interval)),
         };
-        let of_job = || Some((Instant::now(), left_to_slurm()?));
+        let of_job = || Some((Instant::now(), slurm_time_left()?));
         Self {
             signals,
             rule,
@@ -73,16 +76,16 @@ impl<'a> Watch<'a> {
                 .map(|(start, limit)| (start, limit.as_secs_f64())),
             last_checkpoint: Instant::now(),
             cost: Duration::ZERO,
-            turns: 0,
-            last_look: (Instant::now(), 0),
-            next_look: 1,
+            iterations: 0,
+            last_decision: (Instant::now(), 0),
+            next_decision: 1,
         }
     }
 
-    /// Counts a turn; whether the ranks look together after it. `step` is the clock if the turn ended a step.
-    pub fn end_turn(&mut self, step: Option<&Clock>) -> bool {
-        self.turns += 1;
-        self.turns >= self.next_look || self.is_scheduled(step)
+    /// Count an iteration; return true if a decision is due. `step` is the clock if the iteration ended a step.
+    pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
+        self.iterations += 1;
+        self.iterations >= self.next_decision || self.is_scheduled(step)
     }
 
     fn is_scheduled(&self, step: Option<&Clock>) -> bool {
@@ -90,10 +93,10 @@ impl<'a> Watch<'a> {
         step.is_some_and(due)
     }
 
-    /// What to do after this turn, which may have ended a step: the same on all ranks. Collective.
-    pub fn look(&mut self, comm: &dyn Communicator, step: Option<&Clock>) -> Decision {
-        let (then, before) = self.last_look;
-        let per_turn = then.elapsed().as_secs_f64() / (self.turns - before).max(1) as f64;
+    /// Decide on a checkpoint or stop after this iteration; equal on all ranks. Collective.
+    pub fn decide(&mut self, comm: &dyn Communicator, step: Option<&Clock>) -> Decision {
+        let (then, before) = self.last_decision;
+        let per_iteration = then.elapsed().as_secs_f64() / (self.iterations - before).max(1) as f64;
         let due = match self.rule {
             CheckpointRule::WallClock(seconds) => {
                 self.last_checkpoint.elapsed().as_secs_f64() >= seconds
@@ -101,7 +104,7 @@ impl<'a> Watch<'a> {
             CheckpointRule::Simulation(_) => false,
         };
         let late = self.limit.is_some_and(|(start, limit)| {
-            let reserve = (RESERVED_SHARE * limit).clamp(LEAST_RESERVE, MOST_RESERVE);
+            let reserve = (RESERVED_FRACTION * limit).clamp(MIN_RESERVE, MAX_RESERVE);
             start.elapsed().as_secs_f64() + reserve + 2.0 * self.cost.as_secs_f64() >= limit
         });
         let flag = |set: bool| f64::from(u8::from(set));
@@ -109,12 +112,12 @@ impl<'a> Watch<'a> {
             flag(self.signals.is_some_and(Signals::stop)),
             flag(late),
             flag(due || self.signals.is_some_and(Signals::take_request)),
-            per_turn,
+            per_iteration,
         ];
         comm.max(&mut votes);
-        let turns = (SECONDS_APART / votes[3].max(1e-9)) as u64;
-        self.next_look = self.turns + turns.clamp(1, MOST_TURNS);
-        self.last_look = (Instant::now(), self.turns);
+        let iterations = (INTERVAL / votes[3].max(1e-9)) as u64;
+        self.next_decision = self.iterations + iterations.clamp(1, MAX_ITERATIONS);
+        self.last_decision = (Instant::now(), self.iterations);
         Decision {
             checkpoint: votes[2] > 0.0 || self.is_scheduled(step),
             stop: match (votes[0] > 0.0, votes[1] > 0.0) {
@@ -125,15 +128,15 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Takes note that a checkpoint has been written, and how long that took.
-    pub fn wrote_checkpoint(&mut self, cost: Duration) {
+    /// Record a written checkpoint and its duration.
+    pub fn record_checkpoint(&mut self, cost: Duration) {
         self.last_checkpoint = Instant::now();
         self.cost = self.cost.max(cost);
     }
 }
 
-/// The time until the end of the Slurm job that this process is part of.
-fn left_to_slurm() -> Option<Duration> {
+/// Time left in the Slurm job of this process, if any.
+fn slurm_time_left() -> Option<Duration> {
     let end: u64 = std::env::var("SLURM_JOB_END_TIME").ok()?.parse().ok()?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
     Some(Duration::from_secs(end).saturating_sub(now))

@@ -9,7 +9,9 @@ use fissure::comm::threads;
 use fissure::error::ErrorKind;
 use fissure::output::ResultReader;
 use fissure::problem::{Interval, Problem, StepRule};
-use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, Row, Unobserved, View};
+use fissure::run::{
+    Existing, Message, Observer, Options, Outcome, Reason, Row, RunState, Unobserved,
+};
 
 #[allow(dead_code, reason = "the test calls what the example's main calls")]
 #[path = "../../examples/problem_in_rust.rs"]
@@ -52,11 +54,11 @@ impl Observer for Notes {
         self.messages.push(message.clone());
     }
 
-    fn begin(&mut self, now: &mut dyn View) {
+    fn begin(&mut self, now: &mut dyn RunState) {
         self.begun_at = Some(now.number());
     }
 
-    fn step(&mut self, now: &mut dyn View) {
+    fn step(&mut self, now: &mut dyn RunState) {
         self.steps.push(now.number());
         assert_eq!((now.dimension(), now.ids().len()), (2, 1800));
         assert_eq!(now.reference(1).len(), 1800);
@@ -66,7 +68,7 @@ impl Observer for Notes {
         self.top = now.displacement(1)[top.unwrap().0];
     }
 
-    fn row(&mut self, now: &mut dyn View, row: &Row) {
+    fn row(&mut self, now: &mut dyn RunState, row: &Row) {
         assert_eq!(row.value("time"), Some(now.time()));
         assert_eq!(row.values().len(), row.columns.len());
         let energies = row.energies();

@@ -98,8 +98,7 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// What is retained, in a new file that takes the place of the old one: whenever the process is killed, one of
-    /// them is there.
+    /// Copy the retained part to a new file, which replaces the old one by a rename; a kill leaves one of them.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -211,10 +210,11 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Lets a file end after what is retained, if it can be continued in place; else it is left alone. For one rank.
+/// Truncate a file to its retained part if it can be continued in place; return false otherwise. For one
+/// rank.
 ///
 /// # Errors
-/// It cannot be written any more.
+/// If a write fails.
 fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool> {
     let alone = threads::alone();
     let checked = CollectiveFile::open(path, &alone).and_then(|mut file| {
@@ -244,8 +244,8 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     Ok(true)
 }
 
-/// Whether a file is of the same deck and version and has room for the steps that are expected, and no chunk
-/// goes with the rows that are dropped.
+/// Test whether a file can be continued in place: same deck and version, space for all expected steps, and
+/// no chunk freed by the truncation.
 fn has_room(
     file: &mut CollectiveFile<'_>,
     contents: &Contents,
