@@ -112,7 +112,7 @@ impl<'a> Recorder<'a> {
                 let retained = (outputs, rows);
                 let (file, past) =
                     ResultFile::resume(&files.result, comm, &contents, &history, retained)?;
-                observer.recall::<D>(&past);
+                observer.recall(&past);
                 file
             }
         };

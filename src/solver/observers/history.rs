@@ -9,6 +9,7 @@ use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
 use super::centre_line::{self, Branch};
+use super::columns::{Columns, Moment};
 use super::crack_path::CrackPath;
 use super::cracked::Cracked;
 use super::front::Front;
@@ -19,9 +20,6 @@ use super::tip::Tip;
 /// Points summed by one task.
 const CHUNK: usize = 4096;
 
-/// Names of the components.
-const AXES: [&str; 3] = ["x", "y", "z"];
-
 /// A point that is followed.
 struct Probe {
     /// Local index, on the rank that owns it.
@@ -30,7 +28,7 @@ struct Probe {
 
 /// The columns of the history and what they need.
 pub struct HistoryObserver {
-    columns: Vec<(String, &'static str)>,
+    columns: Columns,
     reactions: Vec<Vec<u32>>,
     /// Points, and the direction in which the force on them counts.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
@@ -38,8 +36,6 @@ pub struct HistoryObserver {
     fronts: Vec<Front>,
     cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
-    /// Whether points may be born.
-    refines: bool,
     /// Energy (J) in the first row, and intact bonds before.
     start: Option<(f64, u64)>,
 }
@@ -88,95 +84,90 @@ impl HistoryObserver {
     /// On an empty set and on a line without points; the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
-        let axes = &AXES[..D];
-        let mut columns: Vec<(String, &'static str)> = [
-            ("time", "s"),
-            ("step", "1"),
-            ("kinetic_energy", "J"),
-            ("strain_energy", "J"),
-            ("fracture_energy", "J"),
-            ("external_work", "J"),
-            ("dissipated_energy", "J"),
-            ("energy_error", "J"),
-            ("broken_bonds", "1"),
-            ("cracked_points", "1"),
-        ]
-        .map(|(name, unit)| (name.to_owned(), unit))
-        .into();
-        if simulation.fields.relaxation_velocity.is_some() {
-            columns.push(("residual".to_owned(), "1"));
-            columns.push(("iterations".to_owned(), "1"));
+        let mut columns = Columns::new(D);
+        columns.add("time", "s", |now| now.clock.time());
+        columns.add("step", "1", |now| now.clock.number() as f64);
+        columns.add("kinetic_energy", "J", |now| now.energies.kinetic);
+        columns.add("strain_energy", "J", |now| now.energies.strain);
+        columns.add("fracture_energy", "J", |now| now.energies.fracture);
+        columns.add("external_work", "J", |now| now.energies.work);
+        columns.add("dissipated_energy", "J", |now| now.energies.dissipated);
+        columns.add("energy_error", "J", |now| now.energies.error);
+        columns.add("broken_bonds", "1", |now| now.broken as f64);
+        columns.add("cracked_points", "1", |now| now.cracked_points as f64);
+        if problem.relaxes() {
+            columns.add("residual", "1", |now| now.load_step.residual);
+            columns.add("iterations", "1", |now| now.load_step.iterations as f64);
         }
         if problem.adapts() {
-            columns.push(("time_step".to_owned(), "s"));
-            columns.push(("undone_steps".to_owned(), "1"));
-            columns.push(("most_broken_bonds".to_owned(), "1"));
+            columns.add("time_step", "s", |now| now.clock.step());
+            columns.add("undone_steps", "1", |now| now.undone_steps as f64);
+            columns.add("most_broken_bonds", "1", |now| now.most_broken as f64);
         }
         if problem.scales_density() {
-            columns.push(("kinetic_ratio".to_owned(), "1"));
+            let ratio = |now: &Moment| now.energies.kinetic / now.energies.strain;
+            columns.add("kinetic_ratio", "1", ratio);
         }
         if problem.changes_density_scale() {
-            columns.push(("density_scale_energy".to_owned(), "J"));
+            columns.add("density_scale_energy", "J", |now| now.density_scale_energy);
         }
         if simulation.may_refine() {
-            columns.push(("points".to_owned(), "1"));
-            columns.push(("refinement_energy".to_owned(), "J"));
+            columns.add("points", "1", |now| now.points as f64);
+            columns.add("refinement_energy", "J", |now| now.refinement_energy);
         }
-        let vector = |columns: &mut Vec<_>, name: String, unit| {
-            columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), unit)));
-        };
-        vector(&mut columns, "momentum".to_owned(), "kg m/s");
-        vector(&mut columns, "cracked_lower".to_owned(), "m");
-        vector(&mut columns, "cracked_upper".to_owned(), "m");
-        columns.push(("overshoot_energy".to_owned(), "J"));
+        columns.add_vector("momentum", "kg m/s", |now, d| now.momentum[d]);
+        columns.add_vector("cracked_lower", "m", |now, d| now.cracked_extent[0][d]);
+        columns.add_vector("cracked_upper", "m", |now, d| now.cracked_extent[1][d]);
+        columns.add("overshoot_energy", "J", |now| now.energies.overshoot);
         if simulation.forces.can_be_singular() {
-            columns.push(("singular_points".to_owned(), "1"));
+            columns.add("singular_points", "1", |now| now.singular_points as f64);
         }
         let mut reactions = Vec::new();
-        for Reaction { set, span } in &problem.history.reactions {
+        for (k, Reaction { set, span }) in problem.history.reactions.iter().enumerate() {
             let points = members(problem, &simulation.model, *set);
             let place = ("[history] reactions", span.clone());
             not_empty(problem, comm, *set, &points, place)?;
             reactions.push(points);
-            vector(
-                &mut columns,
-                format!("reaction_{}", problem.sets[*set].name),
-                "N",
-            );
+            let name = format!("reaction_{}", problem.sets[*set].name);
+            columns.add_vector(&name, "N", move |now, d| now.reactions[k][d]);
         }
         let mut support_forces = Vec::new();
-        for rule in &problem.history.support_forces {
+        for (k, rule) in problem.history.support_forces.iter().enumerate() {
             let points = members(problem, &simulation.model, rule.set);
             let key = format!("[history.force.{}] set", rule.name);
             not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
             support_forces.push((points, rule.direction));
-            columns.push((format!("force_{}", rule.name), "N"));
+            let name = format!("force_{}", rule.name);
+            columns.add(name, "N", move |now| now.support_forces[k]);
         }
         let mut probes = Vec::new();
-        for problem::Probe { name, at, .. } in &problem.history.probes {
+        for (k, problem::Probe { name, at, .. }) in problem.history.probes.iter().enumerate() {
             let point = nearest(simulation, *at).own;
             probes.push(Probe { point });
-            vector(&mut columns, format!("probe_{name}_displacement"), "m");
-            vector(&mut columns, format!("probe_{name}_velocity"), "m/s");
+            let of = |quantity: &str| format!("probe_{name}_{quantity}");
+            columns.add_vector(&of("displacement"), "m", move |now, d| now.probes[k][0][d]);
+            columns.add_vector(&of("velocity"), "m/s", move |now, d| now.probes[k][1][d]);
         }
         let mut fronts = Vec::new();
-        for front in &problem.history.fronts {
+        for (k, front) in problem.history.fronts.iter().enumerate() {
             fronts.push(Front::new(simulation, front)?);
-            columns.push((format!("front_{}", front.name), "m"));
+            let name = format!("front_{}", front.name);
+            columns.add(name, "m", move |now| now.fronts[k]);
         }
         let mut cracks = Vec::new();
-        for rule in &problem.history.cracks {
+        for (k, rule) in problem.history.cracks.iter().enumerate() {
             cracks.push(CrackPath::new(simulation, rule)?);
-            columns.push((format!("crack_{}_length", rule.name), "m"));
-            columns.push((format!("crack_{}_branches", rule.name), "1"));
+            let of = |quantity: &str| format!("crack_{}_{quantity}", rule.name);
+            columns.add(of("length"), "m", move |now| now.cracks[k].0);
+            columns.add(of("branches"), "1", move |now| now.cracks[k].1 as f64);
         }
         let mut tips = Vec::new();
-        for tip in &problem.history.tips {
+        for (k, tip) in problem.history.tips.iter().enumerate() {
             tips.push(Tip::new(simulation, tip)?);
             let name = format!("tip_{}", tip.name);
-            columns.extend(axes.iter().map(|axis| (format!("{name}_{axis}"), "m")));
-            columns.push((format!("{name}_length"), "m"));
-            columns.push((format!("{name}_speed"), "m/s"));
+            columns.add_vector(&name, "m", move |now, d| now.tips[k].position[d]);
+            columns.add(length_of(&tip.name), "m", move |now| now.tips[k].length);
+            columns.add(format!("{name}_speed"), "m/s", move |now| now.tips[k].speed);
         }
         Ok(Self {
             columns,
@@ -186,7 +177,6 @@ impl HistoryObserver {
             fronts,
             cracks,
             tips,
-            refines: simulation.may_refine(),
             start: None,
         })
     }
@@ -207,7 +197,7 @@ impl HistoryObserver {
 
     /// Name and unit of each column.
     pub fn columns(&self) -> &[(String, &'static str)] {
-        &self.columns
+        self.columns.names()
     }
 
     /// Energy (J) in the first row and bonds that were intact before any could break, which later rows
@@ -222,12 +212,13 @@ impl HistoryObserver {
     }
 
     /// Takes note of rows of the past, as [`Self::row`] gave them.
-    pub fn recall<const D: usize>(&mut self, rows: &[Vec<f64>]) {
-        let width = D + 2;
-        let first = self.columns.len() - width * self.tips.len();
+    pub fn recall(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
-            for (tip, values) in self.tips.iter_mut().zip(row[first..].chunks_exact(width)) {
-                tip.recall(row[0], values[D]);
+            let value = |name: &str| self.columns.value(row, name);
+            for tip in &mut self.tips {
+                if let (Some(time), Some(length)) = (value("time"), value(&length_of(tip.name()))) {
+                    tip.recall(time, length);
+                }
             }
         }
     }
@@ -302,62 +293,47 @@ impl HistoryObserver {
         // Refinements add intact bonds, and take some away where horizons become shorter.
         let there_were = first_intact as i64 + simulation.refined.bonds;
         let broken = (there_were - intact as i64) as u64 / 2;
-        let mut values = vec![
-            simulation.clock.time(),
-            simulation.clock.number() as f64,
-            energies.kinetic,
-            energies.strain,
-            energies.fracture,
-            energies.work,
-            energies.dissipated,
-            energies.error,
-            broken as f64,
-            cracked_points as f64,
-        ];
-        if fields.relaxation_velocity.is_some() {
-            let load_step = simulation.load_step;
-            values.extend([load_step.residual, load_step.iterations as f64]);
-        }
-        if simulation.problem.adapts() {
-            let control = &mut simulation.step_control;
-            let most = std::mem::take(&mut control.most_broken);
-            let counts = [control.undone, most].map(|count| count as f64);
-            values.push(simulation.clock.step());
-            values.extend(counts);
-        }
-        if simulation.problem.scales_density() {
-            values.push(energies.kinetic / energies.strain);
-        }
-        if simulation.problem.changes_density_scale() {
-            values.push(simulation.density_scale_energy);
-        }
-        if self.refines {
-            values.extend([simulation.model.total as f64, simulation.refined.energy]);
-        }
-        values.extend(&own[3..]);
-        values.extend(&lower[..D]);
-        values.extend(&upper[..D]);
-        values.push(energies.overshoot);
-        values.extend(singular.map(|_| singular_points as f64));
+        let most_broken = std::mem::take(&mut simulation.step_control.most_broken);
         let (reactions, directed) = reactions.split_at(D * self.reactions.len());
-        values.extend(reactions);
-        for (force, (_, direction)) in directed.chunks_exact(D).zip(&self.support_forces) {
+        let support_forces = directed.chunks_exact(D).zip(&self.support_forces);
+        let support_forces = support_forces.map(|(force, (_, direction))| {
             let products = force.iter().zip(direction).map(|(f, d)| f * d);
-            values.push(products.sum());
-        }
-        values.extend(self.probe_values(simulation));
-        for front in &self.fronts {
-            values.push(front.position(simulation, snapshot));
-        }
+            products.sum()
+        });
+        let probes = self.probe_values(simulation);
+        let fronts = self.fronts.iter();
+        let fronts = fronts
+            .map(|front| front.position(simulation, snapshot))
+            .collect();
         let damage = |point| snapshot.damage(&simulation.family_volume, point);
-        for crack in &self.cracks {
+        let cracks = self.cracks.iter().map(|crack| {
             let branches = crack.branches(simulation, damage);
-            values.push(centre_line::length(&branches));
-            values.push(branches.len() as f64);
-        }
-        for tip in &mut self.tips {
-            values.extend(tip.row(simulation, damage));
-        }
+            (centre_line::length(&branches), branches.len())
+        });
+        let cracks = cracks.collect();
+        let tips = self.tips.iter_mut();
+        let tips = tips.map(|tip| tip.row(simulation, damage)).collect();
+        let values = self.columns.row(&Moment {
+            clock: simulation.clock,
+            energies,
+            momentum: own[3..].to_vec(),
+            broken,
+            cracked_points,
+            cracked_extent: [lower, upper],
+            singular_points,
+            load_step: simulation.load_step,
+            undone_steps: simulation.step_control.undone,
+            most_broken,
+            density_scale_energy: simulation.density_scale_energy,
+            points: simulation.model.total,
+            refinement_energy: simulation.refined.energy,
+            reactions: reactions.chunks_exact(D).map(<[f64]>::to_vec).collect(),
+            support_forces: support_forces.collect(),
+            probes,
+            fronts,
+            cracks,
+            tips,
+        });
         HistoryRow {
             values,
             number: simulation.clock.number(),
@@ -369,7 +345,7 @@ impl HistoryObserver {
     }
 
     /// Displacement and velocity of the probes, from the ranks that own their points to all.
-    fn probe_values<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<f64> {
+    fn probe_values<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<[Vec<f64>; 2]> {
         let fields = &simulation.fields;
         let mut bits: Vec<u64> = self
             .probes
@@ -384,8 +360,16 @@ impl HistoryObserver {
             .collect();
         // One rank has the bits, the others add nothing.
         simulation.comm.sum(&mut bits);
-        bits.into_iter().map(f64::from_bits).collect()
+        let values = |bits: &[u64]| bits.iter().map(|bits| f64::from_bits(*bits)).collect();
+        bits.chunks_exact(2 * D)
+            .map(|of_probe| [values(&of_probe[..D]), values(&of_probe[D..])])
+            .collect()
     }
+}
+
+/// The column with the length of a tip, from which its speed follows.
+fn length_of(tip: &str) -> String {
+    format!("tip_{tip}_length")
 }
 
 fn sum(values: &[f64]) -> ExactSum {

@@ -2,6 +2,7 @@
 //! crack tips for the history.
 
 mod centre_line;
+mod columns;
 mod contact;
 mod crack_path;
 mod cracked;

@@ -9,9 +9,21 @@ use crate::solver::conditions::{members, not_empty};
 
 /// A crack tip that is followed.
 pub struct Tip {
+    name: String,
     threshold: f64,
     course: Course,
     growth: Growth,
+}
+
+/// A crack tip now; NaN where no point is above its threshold.
+#[derive(Debug, Clone, Copy)]
+pub struct TipNow {
+    /// Where it is, m.
+    pub position: [f64; 3],
+    /// Length of the crack, m.
+    pub length: f64,
+    /// m/s.
+    pub speed: f64,
 }
 
 impl Tip {
@@ -38,27 +50,34 @@ impl Tip {
             return Err(Error::input(message).at(&rule.span));
         }
         Ok(Self {
+            name: rule.name.clone(),
             threshold: rule.threshold,
             course,
             growth: Growth::new(problem.horizon),
         })
     }
 
-    /// Position (m), length (m) and speed (m/s) at a damage of the owned points; NaN where no point is
-    /// above the threshold. Collective.
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where it is at a damage of the owned points. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
         damage: impl Fn(usize) -> f64,
-    ) -> Vec<f64> {
+    ) -> TipNow {
         let reached = self.course.reached(simulation, self.threshold, damage);
         let Reached { along, position } = reached.unwrap_or(Reached {
             along: f64::NAN,
             position: [f64::NAN; 3],
         });
-        let mut row = position[..D].to_vec();
-        row.extend([along, self.growth.speed(simulation.clock.time(), along)]);
-        row
+        TipNow {
+            position,
+            length: along,
+            speed: self.growth.speed(simulation.clock.time(), along),
+        }
     }
 
     /// Takes over what an earlier observer of the same tip knows of the past.
