@@ -52,7 +52,7 @@ fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let mut tables = deck.named_tables();
     tables.retain(|table| {
         let section = Section::find(table.section);
-        section.is_some_and(|section| section.is_referred_to)
+        section.is_some_and(|section| section.referred_to)
             && !used.contains(&(table.section, table.name.to_owned()))
     });
     let warning = |table: &NamedTable| {

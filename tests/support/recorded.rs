@@ -50,10 +50,10 @@ fn run<const D: usize>(problem: &Problem, comm: &dyn Communicator) -> Recorded {
             }
         }
         stepper.advance();
-        if stepper.load_step().is_settled {
-            if Recorded::is_due(problem, stepper.clock()).contains(&true) {
-                recorded.add(stepper.at_full_step(), &mut history);
-            }
+        if stepper.load_step().is_settled
+            && Recorded::is_due(problem, stepper.clock()).contains(&true)
+        {
+            recorded.add(stepper.at_full_step(), &mut history);
         }
         if !stepper.is_over()
             && let Some(done) = balance.look(&mut stepper).unwrap()

@@ -12,7 +12,7 @@ pub struct Section {
     /// How its header is written.
     pub form: Form,
     /// Whether its tables are there only to be referred to by their names.
-    pub is_referred_to: bool,
+    pub referred_to: bool,
     /// What a restart may change of it.
     pub restart: Restart,
 }
@@ -63,10 +63,10 @@ pub const SECTIONS: [Section; 32] = [
     Section::new("refinement", Table, Fixed),
     Section::new("refinement.region", Named, Fixed),
     Section::new("refinement.trigger", Table, Fixed),
-    Section::new("material", NamedKind, Fixed).is_referred_to(),
-    Section::new("damage", NamedKind, Fixed).is_referred_to(),
+    Section::new("material", NamedKind, Fixed).referred_to(),
+    Section::new("damage", NamedKind, Fixed).referred_to(),
     Section::new("body", Named, FixedOrder),
-    Section::new("set", Named, WhereUsed).is_referred_to(),
+    Section::new("set", Named, WhereUsed).referred_to(),
     Section::new("crack", NamedKind, Fixed),
     Section::new("initial", Named, FixedOrder),
     Section::new("condition", Named, FixedOrder),
@@ -91,14 +91,14 @@ impl Section {
         Self {
             path,
             form,
-            is_referred_to: false,
+            referred_to: false,
             restart,
         }
     }
 
-    const fn is_referred_to(self) -> Self {
+    const fn referred_to(self) -> Self {
         Self {
-            is_referred_to: true,
+            referred_to: true,
             ..self
         }
     }

@@ -373,14 +373,14 @@ impl FastPathGate {
     unsafe fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
         simd: S,
-        mut task: WholeVector<'_, '_, '_, K, D>,
+        task: WholeVector<'_, '_, '_, K, D>,
     ) -> (K::Sums, u8) {
         if const { !K::NEAR } {
             return task.run(simd);
         }
         if self.near && self.waiting == 0 {
             // SAFETY: passed on to the caller.
-            let sums = unsafe { near_vector(simd, task.kernel, task.points, &mut task.vector) };
+            let sums = unsafe { near_vector(simd, task.kernel, task.points, task.vector) };
             if let Some(sums) = sums {
                 return (sums, 0);
             }
