@@ -20,6 +20,10 @@ pub enum Calibration {
     /// As Willberg et al. 2022 print it in eq. 16 and 18: their w has no ½, and in the plane their w_c
     /// is 3G0/(πδ³h). Their w is the work on η, so that it holds for small rotations only.
     Willberg2022,
+    /// As PeriLab computes it: a bond breaks at ¼ |(T_i − T_j)·η| = 3G0/(πδ³h) in the plane and 4G0/(πδ⁴) in space.
+    PeriLab,
+    /// As Peridigm computed it in the plane in 2021, before π was in: ¼ (|T_i·η| + |T_j·η|) = 3G0/(δ³h).
+    Peridigm2021,
 }
 
 /// The law with its constants.
@@ -36,6 +40,15 @@ pub struct BondEnergy {
 }
 
 impl Calibration {
+    /// Whether the formula of the source exists in this dimension.
+    pub fn is_for(self, dimension: usize) -> bool {
+        match self {
+            Self::Energy | Self::Opening(_) | Self::Willberg2022 => true,
+            Self::PeriLab => dimension > 1,
+            Self::Peridigm2021 => dimension == 2,
+        }
+    }
+
     /// The share of the fracture energy that a unit area costs.
     pub fn share(self, dimension: Dimension) -> f64 {
         use Dimension::{Line, PlaneStrain, PlaneStress, Space};
@@ -44,6 +57,9 @@ impl Calibration {
             (Self::Opening(Some(cost)), _) => 1.0 / cost,
             (Self::Willberg2022, PlaneStress { .. } | PlaneStrain { .. }) => 1.0 / PI,
             (Self::Willberg2022, Space | Line { .. }) => 0.5,
+            (Self::PeriLab, PlaneStress { .. } | PlaneStrain { .. }) => 4.0 / PI,
+            (Self::PeriLab, Space | Line { .. }) => 2.0,
+            (Self::Peridigm2021, _) => 4.0,
         }
     }
 }

@@ -44,11 +44,24 @@ pub fn damage(
             let law = spanned.get_ref();
             let key = format!("[damage.{name}.energy]");
             let all = of_crack(&law.fracture_energy, &law.fracture_toughness);
-            let calibration = match law.calibration {
+            let calibration = match law.calibration.get_ref() {
                 grammar::Calibration::Energy => Calibration::Energy,
                 grammar::Calibration::Opening => Calibration::Opening(None),
                 grammar::Calibration::Willberg2022 => Calibration::Willberg2022,
+                grammar::Calibration::Perilab => Calibration::PeriLab,
+                grammar::Calibration::Peridigm2021 => Calibration::Peridigm2021,
             };
+            if !calibration.is_for(scope.dimension) {
+                let message = format!(
+                    "{key} calibration: its formula is known in {} only; `energy`, `opening` and `willberg2022` \
+                     are for every dimension",
+                    match calibration {
+                        Calibration::Peridigm2021 => "the plane",
+                        _ => "the plane and in space",
+                    }
+                );
+                return Err(scope.error(law.calibration.span(), message));
+            }
             let work = WorkRule {
                 sense: if law.tension_only {
                     Sense::Pulled
@@ -57,7 +70,9 @@ pub fn damage(
                 },
                 family_correction: family_correction(scope, &law.family_correction, &key)?,
                 measure: match calibration {
-                    Calibration::Willberg2022 => WorkMeasure::Displacement,
+                    Calibration::Willberg2022
+                    | Calibration::PeriLab
+                    | Calibration::Peridigm2021 => WorkMeasure::Displacement,
                     Calibration::Energy | Calibration::Opening(_) => WorkMeasure::Objective,
                 },
             };

@@ -476,3 +476,75 @@ fn between_bodies_of_different_horizons_by_energy() {
         assert!((border / inside - 1.0).abs() < 0.12, "{case}");
     }
 }
+
+/// The work ¼ |(T_i − T_j)·η| (J/m⁶) at which a bond of length 1 breaks when it is pulled in steps of 0.1 % of its
+/// extension; horizon 1.5, thickness 0.5 in the plane.
+fn work_at_breaking<const D: usize>(dimension: &str, calibration: &str) -> f64 {
+    let thickness = if D == 2 { "thickness = 0.5" } else { "" };
+    let corner = |at: f64| {
+        if D == 2 {
+            format!("[{at}, 0.5]")
+        } else {
+            format!("[{at}, 0.5, 0.5]")
+        }
+    };
+    let origin = if D == 2 { "[0, 0]" } else { "[0, 0, 0]" };
+    let text = format!(
+        "dimension = '{dimension}'
+        {thickness}
+        grid = {{ spacing = 1, horizon = 1.5, volume_correction = 'none', origin = {origin} }}
+        material.rubber.ordinary = {{ density = 1, youngs_modulus = 50, poisson_ratio = 0.3 }}
+        damage.brittle.energy = {{ fracture_energy = 0.01, calibration = '{calibration}' }}
+        body.bond = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = {}, upper = {} }} }}
+        time = {{ end = 1, step = 0.01 }}",
+        corner(0.0).replace("0.5", "0"),
+        corner(2.0).replace("0.5", "1"),
+    );
+    simulate(&text, |mut simulation: Simulation<D>| {
+        assert_eq!(simulation.model.owned(), 2);
+        let (mut extension, mut work) = (1e-4, 0.0);
+        loop {
+            displace(&mut simulation, |[x, y, z]| {
+                [if x > 1.0 { x + extension } else { x }, y, z]
+            });
+            let volume = simulation.model.volume[0];
+            let force = simulation.fields.internal_force[0][0] / volume;
+            if force == 0.0 {
+                return work;
+            }
+            work = 0.25 * force * extension;
+            extension *= 1.001;
+            assert!(extension < 1.0, "the bond does not break");
+        }
+    })
+}
+
+#[test]
+fn one_bond_breaks_where_the_formulas_of_other_codes_say() {
+    let pi = std::f64::consts::PI;
+    let (energy, horizon, thickness) = (0.01, 1.5_f64, 0.5);
+    let plane = energy / (horizon.powi(3) * thickness);
+    let space = energy / (pi * horizon.powi(4));
+    let cases = [
+        ("energy", 0.5 * 1.5 * plane, Some(0.5 * 4.0 * space)),
+        (
+            "willberg2022",
+            0.25 * 3.0 * plane / pi,
+            Some(0.25 * 4.0 * space),
+        ),
+        ("perilab", 3.0 * plane / pi, Some(4.0 * space)),
+        ("peridigm2021", 3.0 * plane, None),
+    ];
+    for (calibration, in_the_plane, in_space) in cases {
+        let found = work_at_breaking::<2>("plane-strain", calibration);
+        let ratio = found / in_the_plane;
+        assert!((0.997..=1.0).contains(&ratio), "{calibration}: {ratio}");
+        if let Some(expected) = in_space {
+            let ratio = work_at_breaking::<3>("3d", calibration) / expected;
+            assert!(
+                (0.997..=1.0).contains(&ratio),
+                "{calibration} in space: {ratio}"
+            );
+        }
+    }
+}

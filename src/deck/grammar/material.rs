@@ -116,9 +116,10 @@ pub struct BondEnergy {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
     /// How the critical work follows: "energy" (all bonds across an area take the fracture energy), "opening"
-    /// (opening a block of the body, which is tried before the run, costs it) or "willberg2022" (as in Willberg et al. 2022, eq. 16 and 18).
-    #[serde(default)]
-    pub calibration: Calibration,
+    /// (opening a block of the body, which is tried before the run, costs it), "willberg2022" (as in Willberg et al. 2022,
+    /// eq. 16 and 18), "perilab" (as PeriLab computes it; 2-D and 3-D) or "peridigm2021" (as Peridigm computed it in 2021; 2-D).
+    #[serde(default = "default_calibration")]
+    pub calibration: Spanned<Calibration>,
     /// Whether only bonds that are longer than at the start break; if not, pressed ones break too, as in a
     /// shear crack.
     #[serde(default = "yes")]
@@ -147,6 +148,14 @@ pub enum Calibration {
     Opening,
     /// As printed in Willberg et al. 2022.
     Willberg2022,
+    /// As PeriLab computes it.
+    Perilab,
+    /// As Peridigm computed it in 2021.
+    Peridigm2021,
+}
+
+fn default_calibration() -> Spanned<Calibration> {
+    Spanned::new(0..0, Calibration::default())
 }
 
 fn yes() -> bool {
