@@ -6,7 +6,7 @@
 use std::fmt;
 use std::ops::Range;
 
-/// Whose fault an error is; it decides the process's exit code.
+/// Category of an error; sets the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
     /// The deck or the command line is wrong: exit code 2.
@@ -92,7 +92,7 @@ impl Error {
         }
     }
 
-    /// Whether it is no fault but the end that a signal asked for.
+    /// Stopped by a signal, which is no failure.
     pub fn is_stop(&self) -> bool {
         self.kind == ErrorKind::Stopped
     }

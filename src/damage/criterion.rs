@@ -2,7 +2,7 @@
 //! [`crate::material::bond`], which needs no root, energies by the work of both ends' force states.
 
 use crate::lanes::{Lanes, Simd};
-use crate::material::bond::{NEAR, Weights, growth_of};
+use crate::material::bond::{NEAR, Weights, relative_square_extension_of};
 use crate::material::{Bond, Law};
 
 /// When the bonds between two blocks break.
@@ -30,8 +30,7 @@ pub type HorizonRatios = [[f64; 2]; 2];
 pub struct WorkRule {
     /// Which bonds break.
     pub sense: Sense,
-    /// The share, from 0 to 1, of what bonds hold [more](Law::truncation_factor) where families are not whole that their
-    /// threshold grows by.
+    /// c from 0 to 1: thresholds are multiplied by 1 + c (f − 1) with the [truncation factor](Law::truncation_factor) f.
     pub family_correction: f64,
     /// Which relative displacement the force states work on.
     pub measure: WorkMeasure,
@@ -96,9 +95,9 @@ impl Criterion {
         matches!(self, Self::Thresholds(_) | Self::WorkThresholds(..))
     }
 
-    /// Whether it depends on the truncation_factors of the ends.
+    /// It reads the truncation factors of the points.
     #[inline(always)]
-    pub fn reads_overloads(self) -> bool {
+    pub fn reads_truncation_factors(self) -> bool {
         match self {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => rule.corrects(),
             Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
@@ -122,18 +121,17 @@ impl Criterion {
         matches!(self, Self::Work(..) | Self::WorkThresholds(..))
     }
 
-    /// The |x| of [`crate::material::bond`] beyond which bonds must be marked; none below breaks by
-    /// its stretch.
+    /// The |x| of [`crate::material::bond`] from which bonds count as beyond the series. Below it none breaks by its stretch.
     #[inline(always)]
     pub fn limit(self) -> f64 {
         match self {
             // What equals the limit is not beyond it.
-            Self::Stretch(critical) => NEAR.min(growth_of(critical).next_down()),
+            Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
             _ => NEAR,
         }
     }
 
-    /// Whether all bonds that break are marked, of laws that may scale thresholds.
+    /// All bonds that break are beyond the series; `scaled` for laws that scale thresholds.
     #[inline(always)]
     pub fn marks_all(self, scaled: bool) -> bool {
         match self {
@@ -154,11 +152,11 @@ impl Criterion {
     ) -> u8 {
         match self {
             Self::Never => 0,
-            // A bond that breaks is marked.
+            // A bond that breaks is beyond the series.
             Self::Stretch(_) if !L::SCALED && bond.beyond_series == 0 => 0,
             Self::Stretch(critical) if !L::SCALED => simd.at_least(
                 bond.relative_square_extension,
-                Lanes::splat(growth_of(critical)),
+                Lanes::splat(relative_square_extension_of(critical)),
             ),
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
                 let [i, j] = ends.weights.acting();

@@ -1,4 +1,4 @@
-//! LaneTuple as they stand in a deck: an integer, a float, or an expression in a string.
+//! Numbers as they stand in a deck: an integer, a float, or an expression in a string.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! LaneTuple, vectors and expressions of a deck, evaluated against its parameters.
+//! Numbers, vectors and expressions of a deck, evaluated against its parameters.
 
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};

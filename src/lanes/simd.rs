@@ -67,8 +67,7 @@ pub trait Task {
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// What every machine has. Whether a product and a sum are rounded `ONCE` is to choose; that is slow on processors
-/// without an instruction for it.
+/// Portable fallback. `ONCE` selects fused multiply-add, which is slow on processors without an instruction for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Portable<const ONCE: bool>;
 

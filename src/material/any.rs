@@ -1,5 +1,4 @@
-//! Laws that are one of several: for what is done once a point, and for the bonds between blocks of
-//! different laws.
+//! Dynamic dispatch over all laws: for work per point, for the set-up and outputs, and for bonds between different laws.
 
 use nalgebra::SMatrix;
 
@@ -76,15 +75,15 @@ pub type AnyPoint = UpTo<{ MOST.point }>;
 /// The history that a bond keeps for an end of any law.
 pub type AnyHistory = UpTo<{ MOST.bond_history }>;
 
-/// The first of some numbers.
+/// Keep the first entries.
 #[inline(always)]
 fn first<A: LaneTuple, B: LaneTuple>(all: &A) -> B {
     B::each(|k| all.get(k))
 }
 
-/// Some numbers, and zeros after them.
+/// Pad with zeros.
 #[inline(always)]
-fn filled_up<A: LaneTuple, B: LaneTuple>(some: A) -> B {
+fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
     B::each(|k| {
         if k < A::COUNT {
             some.get(k)
@@ -154,8 +153,8 @@ impl AnyLaw {
     }
 }
 
-/// Bonds of linear laws meet no others, so these are bonds of the deformed body. Nothing is inlined: every
-/// loop over such bonds would be compiled with all laws in it.
+/// Bonds between different laws are never linear: linear laws are not paired with others. Nothing is inlined, or every loop
+/// would contain all laws.
 impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;
@@ -170,7 +169,7 @@ impl<const D: usize> Law<D> for AnyLaw {
 
     #[inline(never)]
     fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
-        with_law!(self, law => filled_up(law.reference_contribution(bond)))
+        with_law!(self, law => padded(law.reference_contribution(bond)))
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
@@ -184,7 +183,7 @@ impl<const D: usize> Law<D> for AnyLaw {
         own: &Self::Point,
         history: &Self::BondHistory,
     ) -> Self::Sum {
-        with_law!(self, law => filled_up(law.pass_contribution::<S>(bond, &first(own), &first(history))))
+        with_law!(self, law => padded(law.pass_contribution::<S>(bond, &first(own), &first(history))))
     }
 
     #[inline(never)]
@@ -210,7 +209,7 @@ impl<const D: usize> Law<D> for AnyLaw {
         before: &Self::BondHistory,
         step: f64,
     ) -> Self::BondHistory {
-        with_law!(self, law => filled_up(law.bond_history(bond, &first(end), &first(before), step)))
+        with_law!(self, law => padded(law.bond_history(bond, &first(end), &first(before), step)))
     }
 
     #[inline(never)]

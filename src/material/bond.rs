@@ -293,7 +293,7 @@ fn series<S: Simd>(simd: S, x: Lanes, coefficients: &[f64; 7]) -> Lanes {
 
 /// x of a stretch s: (1 + s)² − 1. It grows with s, so that stretches can be compared by it.
 #[inline(always)]
-pub fn growth_of(stretch: f64) -> f64 {
+pub fn relative_square_extension_of(stretch: f64) -> f64 {
     stretch * (2.0 + stretch)
 }
 

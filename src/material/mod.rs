@@ -93,14 +93,14 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// How many sums over the bonds come before that of the forces.
     const PASSES: usize = 0;
 
-    /// LaneTuple of a point that only its own law reads, after those of [`Self::Point`].
+    /// Numbers of a point that only its own law reads, after those of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
     /// Whether [`Self::force`] or [`Self::bond_history`] read the stretch of bonds.
     const FORCE_READS_STRETCH: bool = false;
 
     /// Whether [`Self::force`] reads the shortening of bonds.
-    const FORCE_READS_SHORTENING: bool = true;
+    const FORCE_READS_EXTENSION: bool = true;
 
     /// How many dimensions there must be for bodies of the law.
     const LEAST_DIMENSION: usize = 1;
@@ -140,7 +140,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         &self,
         _bond: &Bond<D>,
         _own: &Self::Point,
-        _memory: &Self::BondHistory,
+        _history: &Self::BondHistory,
     ) -> Self::Sum {
         Self::Sum::splat(0.0)
     }
@@ -149,7 +149,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// flow adds to the plastic state is kept in a step alone.
     fn update_point(
         &self,
-        _stage: usize,
+        _pass: usize,
         _sums: &[f64],
         _numbers: &mut [f64],
         _plastic: &mut PlasticState,
@@ -217,7 +217,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Rotation of a family from the sums of the first pass, for laws whose forces do not act along the bonds.
     fn rotation(&self, _sums: &[f64]) -> Rotation {
-        rotation::NONE
+        rotation::IDENTITY
     }
 
     /// What a bond adds to the strain energy density of one end, J/m⁶.
@@ -271,7 +271,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// What a bond, broken or not, has dissipated at one end without breaking, J/m⁶.
     #[inline(always)]
-    fn dissipated(&self, _length: Lanes, _memory: &Self::BondHistory) -> Lanes {
+    fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
@@ -285,9 +285,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// How many times as much the bonds of a point hold as those of a point inside, at the same strain, from the sums
-    /// of [`Self::reference_contribution`]: where a family is not whole, fewer bonds hold the energy of the point. 1 if bonds hold
-    /// the same everywhere.
+    /// Energy per bond of a point over that of an interior point at the same strain, from the sums of
+    /// [`Self::reference_contribution`]. Above 1 for a truncated family of a law whose points hold the energy; else 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }

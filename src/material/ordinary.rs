@@ -102,7 +102,7 @@ impl Ordinary {
     }
 
     /// What a bond holds over what it would if the family were whole, from m.
-    pub(super) fn overload_of(&self, sum: f64) -> f64 {
+    pub(super) fn truncation_factor_of(&self, sum: f64) -> f64 {
         if sum > 0.0 { self.whole / sum } else { 1.0 }
     }
 }
@@ -296,7 +296,7 @@ impl<const D: usize> Law<D> for Ordinary {
     }
 
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
-        self.overload_of(sums[0])
+        self.truncation_factor_of(sums[0])
     }
 
     /// θ² ≤ (d²/m) Σ ω ε² Ṽ (Cauchy–Schwarz), so (A + max(κ, 0) d²)/m serves.

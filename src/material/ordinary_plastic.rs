@@ -222,7 +222,7 @@ impl<const D: usize> Law<D> for OrdinaryPlastic {
     }
 
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
-        self.elastic.overload_of(sums[0])
+        self.elastic.truncation_factor_of(sums[0])
     }
 
     #[inline(always)]

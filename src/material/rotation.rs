@@ -4,7 +4,7 @@
 //!
 //! (R − I) ξ = q₀ t + q × t with t = 2 q × ξ
 //!
-//! keeps all digits at small angles and takes no division in the loops. In the plane only q_z and q₀ are not 0. R is
+//! keeps all digits at small angles and needs no division in the loops. In the plane only q_z and q₀ are not 0. R is
 //! found with additions, products, quotients and square roots alone, so that its bits are the same on every machine.
 
 use nalgebra::{Matrix3, SMatrix};
@@ -15,7 +15,7 @@ use crate::lanes::{Lanes, Simd};
 pub type Rotation = [f64; 4];
 
 /// R = I.
-pub const NONE: Rotation = [0.0, 0.0, 0.0, 1.0];
+pub const IDENTITY: Rotation = [0.0, 0.0, 0.0, 1.0];
 
 /// Iterations of the polar decomposition at most; strains of a factor of a thousand take about fifteen.
 const MOST_ITERATIONS: usize = 40;
@@ -23,13 +23,13 @@ const MOST_ITERATIONS: usize = 40;
 /// The change of an entry of R in an iteration below which R has converged; the next change would be its square.
 const CONVERGED: f64 = 1e-9;
 
-/// R of a deformation gradient in the plane or in space; none where F turns the family inside out.
+/// R of a deformation gradient in the plane or in space; the identity if det F ≤ 0.
 pub fn of_gradient<const D: usize>(gradient: &SMatrix<f64, D, D>) -> Rotation {
     let mut f = Matrix3::identity();
     f.view_mut((0, 0), (D, D)).copy_from(gradient);
     match D {
         2 => in_plane(&f),
-        _ => orthogonal_factor(f).map_or(NONE, |r| quaternion(&r)),
+        _ => orthogonal_factor(f).map_or(IDENTITY, |r| quaternion(&r)),
     }
 }
 
@@ -41,7 +41,7 @@ fn in_plane(f: &Matrix3<f64>) -> Rotation {
         let [cosine, sine] = of_half_angle(cosine / length, sine / length);
         [0.0, 0.0, sine, cosine]
     } else {
-        NONE
+        IDENTITY
     }
 }
 
@@ -221,8 +221,11 @@ mod tests {
     #[test]
     fn a_family_that_is_turned_inside_out_has_none() {
         let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
-        assert_eq!(of_gradient(&mirror), NONE);
-        assert_eq!(of_gradient(&Matrix3::<f64>::from_element(f64::NAN)), NONE);
-        assert_eq!(of_gradient(&Matrix2::<f64>::zeros()), NONE);
+        assert_eq!(of_gradient(&mirror), IDENTITY);
+        assert_eq!(
+            of_gradient(&Matrix3::<f64>::from_element(f64::NAN)),
+            IDENTITY
+        );
+        assert_eq!(of_gradient(&Matrix2::<f64>::zeros()), IDENTITY);
     }
 }

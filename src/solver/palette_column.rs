@@ -1,4 +1,4 @@
-//! LaneTuple of points of which few are different, as volumes on a grid.
+//! Numbers of points of which few are different, as volumes on a grid.
 
 use std::ops::Index;
 

@@ -270,10 +270,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Makes one step, or one iteration of a load step, but for its second half kick. `kick_is_due` says whether that
+    /// Makes one step, or one iteration of a load step, but for its second half kick. `half_kick_pending` says whether that
     /// of the step before is still to be made, which it is not where a stage begins. Returns whether that of this step
     /// is. Collective.
-    pub(super) fn leap(&mut self, kick_is_due: bool) -> bool {
+    pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
@@ -282,7 +282,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         } = self.time_rule();
         match (method, adaptive) {
             (Method::Explicit, None) => {
-                self.make_step(kick_is_due);
+                self.make_step(half_kick_pending);
                 true
             }
             (Method::Explicit, Some(rule)) => {
@@ -310,20 +310,20 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Makes one step by the equation of motion, but for its second half kick; before it that of the step before, if
     /// it is due. Collective.
-    pub(super) fn make_step(&mut self, kick_is_due: bool) {
+    pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
         let before = self.clock;
         let step = before.step();
-        if kick_is_due {
+        if half_kick_pending {
             self.set_second_half(&before);
         }
         self.clock.advance();
         self.conditions.set_places(self.clock.time(), step);
         let finite = self.walk(|part, mut here| {
-            let finite = if kick_is_due && here.is_empty() && part.damping.is_none() {
+            let finite = if half_kick_pending && here.is_empty() && part.damping.is_none() {
                 verlet::kick_and_drift(part, step)
             } else {
-                let finite = !kick_is_due || second_half(part, &mut here, step);
+                let finite = !half_kick_pending || second_half(part, &mut here, step);
                 here.before_moving(part);
                 verlet::half_kick_and_drift(part, step);
                 here.apply_displacements(part);
@@ -336,7 +336,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             self.note_bad(&before);
         }
         self.times.motion += start.elapsed();
-        self.evaluate_shown(BondUpdate::Step(step));
+        self.evaluate_at_bond_inputs(BondUpdate::Step(step));
     }
 
     /// Gets ready for the second half kick of the step that a clock has come to.
@@ -360,10 +360,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
             ..
         } = self;
         let (all, on_parts) = conditions.by_part();
-        forces.with_bond_inputs(model.owned(), |shown| {
-            walk(Part::all(model, fields, shown), on_parts, |part, on| {
-                work(part, Here::new(all, on))
-            })
+        forces.with_bond_inputs(model.owned(), |bond_inputs| {
+            walk(
+                Part::all(model, fields, bond_inputs),
+                on_parts,
+                |part, on| work(part, Here::new(all, on)),
+            )
         })
     }
 
@@ -374,11 +376,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
             part.write_bond_inputs();
             true
         });
-        self.evaluate_shown(bond_update);
+        self.evaluate_at_bond_inputs(bond_update);
     }
 
-    /// As [`Self::evaluate`], after all parts of the points were [shown](Part::show).
-    fn evaluate_shown(&mut self, bond_update: BondUpdate) {
+    /// As [`Self::evaluate`], after all parts of the points were [bond_inputs](Part::show).
+    fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -440,7 +442,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     pub(super) fn recompute_derived(&mut self) {
         self.apply_loads(self.clock.time(), true);
         self.update_damping_power();
-        self.evaluate(self.standing_evolution());
+        self.evaluate(self.bond_update_at_rest());
     }
 
     /// Takes note of a motion that is not finite, at the time of a clock.

@@ -1,4 +1,4 @@
-//! Steps one after the other, each of which leaves its second half kick to whoever asks for the state.
+//! The leapfrog driver: it defers the second half kick of a step until someone asks for the state.
 
 use crate::comm::Communicator;
 use crate::error::Result;
@@ -12,15 +12,15 @@ use super::simulation::Times;
 
 /// Makes the steps of a simulation.
 ///
-/// Velocities live at half steps, as in the leapfrog form of Verlet: a step ends with forces at the new place, and the
-/// kicks before and after it are made together by the next one, which so goes over the points once. Meanwhile
-/// velocities, reactions, external forces, damping and the energies of these are not those of a full step. So there is
-/// no way to the simulation but [`Self::at_full_step`], which makes the half kick that is missing. The bits are the same
-/// whether it is asked or not, and on how many ranks.
+/// Velocities live at half steps, as in the leapfrog form of Verlet. A step ends with the forces at the new positions. The
+/// next step fuses the second half kick with its own first half kick, in one pass over the points. Meanwhile velocities,
+/// reactions, external forces, damping and their energies are not those of the full step. So the simulation can be
+/// reached through [`Self::at_full_step`] only, which applies the pending half kick first. Results do not depend on how
+/// often it is called, to the bit.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
-    /// Whether the second half kick of the last step is still to be made.
-    kick_is_due: bool,
+    /// The second half kick of the last step is not applied yet.
+    half_kick_pending: bool,
 }
 
 impl<'a, const D: usize> Stepper<'a, D> {
@@ -28,7 +28,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
     pub fn new(simulation: Simulation<'a, D>) -> Self {
         Self {
             simulation,
-            kick_is_due: false,
+            half_kick_pending: false,
         }
     }
 
@@ -37,12 +37,12 @@ impl<'a, const D: usize> Stepper<'a, D> {
         if self.simulation.next_stage().is_some() {
             self.at_full_step();
         }
-        self.kick_is_due = self.simulation.leap(self.kick_is_due);
+        self.half_kick_pending = self.simulation.leap(self.half_kick_pending);
     }
 
-    /// The simulation with everything at the full step. Makes the second half kick on this rank, if it is due.
+    /// The simulation with everything at the full step. Applies the second half kick if it is pending; not collective.
     pub fn at_full_step(&mut self) -> &mut Simulation<'a, D> {
-        if std::mem::take(&mut self.kick_is_due) {
+        if std::mem::take(&mut self.half_kick_pending) {
             self.simulation.kick();
         }
         &mut self.simulation

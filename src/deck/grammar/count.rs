@@ -1,4 +1,4 @@
-//! LaneTuple of things.
+//! Numbers of things.
 
 use std::fmt;
 use std::num::NonZeroU64;

@@ -39,7 +39,7 @@ pub enum Restart {
     Fixed,
     /// Nothing, not even the order of its tables: later ones take precedence over earlier ones.
     FixedOrder,
-    /// A table counts where it is used: it may be there or not, but not change.
+    /// May be added or removed; its content is compared where it is referenced.
     WhereUsed,
     /// Everything.
     Free,

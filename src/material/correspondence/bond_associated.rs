@@ -150,7 +150,7 @@ impl<const D: usize> Law<D> for BondAssociated {
     const LEAST_DIMENSION: usize = 2;
     const SUM_READS_STRETCH: bool = false;
     const SUM_READS_DIRECTION: bool = true;
-    const FORCE_READS_SHORTENING: bool = false;
+    const FORCE_READS_EXTENSION: bool = false;
     const HAS_BOND_STRESS_ACROSS: bool = true;
     // The stresses, in a loop of their own, take most of the time.
     const ISA_SET: IsaSet = IsaSet::Avx2;

@@ -144,7 +144,7 @@ impl<const D: usize> ShapeTensor<D> {
 /// Rotation of a family whose sums are a [`FamilyShare`]; none where its shape tensor is singular.
 pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
     let inverse = ShapeTensor::<D>::new(sums).inverse();
-    inverse.map_or(rotation::NONE, |inverse| {
+    inverse.map_or(rotation::IDENTITY, |inverse| {
         let gradient = from_rows::<D>(&sums[2 * D..]) * inverse;
         rotation::of_gradient(&(SMatrix::identity() + gradient))
     })

@@ -204,7 +204,7 @@ impl<const D: usize> Law<D> for Correspondence {
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;
     const SUM_READS_STRETCH: bool = false;
-    const FORCE_READS_SHORTENING: bool = false;
+    const FORCE_READS_EXTENSION: bool = false;
 
     #[inline(always)]
     fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {

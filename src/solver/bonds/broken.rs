@@ -1,7 +1,7 @@
 //! What comes of bonds that break.
 //!
 //! A bond breaks where the forces are summed, by what the force states of both ends say, and is not in
-//! these sums any more. LaneTuple of points that follow from sums over bonds, and the forces that follow
+//! these sums any more. Numbers of points that follow from sums over bonds, and the forces that follow
 //! from them, are then found anew: only at the points that a broken bond changes.
 
 use std::ops::Range;
@@ -11,7 +11,7 @@ use crate::comm::{self, Communicator};
 use crate::families::Which;
 use crate::solver::model::Model;
 
-use super::evaluate::{Acting, ForceTimes, News};
+use super::evaluate::{Acting, ForceTimes, HaloContent};
 use super::force::BondUpdate;
 use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
@@ -127,14 +127,14 @@ impl<const D: usize> Forces<D> {
         let before = self.held(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
             if pass != Pass::PointSum(0) {
-                self.update(News::OwnNumbers, Which::Owned, model, displacement);
+                self.update(HaloContent::OwnedOnly, Which::Owned, model, displacement);
             }
             self.clear(pass, points.clone());
             self.run(pass, points.clone(), force, BondUpdate::None);
             self.finish(pass, points.clone(), model, bond_update, plastic);
         }
         // Bonds read what lattices show of the points.
-        self.update(News::OwnNumbers, Which::Owned, model, displacement);
+        self.update(HaloContent::OwnedOnly, Which::Owned, model, displacement);
         let after = self.held(model, points.clone(), plastic);
         for broken in &mut self.broken {
             if points.contains(&broken.point) {
@@ -183,7 +183,7 @@ impl<const D: usize> Forces<D> {
         halo.update_ghosts(comm, &mut columns.collect::<Vec<_>>());
         self.halo = halo;
         times.halo += start.elapsed();
-        self.update(News::LaneTuple, Which::All, model, displacement);
+        self.update(HaloContent::PointNumbers, Which::All, model, displacement);
         let mut changed = own.clone();
         for interaction in &self.interactions {
             for point in &own {
@@ -192,7 +192,7 @@ impl<const D: usize> Forces<D> {
             }
         }
         changed.retain(|point| *point < owned);
-        // Who is bonded to a ghost only that knows itself.
+        // Bonds to ghosts are stored only at the owned point, so all border points are recomputed.
         if flags[owned..].iter().any(|flag| *flag > 0.0) {
             changed.extend(model.interior..owned);
         }

@@ -18,7 +18,7 @@ use super::force::{BondUpdate, Force};
 use super::list_points;
 use super::point_numbers::PlasticColumns;
 use super::point_sums::{PassSum, SmallestStretch};
-use super::sweep::{Source, sweep};
+use super::sweep::{PointData, sweep};
 use super::{Forces, Pass};
 
 /// Points handled by one task.
@@ -31,15 +31,15 @@ const PIECE: usize = 4096;
 /// Columns of [`Forces::changing_columns`] at most.
 const MOST_CHANGING: usize = MOST.point + 4;
 
-/// What a pass reads anew from other ranks.
+/// Point data that a pass receives from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum News {
+pub(super) enum HaloContent {
     Displacement,
     Thresholds,
-    LaneTuple,
-    /// LaneTuple again, but only those of the own ends.
-    OwnNumbers,
-    Nothing,
+    PointNumbers,
+    /// Nothing is sent; numbers of owned points are copied to the grids.
+    OwnedOnly,
+    None,
 }
 
 /// Where the time of a force evaluation went.
@@ -69,8 +69,8 @@ pub struct Acting<'a, const D: usize> {
 }
 
 impl<const D: usize> Forces<D> {
-    /// Brings the ghosts up to date and adds up the internal force densities. The bonds have been
-    /// [shown](Self::with_bond_inputs) the owned points. `bond_update` says what changes besides the forces; what
+    /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has written the owned
+    /// points. `bond_update` says what changes besides the forces; what
     /// comes of bonds that break is in [`Self::broken`]. Collective.
     pub fn evaluate(
         &mut self,
@@ -92,16 +92,16 @@ impl<const D: usize> Forces<D> {
         let mut in_bonds = Duration::ZERO;
         for turn in 0..self.passes.len() {
             let pass = self.passes[turn];
-            let news = self.news(turn);
+            let content = self.content(turn);
             let mut halo = std::mem::take(&mut self.halo);
-            match news {
-                News::Displacement => halo.pack(displacement.iter().map(Vec::as_slice)),
-                News::Thresholds => halo.pack([&self.limits.thresholds[..]].into_iter()),
-                News::LaneTuple => {
+            match content {
+                HaloContent::Displacement => halo.pack(displacement.iter().map(Vec::as_slice)),
+                HaloContent::Thresholds => halo.pack([&self.limits.thresholds[..]].into_iter()),
+                HaloContent::PointNumbers => {
                     let (columns, count) = self.changing_columns();
                     halo.pack(columns[..count].iter().map(|column| &**column));
                 }
-                News::OwnNumbers | News::Nothing => {}
+                HaloContent::OwnedOnly | HaloContent::None => {}
             }
             self.clear(pass, 0..owned);
             let mut timed = |work: &mut dyn FnMut()| {
@@ -110,7 +110,7 @@ impl<const D: usize> Forces<D> {
                 in_bonds += start.elapsed();
             };
             let mut interior = |progress: &mut dyn FnMut() -> bool| {
-                timed(&mut || self.update(news, Which::Owned, model, displacement));
+                timed(&mut || self.update(content, Which::Owned, model, displacement));
                 let mut rest = 0..model.interior;
                 // Once all messages have arrived the rest is done in one piece.
                 while rest.len() > piece && progress() {
@@ -121,25 +121,27 @@ impl<const D: usize> Forces<D> {
                 }
                 timed(&mut || self.run(pass, rest.clone(), force, bond_update));
             };
-            if matches!(news, News::OwnNumbers | News::Nothing) {
+            if matches!(content, HaloContent::OwnedOnly | HaloContent::None) {
                 interior(&mut || false);
             } else {
                 halo.exchange(comm, &mut interior);
             }
-            match news {
-                News::Displacement => {
+            match content {
+                HaloContent::Displacement => {
                     halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
                 }
-                News::Thresholds => halo.unpack([&mut self.limits.thresholds[..]].into_iter()),
-                News::LaneTuple => {
+                HaloContent::Thresholds => {
+                    halo.unpack([&mut self.limits.thresholds[..]].into_iter())
+                }
+                HaloContent::PointNumbers => {
                     let (columns, count) = self.changing_columns();
                     halo.unpack(columns.into_iter().take(count));
                 }
-                News::OwnNumbers | News::Nothing => {}
+                HaloContent::OwnedOnly | HaloContent::None => {}
             }
             self.halo = halo;
             let start = Instant::now();
-            self.update(news, Which::Ghosts, model, displacement);
+            self.update(content, Which::Ghosts, model, displacement);
             let border = model.interior..owned;
             self.run(pass, border, force, bond_update);
             self.finish(pass, 0..owned, model, bond_update, &mut plastic);
@@ -181,43 +183,46 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// What a pass reads anew from other ranks.
-    fn news(&self, turn: usize) -> News {
+    /// Point data that a pass receives from other ranks.
+    fn content(&self, turn: usize) -> HaloContent {
         match (
             turn.checked_sub(1).map(|before| self.passes[before]),
             self.passes[turn],
         ) {
-            (None, _) => News::Displacement,
-            (Some(Pass::SmallestStretch), _) => News::Thresholds,
-            (Some(Pass::PointSum(_)), Pass::Force) => News::LaneTuple,
-            (Some(Pass::PointSum(_)), _) => News::OwnNumbers,
-            _ => News::Nothing,
+            (None, _) => HaloContent::Displacement,
+            (Some(Pass::SmallestStretch), _) => HaloContent::Thresholds,
+            (Some(Pass::PointSum(_)), Pass::Force) => HaloContent::PointNumbers,
+            (Some(Pass::PointSum(_)), _) => HaloContent::OwnedOnly,
+            _ => HaloContent::None,
         }
     }
 
-    /// Shows the bonds what is new of some of the points; they have been shown the displacements of the owned ones.
+    /// Copy received data of points to where lattices and lists read it. Displacements of owned points are there already.
     pub(super) fn update(
         &mut self,
-        news: News,
+        content: HaloContent,
         which: Which,
         model: &Model<D>,
         displacement: &[Vec<f64>; D],
     ) {
         for grid in &mut self.grids {
-            match news {
-                News::Displacement if which == Which::Ghosts => grid.update_ghosts(displacement),
-                News::Displacement => {}
-                News::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
-                News::OwnNumbers if which == Which::Ghosts => {}
-                News::LaneTuple | News::OwnNumbers => {
+            match content {
+                HaloContent::Displacement if which == Which::Ghosts => {
+                    grid.update_ghosts(displacement)
+                }
+                HaloContent::Displacement => {}
+                HaloContent::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
+                HaloContent::OwnedOnly if which == Which::Ghosts => {}
+                HaloContent::PointNumbers | HaloContent::OwnedOnly => {
                     let first = self.numbers.first_changing;
                     grid.update_numbers(which, first, &self.numbers.columns);
                     grid.update_rotations(which, &self.limits.rotations);
                 }
-                News::Nothing => {}
+                HaloContent::None => {}
             }
         }
-        if news == News::Displacement && which == Which::Ghosts && !self.nodes.is_empty() {
+        if content == HaloContent::Displacement && which == Which::Ghosts && !self.nodes.is_empty()
+        {
             let owned = model.owned();
             let ghosts = self.nodes[owned..].par_chunks_mut(CHUNK).enumerate();
             ghosts.for_each(|(chunk, nodes)| {
@@ -230,7 +235,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Gets ready for a pass at some of the points.
+    /// Zero the sums of a pass over a range of points.
     pub(super) fn clear(&mut self, pass: Pass, points: Range<usize>) {
         match pass {
             Pass::SmallestStretch => self.limits.thresholds[points].fill(f64::INFINITY),
@@ -342,7 +347,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
     law: L,
     bond_update: BondUpdate,
     sums: &mut [Column],
-    source: Source<'_, D>,
+    source: PointData<'_, D>,
 ) {
     if number >= L::PASSES {
         return;

@@ -143,14 +143,14 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     type Rotation = <L::Force as ForceState<D>>::Rotation;
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const ISA_SET: IsaSet = L::ISA_SET;
-    const NEAR: bool = L::ISA_SET.is_each()
+    const HAS_FAST_PATH: bool = L::ISA_SET.is_each()
         && !L::LINEAR
         && L::BondHistory::COUNT == 0
-        && (L::FORCE_READS_STRETCH || L::FORCE_READS_SHORTENING);
+        && (L::FORCE_READS_STRETCH || L::FORCE_READS_EXTENSION);
     const WANTED: Wanted = Wanted {
         linear: L::LINEAR,
         stretch: L::FORCE_READS_STRETCH,
-        extension_over_deformed: L::FORCE_READS_SHORTENING,
+        extension_over_deformed: L::FORCE_READS_EXTENSION,
     };
 
     #[inline(always)]
@@ -182,12 +182,12 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     }
 
     #[inline(always)]
-    fn is_plain_near(&self) -> bool {
+    fn may_skip_criterion(&self) -> bool {
         self.criterion.marks_all(L::SCALED)
     }
 
     #[inline(always)]
-    fn add_near<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
+    fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
         let total = self.weighted(simd, group, group.weights);
         total.add(simd, &group.bond, group.volume, group.intact, force);
     }

@@ -80,13 +80,13 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Takes the truncation_factors of the local points.
+    /// Takes the truncation factors of the local points.
     pub fn update_truncation_factors(&mut self, values: &[f64]) {
         let places = &mut self.limits.truncation_factors;
         self.grid.update(Which::All, values, places);
     }
 
-    /// BondHistory, that of the grid included, bytes.
+    /// Memory, that of the grid included, bytes.
     pub fn bytes(&self) -> usize {
         let columns = self.displacement.iter().chain(&self.numbers);
         let count: usize = columns.map(|column| column.len()).sum();
@@ -147,9 +147,9 @@ impl<K: Kernel<D>, const D: usize> Clone for GridPoints<'_, K, D> {
 
 impl<K: Kernel<D>, const D: usize> Copy for GridPoints<'_, K, D> {}
 
-/// What is read of the own ends of bonds.
+/// Data of eight adjacent points i.
 #[derive(Clone, Copy)]
-pub struct OwnEnd<P, R, const D: usize> {
+pub struct PointI<P, R, const D: usize> {
     displacement: [Lanes; D],
     numbers: P,
     limits: Limits,
@@ -216,8 +216,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// As for [`Self::numbers`].
     #[inline(always)]
-    unsafe fn limits<const ONLY_NEAR: bool>(&self, place: usize) -> Limits {
-        if ONLY_NEAR {
+    unsafe fn limits<const FAST_PATH: bool>(&self, place: usize) -> Limits {
+        if FAST_PATH {
             return Limits::unread();
         }
         // SAFETY: `ReadLimits::new` has checked the lengths.
@@ -227,8 +227,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// As for [`Self::numbers`].
     #[inline(always)]
-    unsafe fn rotations<const ONLY_NEAR: bool>(&self, place: usize) -> K::Rotation {
-        if ONLY_NEAR {
+    unsafe fn rotations<const FAST_PATH: bool>(&self, place: usize) -> K::Rotation {
+        if FAST_PATH {
             return K::Rotation::splat(0.0);
         }
         // SAFETY: `ReadRotations::new` has checked the lengths.
@@ -240,10 +240,10 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// # Safety
     /// The place must be that of a vector of the grid.
     #[inline(always)]
-    pub unsafe fn here(&self, place: usize) -> OwnEnd<K::Point, K::Rotation, D> {
+    pub unsafe fn load_point_i(&self, place: usize) -> PointI<K::Point, K::Rotation, D> {
         // SAFETY: `new` has checked the lengths.
         unsafe {
-            OwnEnd {
+            PointI {
                 displacement: LaneTuple::each(|d| eight(self.displacement[d], place)),
                 numbers: self.numbers(place),
                 limits: self.limits::<false>(place),
@@ -252,16 +252,16 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// The bonds of a vector at one offset; with `ONLY_NEAR` less of those that are marked, nothing of what
+    /// The bonds of a vector at one offset; with `FAST_PATH` less of those that are marked, nothing of what
     /// makes bonds break.
     ///
     /// # Safety
     /// The vector must be one of the grid, the offset one of its.
     #[inline(always)]
-    pub unsafe fn load<'h, S: Simd, const ONLY_NEAR: bool>(
+    pub unsafe fn load<'h, S: Simd, const FAST_PATH: bool>(
         &self,
         simd: S,
-        here: &'h OwnEnd<K::Point, K::Rotation, D>,
+        here: &'h PointI<K::Point, K::Rotation, D>,
         vector: &mut VectorBonds<'_>,
         o: usize,
     ) -> Group<'h, K, D> {
@@ -274,8 +274,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             (
                 displacement,
                 self.far_numbers(far),
-                self.limits::<ONLY_NEAR>(far),
-                self.rotations::<ONLY_NEAR>(far),
+                self.limits::<FAST_PATH>(far),
+                self.rotations::<FAST_PATH>(far),
             )
         };
         let eta = LaneTuple::each(|d: usize| displacement[d] - here.displacement[d]);
@@ -287,7 +287,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         };
         let intact = vector.groups.intact[o];
         Group {
-            bond: deform::<_, ONLY_NEAR, D>(
+            bond: deform::<_, FAST_PATH, D>(
                 simd,
                 &reference,
                 eta,
@@ -312,7 +312,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             intact,
             whole: 0,
             breakable: match vector.groups.breakable {
-                Some(bits) if !ONLY_NEAR => bits[o],
+                Some(bits) if !FAST_PATH => bits[o],
                 _ => u8::MAX,
             },
         }

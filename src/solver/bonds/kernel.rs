@@ -1,53 +1,53 @@
-//! What is summed over the bonds of points: forces, numbers of points, energies.
+//! Sums over the bonds of points: forces, numbers of points, energies.
 //!
-//! A kernel sees eight bonds at a time and adds to eight sums. It is written once for any dimension,
-//! law and storage: the bonds may be those of one point or those of eight.
+//! A kernel adds eight bonds at a time to eight lanes of each sum. It is written once for all dimensions, laws and
+//! storages: the eight bonds are those of one point (lists) or of eight points (lattices).
 
 use crate::damage::{Criterion, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::Bond;
 use crate::material::bond::{Wanted, Weights};
 
-/// Eight bonds: what is read of both ends, and what is kept of the bonds.
+/// Eight bonds ij with the data of both points and their history.
 pub struct Group<'a, K: Kernel<D>, const D: usize> {
-    /// What laws see.
+    /// Geometry, as laws read it.
     pub bond: Bond<D>,
-    /// Volumes of the own ends, m³.
+    /// Volumes of points i, m³.
     pub own_volume: Lanes,
-    /// Volumes of the far ends, m³.
+    /// Volumes of points j, m³.
     pub volume: Lanes,
-    /// What volumes are multiplied by.
+    /// Influence or volume share of the bonds at each end.
     pub weights: Weights,
-    /// The numbers of the own ends.
+    /// Numbers of points i.
     pub own: &'a K::Point,
-    /// The numbers of the far ends.
+    /// Numbers of points j.
     pub far: K::Point,
-    /// What the criterion reads of points i.
+    /// Thresholds and truncation factors of points i.
     pub limits_i: &'a Limits,
-    /// What the criterion reads of points j.
+    /// Thresholds and truncation factors of points j.
     pub limits_j: Limits,
     /// Rotations of the families of points i.
     pub rotation_i: &'a K::Rotation,
     /// Rotations of the families of points j.
     pub rotation_j: K::Rotation,
-    /// What the bonds keep for their own and their far ends.
+    /// Bond history for point i and for point j.
     pub history: [K::BondHistory; 2],
     /// A bit for each bond that is intact.
     pub intact: u8,
-    /// A bit for each bond, broken or not; only for kernels that want it.
+    /// A bit for each bond, broken or not; only with [`Kernel::READS_BROKEN`].
     pub whole: u8,
     /// A bit for each bond that can break.
     pub breakable: u8,
 }
 
 impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
-    /// The numbers of both ends.
+    /// Numbers of points i and j.
     #[inline(always)]
     pub fn points(&self) -> [&K::Point; 2] {
         [self.own, &self.far]
     }
 
-    /// A bit for each intact bond that counts in the own end's sums.
+    /// A bit for each intact bond within the horizon of point i.
     #[inline(always)]
     pub fn family(&self) -> u8 {
         match self.weights {
@@ -56,9 +56,9 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
         }
     }
 
-    /// A share in the sums of the own end, by volume.
+    /// Multiply by V_j and the weight of point i.
     #[inline(always)]
-    pub fn own_share(&self, share: Lanes) -> Lanes {
+    pub fn weighted_by_volume(&self, share: Lanes) -> Lanes {
         let share = share * self.volume;
         match self.weights {
             Weights::One => share,
@@ -67,60 +67,59 @@ impl<K: Kernel<D>, const D: usize> Group<'_, K, D> {
     }
 }
 
-/// How the lanes of a sum become a number of a point.
+/// Reduction of the lanes of a sum to the number of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Combine {
-    /// They are added.
+    /// Sum.
     Add,
-    /// The smallest counts.
+    /// Minimum.
     Smallest,
 }
 
-/// Something that is summed over the bonds of points.
+/// A sum over the bonds of points.
 pub trait Kernel<const D: usize>: Copy + Sync {
-    /// Eight sums of each quantity; each is added to a column of numbers of the points.
+    /// Sums, eight lanes per quantity. Each quantity is added to one column of the points.
     type Sums: LaneTuple;
 
-    /// Eight sums of each quantity to which only bonds add that break; they are told by point, where
-    /// there are any.
+    /// Sums over the bonds that break in this sweep, eight lanes per quantity. They are returned per point, only for points
+    /// with such bonds.
     type Broken: LaneTuple;
 
-    /// The numbers of the ends that it reads.
+    /// Numbers of points i and j that it reads.
     type Point: LaneTuple;
 
-    /// The numbers of the bonds that it reads.
+    /// Bond history that it reads.
     type BondHistory: LaneTuple;
 
-    /// The rotations of the ends, if its criterion can read them.
+    /// Rotations of points i and j, if its criterion can read them.
     type Rotation: LaneTuple;
 
-    /// Whether there are bonds for it in `D` dimensions; else no loops are compiled.
+    /// Implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
 
-    /// How its sums become numbers.
+    /// Reduction of its sums.
     const COMBINE: Combine = Combine::Add;
 
-    /// For which vector instructions its loops are compiled. One that runs for outputs only takes longer to compile
-    /// than it could save.
+    /// Instruction sets for which its loops are compiled. For outputs one is enough.
     const ISA_SET: IsaSet = IsaSet::One;
 
-    /// Whether it is worth a loop for bonds none of which is marked.
-    const NEAR: bool = false;
+    /// Compile a second loop for vectors whose bonds all stay within the series limit.
+    const HAS_FAST_PATH: bool = false;
 
-    /// Whether it wants to know of broken bonds.
-    const WHOLE: bool = false;
+    /// Load the bits of all bonds, broken ones included.
+    const READS_BROKEN: bool = false;
 
-    /// Whether its sums may follow from where points lie undeformed and which bonds are intact, and it neither breaks nor
-    /// changes any: in a lattice they are then found once for all points that are alike in that.
+    /// Sums can depend on reference positions and intact bits alone. A lattice then caches them per bit pattern. Such a
+    /// kernel must not break or change bonds.
     const UNDEFORMED: bool = false;
 
-    /// Whether it reads the numbers of the far ends; else they are 0.
+    /// Load the numbers of points j; otherwise they are 0.
     const READS_FAR: bool = true;
 
-    /// What it wants to know of deformed bonds.
+    /// Quantities of the deformed bonds to compute.
     const WANTED: Wanted;
 
-    /// Whether the law of its bonds is known at run time only, and with it whether bonds are linear.
+    /// The law, and so whether bonds are linear, is known at run time only.
     const ANY_LAW: bool = false;
 
     /// Whether bonds are those of a linear law, see [`Bond`].
@@ -145,42 +144,43 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::UNDEFORMED
     }
 
-    /// When it breaks bonds: what it needs of them for that is found.
+    /// Failure criterion. The sweep loads only the columns it reads.
     #[inline(always)]
     fn criterion(&self) -> Criterion {
         Criterion::Never
     }
 
-    /// Whether it changes what bonds keep.
+    /// The bond history is written back.
     #[inline(always)]
     fn stores_history(&self) -> bool {
         false
     }
 
-    /// The sums over no bond.
+    /// Initial value of the sums.
     #[inline(always)]
     fn start(&self) -> Self::Sums {
         Self::Sums::splat(0.0)
     }
 
-    /// Adds eight bonds but for those that break, whose bits it clears; may change what bonds keep.
+    /// Add eight bonds, except those that break: their intact bits are cleared. May change the bond history.
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
 
-    /// Whether no bond breaks or remembers but marked ones; only asked with [`Self::NEAR`].
+    /// Bonds within the series limit can neither break nor change their history, so [`Self::add_fast`] may skip the
+    /// criterion.
     #[inline(always)]
-    fn is_plain_near(&self) -> bool {
+    fn may_skip_criterion(&self) -> bool {
         true
     }
 
-    /// Adds eight bonds none of which is marked, if [`Self::is_plain_near`].
+    /// Add eight bonds that are all within the series limit, if [`Self::may_skip_criterion`].
     #[inline(always)]
-    fn add_near<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
+    fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
         self.add(simd, group, sums);
     }
 
-    /// Clears the bits of those of eight bonds that break, and adds them. Groups come here after
-    /// [`Self::add`], if it has broken any bond of the same point or vector: what is rarely done takes no
-    /// registers from the loop.
+    /// Clear the intact bits of breaking bonds and add these bonds to `broken`. A second loop over the bonds of a point or
+    /// vector calls it if [`Self::add`] broke one; out of line to save registers. The bits that [`Self::add`] cleared
+    /// are a copy.
     fn add_broken<S: Simd>(
         &self,
         _simd: S,

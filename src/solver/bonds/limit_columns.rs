@@ -2,7 +2,7 @@
 
 use crate::damage::{Criterion, DamageLaw, Limits};
 use crate::lanes::{Column, LaneTuple, Lanes};
-use crate::material::rotation::NONE;
+use crate::material::rotation::IDENTITY;
 
 use super::interaction::BlockLaws;
 
@@ -35,22 +35,23 @@ impl LimitsRead {
 
 /// [`Limits`] by column; one that no criterion reads is empty.
 pub struct LimitColumns {
-    /// Of the local points, or by place of a grid.
+    /// Failure thresholds, indexed by local point (lists) or grid slot (lattices).
     pub thresholds: Column,
-    /// As above.
+    /// Truncation factors, likewise.
     pub truncation_factors: Column,
     /// By component; in the plane q_z and q₀ alone are stored.
     pub rotations: [Column; 4],
 }
 
 impl LimitColumns {
-    /// The columns that are read, for so many points in `D` dimensions; `number` others are read with them.
+    /// Allocate the columns in `read` for `count` points. `number` is the index of the first column among those that loops
+    /// read together, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
             rotations: std::array::from_fn(|k| {
                 let is_read = read.rotations && k >= first_component::<D>();
-                of(number + 2 + k, is_read, NONE[k])
+                of(number + 2 + k, is_read, IDENTITY[k])
             }),
             thresholds: of(number, read.thresholds, 0.0),
             truncation_factors: of(number + 1, read.truncation_factors, 1.0),
@@ -94,7 +95,10 @@ impl<'a> ReadLimits<'a> {
             reads.then_some(&column[..])
         };
         let thresholds = read(criterion.reads_thresholds(), &columns.thresholds);
-        let truncation_factors = read(criterion.reads_overloads(), &columns.truncation_factors);
+        let truncation_factors = read(
+            criterion.reads_truncation_factors(),
+            &columns.truncation_factors,
+        );
         Self {
             thresholds,
             truncation_factors,

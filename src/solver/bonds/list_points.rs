@@ -31,7 +31,7 @@ pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
     (0..model.volume.len()).map(node).collect()
 }
 
-/// Brings the displacements of some points up to date.
+/// Copy displacements into the nodes.
 pub fn update<const D: usize>(nodes: &mut [Node], displacement: [&[f64]; D]) {
     for (k, node) in nodes.iter_mut().enumerate() {
         for d in 0..D {
@@ -58,9 +58,9 @@ impl<K: Kernel<D>, const D: usize> Clone for ListPoints<'_, K, D> {
 
 impl<K: Kernel<D>, const D: usize> Copy for ListPoints<'_, K, D> {}
 
-/// What is read of the own end of bonds.
+/// Data of point i, the same in all lanes.
 #[derive(Clone, Copy)]
-pub struct OwnEnd<P, R, const D: usize> {
+pub struct PointI<P, R, const D: usize> {
     reference: [Lanes; D],
     displacement: [Lanes; D],
     volume: Lanes,
@@ -70,7 +70,7 @@ pub struct OwnEnd<P, R, const D: usize> {
 }
 
 impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
-    /// For a kernel that reads the points of a list below a local index.
+    /// For a kernel that reads the points with local index below `reach`.
     ///
     /// # Panics
     /// When an array that the kernel reads does not reach so far.
@@ -141,12 +141,12 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         (self.rotations).eight::<D>(|column| unsafe { gather(column, indices) })
     }
 
-    /// The own end of a point's bonds.
+    /// Load point i.
     ///
     /// # Safety
     /// The point must be below the reach.
     #[inline(always)]
-    pub unsafe fn here(&self, point: usize) -> OwnEnd<K::Point, K::Rotation, D> {
+    pub unsafe fn load_point_i(&self, point: usize) -> PointI<K::Point, K::Rotation, D> {
         debug_assert!(point < self.nodes.len());
         let own = [point as u32; 8];
         // SAFETY: `new` has checked the lengths.
@@ -158,7 +158,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
                 self.rotations(&own),
             )
         };
-        OwnEnd {
+        PointI {
             reference: LaneTuple::each(|d| Lanes::splat(node[d])),
             displacement: LaneTuple::each(|d| Lanes::splat(node[DISPLACEMENT + d])),
             volume: Lanes::splat(node[VOLUME]),
@@ -176,7 +176,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     pub unsafe fn load<'h, S: Simd>(
         &self,
         simd: S,
-        here: &'h OwnEnd<K::Point, K::Rotation, D>,
+        here: &'h PointI<K::Point, K::Rotation, D>,
         row: &mut Row<'_>,
         group: usize,
     ) -> Group<'h, K, D> {
@@ -194,7 +194,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         for component in &xi[1..] {
             square = simd.multiply_add(*component, *component, square);
         }
-        // In this order the root waits for nothing but the quotient, and the stretch not for the root.
+        // 1/|ξ|² first: x needs the quotient only, so the root is off its dependency chain.
         let inverse_square = Lanes::splat(1.0) / square;
         let inverse = inverse_square.sqrt();
         let reference = Reference {
@@ -231,7 +231,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             rotation_i: &here.rotation,
             rotation_j: rotation,
             history: load_history::<K::BondHistory>(&mut row.groups, group),
-            whole: if K::WHOLE { row.whole(group) } else { 0 },
+            whole: if K::READS_BROKEN { row.whole(group) } else { 0 },
             intact,
             breakable: row.groups.breakable.map_or(u8::MAX, |bits| bits[group]),
         }

@@ -13,7 +13,7 @@ use super::Forces;
 use super::interaction::Interaction;
 use super::kernel::Kernel;
 use super::measures;
-use super::sweep::{Source, sweep, sweep_from};
+use super::sweep::{PointData, sweep, sweep_from};
 
 /// What the bonds of the owned points hold, by column over the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ impl<const D: usize> Forces<D> {
         &mut self,
         owned: usize,
         columns: usize,
-        mut sweep: impl FnMut(&mut Interaction, &mut [Vec<f64>], Source<'_, D>),
+        mut sweep: impl FnMut(&mut Interaction, &mut [Vec<f64>], PointData<'_, D>),
     ) -> Vec<Vec<f64>> {
         let mut sums = vec![vec![0.0; owned]; columns];
         self.for_each_interaction(|interaction, source| sweep(interaction, &mut sums, source));
@@ -236,7 +236,7 @@ pub(super) fn sweep_all<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     sums: &mut [Vec<f64>],
     kernel: &K,
-    source: Source<'_, D>,
+    source: PointData<'_, D>,
 ) {
     let owned = sums.first().map_or(0, Vec::len);
     let results = K::Sums::columns_mut(sums);

@@ -6,7 +6,7 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, FamilyShare, Law, family_sha
 
 use super::kernel::{Group, Kernel};
 
-/// All of the bonds: these loops are not those of every step.
+/// Compute every bond quantity; these kernels are not in the step loop.
 const fn wanted(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -15,10 +15,11 @@ const fn wanted(linear: bool) -> Wanted {
     }
 }
 
-/// Sums what the intact bonds of a point hold: strain energy density (J/m³) that belongs to single
-/// bonds, volume of the neighbours in the point's own family (m³), and the number of neighbours,
-/// those included that have the point in their family only; then what all bonds have dissipated
-/// without breaking (J/m³).
+/// Sums of a point, by index:
+/// 0. strain energy density of its intact bonds, J/m³;
+/// 1. volume of the intact neighbours within its horizon, m³;
+/// 2. number of intact bonds, those beyond its own horizon included;
+/// 3. energy density that all bonds have dissipated without breaking, J/m³.
 #[derive(Clone, Copy)]
 pub struct Stored {
     /// The law of point i.
@@ -33,7 +34,7 @@ impl<const D: usize> Kernel<D> for Stored {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;
     type Rotation = [Lanes; 0];
-    const WHOLE: bool = true;
+    const READS_BROKEN: bool = true;
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = Wanted {
@@ -49,13 +50,13 @@ impl<const D: usize> Kernel<D> for Stored {
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
         let (family, own) = (group.family(), group.own);
         let energy = self.law.bond_energy(&group.bond, own, &group.history[0]);
-        let energy = simd.whole(group.own_share(energy));
+        let energy = simd.whole(group.weighted_by_volume(energy));
         sums[0] += simd.keep(energy, family);
         sums[1] += simd.keep(group.volume, family);
         sums[2] += simd.keep(Lanes::splat(1.0), group.intact);
         if self.keeps_history {
             let dissipated = Law::<D>::dissipated(&self.law, group.bond.length, &group.history[0]);
-            sums[3] += simd.keep(group.own_share(dissipated), group.whole);
+            sums[3] += simd.keep(group.weighted_by_volume(dissipated), group.whole);
         }
     }
 }
@@ -135,7 +136,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
         let xi = &group.bond.reference;
         let own = Law::<D>::stiffness(&self.laws[0], length, group.own) * group.weights.own();
         let far = Law::<D>::stiffness(&self.laws[1], length, &group.far) * group.weights.far();
-        // Either all of a spring or the share along the bond.
+        // A law with `resists_across` has springs k I, another one k n⊗n.
         let [own_across, far_across] = self.laws.map(|law| Law::<D>::resists_across(&law));
         let none = Lanes::splat(0.0);
         let sum = |across: bool| {
@@ -209,7 +210,7 @@ impl<const D: usize> Kernel<D> for StressAcross {
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
         let stress = self.law.bond_stress_across(&group.bond, group.own);
-        sums[0] += simd.keep(group.own_share(stress), group.intact);
+        sums[0] += simd.keep(group.weighted_by_volume(stress), group.intact);
     }
 }
 
@@ -228,7 +229,7 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
-        let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
+        let weight = simd.keep(group.weighted_by_volume(Lanes::splat(1.0)), group.intact);
         let share = family_share(&group.bond);
         for k in 0..FamilyShare::<D>::COUNT {
             let sum = sums.get_mut(k);
@@ -251,7 +252,7 @@ impl<const D: usize> Kernel<D> for Dilatation {
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    const WHOLE: bool = true;
+    const READS_BROKEN: bool = true;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = wanted(false);
 

@@ -41,7 +41,7 @@ use list_points::Node;
 use measure::sweep_all;
 use point_numbers::PointNumbers;
 use point_sums::FamilySum;
-use sweep::Source;
+use sweep::PointData;
 
 pub use bond_inputs::BondInputs;
 pub use broken::Broken;
@@ -209,8 +209,8 @@ impl<const D: usize> Forces<D> {
     }
 
     /// Calls `work` for all bonds between two blocks after one another.
-    fn for_each_interaction(&mut self, mut work: impl FnMut(&mut Interaction, Source<'_, D>)) {
-        let source = Source {
+    fn for_each_interaction(&mut self, mut work: impl FnMut(&mut Interaction, PointData<'_, D>)) {
+        let source = PointData {
             nodes: &self.nodes,
             // Those beyond belong to owned points alone.
             numbers: &self.numbers.columns[..self.numbers.read],
@@ -243,7 +243,7 @@ impl<const D: usize> Forces<D> {
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))
     }
 
-    /// BondHistory of the bonds and of what they read of the points, bytes.
+    /// Memory of the bonds and of what they read of the points, bytes.
     pub fn bytes(&self) -> usize {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
         let grids: usize = self.grids.iter().map(GridValues::bytes).sum();
@@ -314,7 +314,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Brings the entries of ghosts from their owners.
+    /// Exchange the ghost values of a column. Collective.
     pub fn bring(&mut self, comm: &dyn Communicator, values: &mut [f64]) {
         self.halo.update_ghosts(comm, &mut [values]);
     }

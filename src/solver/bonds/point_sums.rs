@@ -8,7 +8,7 @@ use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
 /// Neither stretches nor forces.
-const fn growth_only(linear: bool) -> Wanted {
+const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,
         stretch: false,
@@ -33,7 +33,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     type Rotation = [Lanes; 0];
     const EXISTS: bool = D >= L::LEAST_DIMENSION;
     const ISA_SET: IsaSet = L::ISA_SET;
-    const NEAR: bool =
+    const HAS_FAST_PATH: bool =
         L::ISA_SET.is_each() && !L::LINEAR && L::BondHistory::COUNT == 0 && L::SUM_READS_STRETCH;
     const READS_FAR: bool = false;
     const WANTED: Wanted = Wanted {
@@ -54,7 +54,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
         let share = self
             .law
             .pass_contribution::<N>(&group.bond, group.own, &history);
-        let weight = simd.keep(group.own_share(Lanes::splat(1.0)), group.intact);
+        let weight = simd.keep(group.weighted_by_volume(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
             // Length, stretch and direction of a bond that only fills up a group are not numbers.
             let share = if L::SUM_READS_STRETCH || L::SUM_READS_DIRECTION {
@@ -83,11 +83,11 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    const WHOLE: bool = true;
+    const READS_BROKEN: bool = true;
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const UNDEFORMED: bool = true;
     const ANY_LAW: bool = true;
-    const WANTED: Wanted = growth_only(false);
+    const WANTED: Wanted = extension_only(false);
 
     fn is_linear(&self) -> bool {
         self.law.is_linear::<D>()
@@ -126,7 +126,7 @@ impl<const D: usize> Kernel<D> for SmallestStretch {
     type Rotation = [Lanes; 0];
     const COMBINE: Combine = Combine::Smallest;
     const ISA_SET: IsaSet = IsaSet::Each;
-    const WANTED: Wanted = growth_only(false);
+    const WANTED: Wanted = extension_only(false);
 
     #[inline(always)]
     fn start(&self) -> [Lanes; 1] {

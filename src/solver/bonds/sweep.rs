@@ -24,38 +24,38 @@ const LEAF: usize = 2048;
 /// As [`LEAF`], where the sums of one vector serve others of its task.
 const UNDEFORMED_LEAF: usize = 128 * LEAF;
 
-/// So many different families are known at once; at curved surfaces there are many, which do not come again.
-const MOST_KNOWN: usize = 256;
+/// Cached bit patterns per task. Curved surfaces have many that never recur, so a full cache is cleared.
+const CACHE_CAPACITY: usize = 256;
 
-/// What kernels read of the points.
+/// Point data that kernels read.
 #[derive(Clone, Copy)]
-pub struct Source<'a, const D: usize> {
-    /// Geometry for lists; empty where there is no list.
+pub struct PointData<'a, const D: usize> {
+    /// Packed positions, displacements and volumes for lists; empty without lists.
     pub nodes: &'a [Node],
-    /// LaneTuple of the points by column, for lists.
+    /// Numbers of the points by column, for lists.
     pub numbers: &'a [Column],
-    /// What criteria read of the points, for lists.
+    /// Thresholds, truncation factors and rotations, for lists.
     pub limits: &'a LimitColumns,
-    /// For lattices, by grid.
+    /// All of these for lattices, by grid.
     pub grids: &'a [GridValues<D>],
-    /// What to run on.
+    /// Instruction set.
     pub instructions: Instructions,
 }
 
 /// The columns of numbers of the points that a kernel adds to.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
-/// What a kernel sums over the bonds of a point that break.
+/// Sums over the bonds of a point that break in a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct BrokenSums {
     /// Its local index.
     pub point: usize,
-    /// The sums; those that a kernel does not have are 0.
-    pub sums: [f64; MOST_BROKEN],
+    /// The sums; missing quantities are 0.
+    pub sums: [f64; MAX_BROKEN_SUMS],
 }
 
 /// The most quantities of [`Kernel::Broken`].
-pub const MOST_BROKEN: usize = 6;
+pub const MAX_BROKEN_SUMS: usize = 6;
 
 /// Part of the bonds of two blocks.
 trait Part: Sized + Send {
@@ -96,7 +96,7 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
     points: Range<usize>,
     results: Results<'_, K, D>,
     kernel: &K,
-    source: Source<'_, D>,
+    source: PointData<'_, D>,
 ) -> Vec<BrokenSums> {
     sweep_from(bonds, points, 0, results, kernel, source)
 }
@@ -108,22 +108,22 @@ pub fn sweep_from<K: Kernel<D>, const D: usize>(
     base: usize,
     results: Results<'_, K, D>,
     kernel: &K,
-    source: Source<'_, D>,
+    source: PointData<'_, D>,
 ) -> Vec<BrokenSums> {
     if const { K::EXISTS } {
-        sweep_there(bonds, points, base, results, kernel, source)
+        sweep_blocks(bonds, points, base, results, kernel, source)
     } else {
-        unreachable!("bonds of a law that is not there in {D} dimensions")
+        unreachable!("the kernel is not implemented in {D} dimensions")
     }
 }
 
-fn sweep_there<K: Kernel<D>, const D: usize>(
+fn sweep_blocks<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
     base: usize,
     results: Results<'_, K, D>,
     kernel: &K,
-    source: Source<'_, D>,
+    source: PointData<'_, D>,
 ) -> Vec<BrokenSums> {
     let instructions = source.instructions;
     let several = rayon::current_num_threads() > 1;
@@ -136,7 +136,7 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
     };
     match bonds {
         BlockBonds::List(list) => {
-            let Source {
+            let PointData {
                 nodes,
                 numbers,
                 limits,
@@ -150,7 +150,7 @@ fn sweep_there<K: Kernel<D>, const D: usize>(
         }
         BlockBonds::Lattice(lattice) => {
             let vectors = lattice.vectors_below(points.start)..lattice.vectors_below(points.end);
-            let whole = if K::WHOLE {
+            let whole = if K::READS_BROKEN {
                 lattice.whole()
             } else {
                 Vec::new()
@@ -313,7 +313,7 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
 
 /// The sums over bonds that break, 0 for those that a kernel does not have.
 #[inline(always)]
-fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MOST_BROKEN] {
+fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MAX_BROKEN_SUMS] {
     LaneTuple::each(|k| {
         if k < N::COUNT {
             broken.get(k)
@@ -326,7 +326,7 @@ fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MOST_BROKEN] {
 /// Notes what comes of the bonds of a point that break.
 #[cold]
 #[inline(never)]
-fn note_point(broken_sums: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; MOST_BROKEN]) {
+fn note_point(broken_sums: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; MAX_BROKEN_SUMS]) {
     let sums = broken.map(Lanes::sum);
     broken_sums.push(BrokenSums { point, sums });
 }
@@ -334,7 +334,7 @@ fn note_point(broken_sums: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; 
 /// Notes what comes of the bonds of eight adjacent points that break.
 #[cold]
 #[inline(never)]
-fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MOST_BROKEN]) {
+fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MAX_BROKEN_SUMS]) {
     for lane in 0..WIDTH {
         let sums = broken.map(|lanes| lanes.0[lane]);
         if sums[0] > 0.0 {
@@ -344,47 +344,45 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
     }
 }
 
-/// After a vector with marked bonds so many are not tried without: those around it mostly have some too.
-const PATIENCE: usize = 7;
+/// Vectors that skip the fast path after a failed attempt: large strains cluster.
+const FAST_PATH_BACKOFF: usize = 7;
 
-/// Which loop the next vector goes through. In lists a loop of its own gains nothing: there the time goes into
-/// fetching the far ends.
+/// Choice of the loop for the next vector. Lists have no fast path: there, loading points j takes the time.
 struct FastPathGate {
-    /// Whether there is a loop for vectors without marked bonds.
+    /// The fast path is allowed.
     near: bool,
-    /// How many are not to be tried by it.
+    /// Vectors left that skip it.
     waiting: usize,
 }
 
 impl FastPathGate {
     fn new<K: Kernel<D>, const D: usize>(kernel: &K) -> Self {
         Self {
-            near: kernel.is_plain_near(),
+            near: kernel.may_skip_criterion(),
             waiting: 0,
         }
     }
 
-    /// The sums over the bonds of a vector and the bits of those that break: by the loop without marked bonds where that
-    /// is worth a try.
+    /// Sums over the bonds of a vector and the bits of those that break.
     ///
     /// # Safety
-    /// As for [`near_vector`].
+    /// As for [`fast_vector`].
     #[inline(always)]
     unsafe fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
         simd: S,
         task: WholeVector<'_, '_, '_, K, D>,
     ) -> (K::Sums, u8) {
-        if const { !K::NEAR } {
+        if const { !K::HAS_FAST_PATH } {
             return task.run(simd);
         }
         if self.near && self.waiting == 0 {
             // SAFETY: passed on to the caller.
-            let sums = unsafe { near_vector(simd, task.kernel, task.points, task.vector) };
+            let sums = unsafe { fast_vector(simd, task.kernel, task.points, task.vector) };
             if let Some(sums) = sums {
                 return (sums, 0);
             }
-            self.waiting = PATIENCE;
+            self.waiting = FAST_PATH_BACKOFF;
         } else {
             self.waiting = self.waiting.saturating_sub(1);
         }
@@ -392,26 +390,25 @@ impl FastPathGate {
     }
 }
 
-/// The sums over the bonds of vectors by which of these are intact, for kernels of the
-/// [undeformed](Kernel::UNDEFORMED).
+/// Cache of the sums over the bonds of a vector by their intact bits, for [undeformed](Kernel::UNDEFORMED) kernels.
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
 impl<N: LaneTuple> Known<N> {
     /// Stores the sums of a vector.
     fn insert(&mut self, vector: &VectorBonds<'_>, sums: N) {
-        if self.0.len() == MOST_KNOWN {
+        if self.0.len() == CACHE_CAPACITY {
             self.0.clear();
         }
         self.0.insert(Box::from(&*vector.groups.intact), sums);
     }
 }
 
-/// The sums over the bonds of a vector; nothing if one is marked.
+/// Sums over the bonds of a vector; `None` if one is beyond the series limit.
 ///
 /// # Safety
 /// The vector must be one of the grid that `points` was made for.
 #[inline(always)]
-unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
+unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     simd: S,
     kernel: K,
     points: GridPoints<'_, K, D>,
@@ -419,14 +416,14 @@ unsafe fn near_vector<K: Kernel<D>, S: Simd, const D: usize>(
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
     // SAFETY: passed on to the caller.
-    let here = unsafe { points.here(vector.slot) };
+    let here = unsafe { points.load_point_i(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
         let mut bonds = unsafe { points.load::<S, true>(simd, &here, vector, o) };
         if bonds.bond.beyond_series != 0 {
             return None;
         }
-        kernel.add_near(simd, &mut bonds, &mut sums);
+        kernel.add_fast(simd, &mut bonds, &mut sums);
     }
     Some(sums)
 }
@@ -450,11 +447,11 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
         let mut sums = kernel.start();
         let mut gone = 0;
         // SAFETY: `points` was made for the grid of the vector.
-        let own = unsafe { points.here(vector.slot) };
+        let own = unsafe { points.load_point_i(vector.slot) };
         for o in 0..vector.offsets.len() {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
-            if K::WHOLE {
+            if K::READS_BROKEN {
                 bonds.whole = self.whole.map_or(0, |bits| bits[o]);
             }
             let before = bonds.intact;
@@ -477,14 +474,14 @@ struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
 }
 
 impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
-    type Output = [Lanes; MOST_BROKEN];
+    type Output = [Lanes; MAX_BROKEN_SUMS];
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (kernel, points, vector) = (self.kernel, self.points, self.vector);
         let mut broken = K::Broken::splat(0.0);
         // SAFETY: `points` was made for the grid of the vector.
-        let own = unsafe { points.here(vector.slot) };
+        let own = unsafe { points.load_point_i(vector.slot) };
         for o in 0..vector.offsets.len() {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load::<S, false>(simd, &own, vector, o) };
@@ -504,14 +501,14 @@ struct BrokenOfRow<'t, 'r, 'p, K: Kernel<D>, const D: usize> {
 }
 
 impl<K: Kernel<D>, const D: usize> Task for BrokenOfRow<'_, '_, '_, K, D> {
-    type Output = [Lanes; MOST_BROKEN];
+    type Output = [Lanes; MAX_BROKEN_SUMS];
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let (kernel, points, row) = (self.kernel, self.points, self.row);
         let mut broken = K::Broken::splat(0.0);
         // SAFETY: `points` was made for the list of the row.
-        let own = unsafe { points.here(row.point) };
+        let own = unsafe { points.load_point_i(row.point) };
         for group in 0..row.neighbours.len() {
             // SAFETY: as above.
             let mut bonds = unsafe { points.load(simd, &own, row, group) };
@@ -546,7 +543,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
             let mut sums = kernel.start();
             let mut gone = 0;
             // SAFETY: the rows are those of the list whose reach `points` was made for.
-            let here = unsafe { points.here(row.point) };
+            let here = unsafe { points.load_point_i(row.point) };
             for group in 0..row.neighbours.len() {
                 // SAFETY: as above.
                 let mut bonds = unsafe { points.load(simd, &here, &mut row, group) };

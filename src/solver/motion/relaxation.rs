@@ -190,7 +190,7 @@ impl<const D: usize> Simulation<'_, D> {
         } else {
             Some(self.drift())
         };
-        self.evaluate(self.standing_evolution());
+        self.evaluate(self.bond_update_at_rest());
         self.apply_velocities();
         self.look(before);
         let forces = self.times.forces.whole() - forces;
@@ -354,7 +354,7 @@ impl<const D: usize> Simulation<'_, D> {
 
     /// How forces follow from the present place without a change of the state: during a load step from the history that
     /// bonds would have if this were its equilibrium.
-    pub(in crate::solver) fn standing_evolution(&self) -> BondUpdate {
+    pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
         if self.load_step.is_settled {
             BondUpdate::None
         } else {
@@ -379,7 +379,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.load_step.has_broken = true;
             self.load_step.since_breaking = 0;
             self.stop();
-            self.evaluate(self.standing_evolution());
+            self.evaluate(self.bond_update_at_rest());
             self.apply_velocities();
             self.look(None);
             return;

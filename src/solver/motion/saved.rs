@@ -76,7 +76,7 @@ impl<const D: usize> Simulation<'_, D> {
         fields.flat_map(|(_, columns)| columns)
     }
 
-    /// LaneTuple that are saved a point; the same on all ranks.
+    /// Numbers that are saved a point; the same on all ranks.
     pub fn saved_width(&self) -> usize {
         self.state().count()
     }

@@ -36,7 +36,7 @@ pub struct Part<'a, const D: usize> {
     pub external_work: Option<Columns<'a, 1>>,
     /// As [`Fields::damping_power`] and [`Fields::damped_energy`].
     pub damping: Option<Columns<'a, 2>>,
-    shown: BondInputs<'a, D>,
+    bond_inputs: BondInputs<'a, D>,
 }
 
 /// A component of the motion of some points, and what moves them.
@@ -53,7 +53,11 @@ pub struct Moving<'a> {
 
 impl<'a, const D: usize> Part<'a, D> {
     /// All owned points.
-    pub fn all(model: &'a Model<D>, fields: &'a mut Fields<D>, shown: BondInputs<'a, D>) -> Self {
+    pub fn all(
+        model: &'a Model<D>,
+        fields: &'a mut Fields<D>,
+        bond_inputs: BondInputs<'a, D>,
+    ) -> Self {
         let owned = model.owned();
         let vector = |field: &'a mut [Vec<f64>; D]| field.each_mut().map(Vec::as_mut_slice);
         let scalars = fields
@@ -70,7 +74,7 @@ impl<'a, const D: usize> Part<'a, D> {
             reaction: fields.reaction.as_mut().map(vector),
             external_work: fields.external_work.as_mut().map(|work| [&mut work[..]]),
             damping: scalars.map(|(power, energy)| [&mut power[..], &mut energy[..]]),
-            shown,
+            bond_inputs,
         }
     }
 
@@ -121,7 +125,7 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// Shows the bonds the displacements, and begins the sums of their forces with 0.
     pub fn write_bond_inputs(&mut self) {
-        self.shown
+        self.bond_inputs
             .write_bond_inputs(self.displacement.each_ref().map(|column| &**column));
         for component in &mut self.internal_force {
             component.fill(0.0);
@@ -142,7 +146,7 @@ impl<'a, const D: usize> Part<'a, D> {
             reaction: self.reaction.as_mut().map(|force| cut(force, count)),
             external_work: self.external_work.as_mut().map(|work| cut(work, count)),
             damping: self.damping.as_mut().map(|damping| cut(damping, count)),
-            shown: self.shown.split_off_first(count),
+            bond_inputs: self.bond_inputs.split_off_first(count),
         }
     }
 }

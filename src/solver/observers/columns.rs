@@ -9,8 +9,8 @@ use super::tip::TipNow;
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What is known of a run when a row is due; the same on all ranks.
-pub struct Moment {
+/// Global quantities of one row of the history; the same on all ranks.
+pub struct GlobalState {
     /// Time and step.
     pub clock: Clock,
     /// Energies of the whole body.
@@ -25,7 +25,7 @@ pub struct Moment {
     pub cracked_extent: [[f64; 3]; 2],
     /// Points whose bonds left are too few for their law.
     pub singular_points: u64,
-    /// How far the load step has come.
+    /// State of the present load step.
     pub load_step: LoadStep,
     /// Steps undone so far, and the largest number of bonds of a point that a step has broken since the last row.
     pub undone_steps: u64,
@@ -52,7 +52,7 @@ pub struct Moment {
 }
 
 /// The value of a column.
-type Value = Box<dyn Fn(&Moment) -> f64>;
+type Value = Box<dyn Fn(&GlobalState) -> f64>;
 
 /// The columns in their order.
 pub struct Columns {
@@ -76,7 +76,7 @@ impl Columns {
         &mut self,
         name: impl Into<String>,
         unit: &'static str,
-        value: impl Fn(&Moment) -> f64 + 'static,
+        value: impl Fn(&GlobalState) -> f64 + 'static,
     ) {
         self.names.push((name.into(), unit));
         self.values.push(Box::new(value));
@@ -87,7 +87,7 @@ impl Columns {
         &mut self,
         name: &str,
         unit: &'static str,
-        value: impl Fn(&Moment, usize) -> f64 + Copy + 'static,
+        value: impl Fn(&GlobalState, usize) -> f64 + Copy + 'static,
     ) {
         for (d, axis) in AXES[..self.dimension].iter().enumerate() {
             self.add(format!("{name}_{axis}"), unit, move |now| value(now, d));
@@ -106,7 +106,7 @@ impl Columns {
     }
 
     /// The values now.
-    pub fn row(&self, now: &Moment) -> Vec<f64> {
+    pub fn row(&self, now: &GlobalState) -> Vec<f64> {
         self.values.iter().map(|value| value(now)).collect()
     }
 }

@@ -9,7 +9,7 @@ use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
 use super::centre_line::{self, Branch};
-use super::columns::{Columns, Moment};
+use super::columns::{Columns, GlobalState};
 use super::crack_path::CrackPath;
 use super::cracked::Cracked;
 use super::front::Front;
@@ -105,7 +105,7 @@ impl HistoryObserver {
             columns.add("most_broken_bonds", "1", |now| now.most_broken as f64);
         }
         if problem.scales_density() {
-            let ratio = |now: &Moment| now.energies.kinetic / now.energies.strain;
+            let ratio = |now: &GlobalState| now.energies.kinetic / now.energies.strain;
             columns.add("kinetic_ratio", "1", ratio);
         }
         if problem.changes_density_scale() {
@@ -313,7 +313,7 @@ impl HistoryObserver {
         let cracks = cracks.collect();
         let tips = self.tips.iter_mut();
         let tips = tips.map(|tip| tip.row(simulation, damage)).collect();
-        let values = self.columns.row(&Moment {
+        let values = self.columns.row(&GlobalState {
             clock: simulation.clock,
             energies,
             momentum: own[3..].to_vec(),

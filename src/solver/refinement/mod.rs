@@ -67,7 +67,7 @@ impl Refined {
 struct Kept {
     /// The numbers of their state, and at last the block that they had.
     rows: Vec<f64>,
-    /// LaneTuple of a row.
+    /// Numbers of a row.
     width: usize,
     /// How many of their bonds are broken.
     lengths: Vec<u32>,
