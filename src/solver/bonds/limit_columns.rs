@@ -140,7 +140,9 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         columns: &'a LimitColumns,
         reach: usize,
     ) -> Self {
-        let is_read = R::COUNT > 0 && criterion.reads_rotations();
+        // A run whose laws all act along the bonds has no rotations; bonds between different ones still ask.
+        let is_stored = !columns.rotations[3].is_empty();
+        let is_read = R::COUNT > 0 && criterion.reads_rotations() && is_stored;
         let columns = R::columns(&columns.rotations);
         let components = first_component::<D>()..R::COUNT;
         assert!(
