@@ -1,5 +1,5 @@
 //! All tests but those of single files, as one program: what they call is generic, and would be
-//! compiled anew for each. `tests/README.md` says what each folder holds.
+//! compiled for each. `tests/README.md` says what each folder holds.
 
 mod support;
 

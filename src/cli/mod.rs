@@ -102,8 +102,8 @@ Examples:
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
-The loops use the best vector instructions that all ranks have; AVX-512 and AVX2 give the same bits.
-FISSURE_INSTRUCTIONS (baseline, avx2, avx512) names the most to use.
+The loops use the largest vector instruction set that all ranks have; AVX-512 and AVX2 give the same bits.
+FISSURE_INSTRUCTIONS (avx2, avx512) limits it.
 
 SIGTERM, SIGINT or SIGUSR1 to any rank: all finish the step, write a checkpoint and leave with exit
 code 75; a second signal ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
@@ -261,7 +261,7 @@ Examples:
   mpirun -n 2 --bind-to none fissure bench --threads 1
   fissure bench --json                          one line for scripts
 
-FISSURE_INSTRUCTIONS=avx2 or baseline limits the vector instructions of the loops.")]
+FISSURE_INSTRUCTIONS=avx2 limits the vector instructions of the loops.")]
 struct BenchArguments {
     /// The law of the bonds.
     #[arg(long, value_enum, default_value_t = bench::Law::Pmb)]

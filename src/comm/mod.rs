@@ -98,19 +98,19 @@ pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> 
     bytemuck::pod_collect_to_vec(&comm.all_gather(bytemuck::cast_slice(own)))
 }
 
-/// What a rank has found, to be compared with what others have; see [`least`].
+/// A candidate of a rank for [`least`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found<T, const N: usize = 1> {
-    /// What is compared first.
+    /// Compared first.
     pub key: f64,
-    /// What is compared where keys are equal, such as the id of a point.
+    /// Compared where keys are equal, such as the id of a point.
     pub ids: [u64; N],
-    /// What comes with it.
+    /// Data of the candidate.
     pub payload: T,
 }
 
-/// What the ranks have found with the least key and, of these, the least ids; none if no rank has found anything. The
-/// same on all ranks. Collective.
+/// The candidate of all ranks with the least key and, among equal keys, the least ids; `None` without candidates. The same
+/// on all ranks. Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,

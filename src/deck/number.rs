@@ -1,4 +1,4 @@
-//! Numbers as they stand in a deck: an integer, a float, or an expression in a string.
+//! Numbers of a deck as written: an integer, a float, or an expression in a string.
 
 use std::fmt;
 

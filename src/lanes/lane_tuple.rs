@@ -48,6 +48,28 @@ pub trait LaneTuple: Copy + Send + Sync {
     /// One of the columns.
     fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64];
 
+    /// Whether every column has at least so many entries; one that is missing because of [`Self::PADDED`] counts as long
+    /// enough.
+    fn covers(columns: &Self::Columns<'_>, entries: usize) -> bool {
+        (0..Self::COUNT).all(|k| {
+            let column = Self::column(columns, k);
+            column.len() >= entries || Self::PADDED && column.is_empty()
+        })
+    }
+
+    /// Load each quantity from its column with `take`; one without a column is 0.
+    #[inline(always)]
+    fn load(columns: &Self::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
+        Self::each(|k| {
+            let column = Self::column(columns, k);
+            if Self::PADDED && column.is_empty() {
+                Lanes::splat(0.0)
+            } else {
+                take(column)
+            }
+        })
+    }
+
     /// The same value everywhere.
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -169,8 +191,7 @@ impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     }
 }
 
-/// At most `N` quantities; those without a column are 0. What laws share whose number of quantities is known at run
-/// time only.
+/// At most `N` quantities; those without a column to read are 0. For laws that are known at run time only.
 #[derive(Debug, Clone, Copy)]
 pub struct UpTo<const N: usize>([Lanes; N]);
 
@@ -200,8 +221,7 @@ impl<const N: usize> LaneTuple for UpTo<N> {
     }
 
     fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_> {
-        let mut all = all.iter_mut();
-        std::array::from_fn(|_| all.next().map_or(&mut [][..], |column| &mut column[..]))
+        <[Lanes; N]>::columns_mut(all)
     }
 
     #[inline(always)]
@@ -210,14 +230,7 @@ impl<const N: usize> LaneTuple for UpTo<N> {
     }
 
     fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2] {
-        let mut firsts = columns;
-        let seconds = std::array::from_fn(|k| {
-            let column = std::mem::take(&mut firsts[k]);
-            let (first, second) = column.split_at_mut(middle.min(column.len()));
-            firsts[k] = first;
-            second
-        });
-        [firsts, seconds]
+        <[Lanes; N]>::split_at(columns, middle)
     }
 
     #[inline(always)]

@@ -159,13 +159,11 @@ impl<const D: usize> Law<D> for AnyLaw {
     type Point = AnyPoint;
     type BondHistory = AnyHistory;
     type ReferenceSum = [Lanes; MOST.reference_sum];
-    type Sum = [Lanes; MOST.sum];
+    // Passes run over the law of point i, not over this one.
+    type Sum = [Lanes; 0];
     type Force = [Lanes; D];
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const PASSES: usize = MOST.passes;
-    const OWN_NUMBERS: usize = MOST.own;
     const FORCE_READS_STRETCH: bool = true;
-    const HAS_BOND_STRESS_ACROSS: bool = true;
 
     #[inline(never)]
     fn reference_contribution(&self, bond: &Bond<D>) -> Self::ReferenceSum {
@@ -174,16 +172,6 @@ impl<const D: usize> Law<D> for AnyLaw {
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         with_law!(self, law => Law::<D>::constants(law, sums, numbers));
-    }
-
-    #[inline(never)]
-    fn pass_contribution<const S: usize>(
-        &self,
-        bond: &Bond<D>,
-        own: &Self::Point,
-        history: &Self::BondHistory,
-    ) -> Self::Sum {
-        with_law!(self, law => padded(law.pass_contribution::<S>(bond, &first(own), &first(history))))
     }
 
     #[inline(never)]
@@ -227,10 +215,6 @@ impl<const D: usize> Law<D> for AnyLaw {
         rotation: &<Self::Force as ForceState<D>>::Rotation,
     ) -> Lanes {
         with_law!(self, law => law.end_work(simd, bond, &first(end), &first(history), &first(rotation)))
-    }
-
-    fn reads_advanced_history(&self, pass: usize) -> bool {
-        with_law!(self, law => Law::<D>::reads_advanced_history(law, pass))
     }
 
     fn rotation(&self, sums: &[f64]) -> Rotation {

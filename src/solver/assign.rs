@@ -87,6 +87,13 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         let message = format!("[body.{}] damage: {message}", body.name);
         Err(Error::input(message).at(&body.span))
     };
+    if let DamageRule::Energy { calibration, .. } = damage.rule
+        && !calibration.is_for(problem.dimension.count())
+    {
+        return error(format!(
+            "the calibration {calibration:?} has no formula in this dimension"
+        ));
+    }
     let meets = |other: &Body| problem.interface.between(body, other) != InterfaceRule::None;
     let of_other_kind = problem.bodies.iter().find(|other| {
         let differs = |damage| breaks_by_work(other, damage) != by_work;

@@ -270,9 +270,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Makes one step, or one iteration of a load step, but for its second half kick. `half_kick_pending` says whether that
-    /// of the step before is still to be made, which it is not where a stage begins. Returns whether that of this step
-    /// is. Collective.
+    /// Makes one step without its second half kick, or one iteration of a load step. `half_kick_pending`: the half kick of
+    /// the step before is not applied yet; false where a stage begins. Returns whether this step has one pending.
+    /// Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
@@ -308,8 +308,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.motion += start.elapsed();
     }
 
-    /// Makes one step by the equation of motion, but for its second half kick; before it that of the step before, if
-    /// it is due. Collective.
+    /// Makes one step by the equation of motion without its second half kick. A pending half kick of the step before is
+    /// applied first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
         let before = self.clock;
@@ -369,8 +369,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Internal forces at the present place; bonds break and remember, or nothing changes but forces.
-    /// Collective.
+    /// Evaluate the internal forces at the present displacements. Collective.
     pub fn evaluate(&mut self, bond_update: BondUpdate) {
         self.walk(|part, _| {
             part.write_bond_inputs();
@@ -379,7 +378,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(bond_update);
     }
 
-    /// As [`Self::evaluate`], after all parts of the points were [bond_inputs](Part::show).
+    /// As [`Self::evaluate`], after [`Part::write_bond_inputs`] of all parts of the points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let fields = &mut self.fields;
         let acting = Acting {

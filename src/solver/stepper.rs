@@ -98,7 +98,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &self.simulation.fields.displacement
     }
 
-    /// As [`Simulation::check`], of all values but those that a kick which is due changes. Collective.
+    /// As [`Simulation::check`], without the values that a pending half kick changes. Collective.
     ///
     /// # Errors
     /// As those of [`Simulation::check`].

@@ -477,8 +477,8 @@ fn between_bodies_of_different_horizons_by_energy() {
     }
 }
 
-/// The work ¼ |(T_i − T_j)·η| (J/m⁶) at which a bond of length 1 breaks when it is pulled in steps of 0.1 % of its
-/// extension; horizon 1.5, thickness 0.5 in the plane.
+/// The work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1 % of its extension, so
+/// the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the plane.
 fn work_at_breaking<const D: usize>(dimension: &str, calibration: &str) -> f64 {
     let thickness = if D == 2 { "thickness = 0.5" } else { "" };
     let corner = |at: f64| {
@@ -538,11 +538,11 @@ fn one_bond_breaks_where_the_formulas_of_other_codes_say() {
     for (calibration, in_the_plane, in_space) in cases {
         let found = work_at_breaking::<2>("plane-strain", calibration);
         let ratio = found / in_the_plane;
-        assert!((0.997..=1.0).contains(&ratio), "{calibration}: {ratio}");
+        assert!((0.998..=1.0).contains(&ratio), "{calibration}: {ratio}");
         if let Some(expected) = in_space {
             let ratio = work_at_breaking::<3>("3d", calibration) / expected;
             assert!(
-                (0.997..=1.0).contains(&ratio),
+                (0.998..=1.0).contains(&ratio),
                 "{calibration} in space: {ratio}"
             );
         }

@@ -6,7 +6,8 @@ use fissure::elastic::Isotropic;
 use fissure::expression::Expression;
 use fissure::material::{Declaration, Key, Kind, declarations};
 use fissure::problem::{
-    Damage, DamageRule, Law, Material, Problem, Shape, StepRule, Toughness, VolumeCorrection,
+    Calibration, Damage, DamageRule, Law, Material, Problem, Sense, Shape, StepRule, Toughness,
+    VolumeCorrection, WorkMeasure, WorkRule,
 };
 use fissure::solver::Simulation;
 
@@ -119,6 +120,16 @@ fn a_law_of_a_problem_in_rust_is_checked_before_the_run() {
     );
     let found = fault::<1>(&body(line, law("ordinary"), None)).unwrap();
     assert!(found.contains("has no 1-D form"), "{found}");
+    let work = WorkRule {
+        sense: Sense::Pulled,
+        family_correction: 0.0,
+        measure: WorkMeasure::Displacement,
+    };
+    let calibration = Calibration::Peridigm2021;
+    let rule = DamageRule::Energy { calibration, work };
+    let of_the_plane = Damage::new(rule, Toughness::FractureEnergy(1.0));
+    let found = fault::<3>(&body(space, law("ordinary"), Some(of_the_plane))).unwrap();
+    assert!(found.contains("no formula in this dimension"), "{found}");
     let found = fault::<3>(&body(space, law("proportional"), Some(brittle.clone()))).unwrap();
     assert!(found.contains("never break"), "{found}");
 

@@ -235,18 +235,19 @@ fn same_under_mpirun(name: &str, text: &str, must_break: bool) {
     let (deck, problem) = deck_in(&folder, text);
     let expected = record(&problem, 1, 1).datasets;
     assert_events(&expected, text, must_break);
+    let mut repartitions = 0;
     for (ranks, threads) in [(1, 2), (2, 2), (3, 1), (4, 1)] {
         let out = folder.join(format!("{ranks}x{threads}"));
         let mut command = fissure(ranks);
         command.arg("run").arg(&deck).arg("--output").arg(&out);
         let printed = succeed(command.args(["--threads", &threads.to_string(), "-v"]));
         assert!(printed.contains("all writes were collective"), "{printed}");
-        let moves = ranks > 1 && text.contains("[balance]");
-        let moved = printed.matches("changed their rank").count();
-        assert_eq!(moved > 1, moves, "{moved} repartitions: {printed}");
+        repartitions += printed.matches("changed their rank").count();
         let difference = difference(&expected, &datasets(&out.join("result.vtkhdf")));
         assert_eq!(difference, None, "on {ranks} × {threads}");
     }
+    // Which layouts move points depends on measured times.
+    assert_eq!(repartitions > 0, text.contains("[balance]"));
 }
 
 /// Numbers of ranks and of threads of each.

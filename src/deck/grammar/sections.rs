@@ -75,7 +75,7 @@ pub const SECTIONS: [Section; 32] = [
     Section::new("time.relaxation", Table, Fixed),
     Section::new("stage", Array, Fixed),
     Section::new("output", Table, Free),
-    // What the columns of the history mean is compared apart.
+    // Definitions of history columns are compared separately.
     Section::new("history", Table, Free),
     Section::new("history.force", Named, Fixed),
     Section::new("history.probe", Named, Fixed),

@@ -47,7 +47,7 @@ pub struct Force<L> {
     pub criterion: Criterion,
     /// Whether the weights of bonds are their influence, and not shares of volume.
     pub influence: bool,
-    /// Whether bonds remember.
+    /// What happens to the bonds.
     pub bond_update: BondUpdate,
 }
 

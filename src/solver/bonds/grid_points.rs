@@ -163,24 +163,17 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// When an array that the kernel reads does not cover the grid.
     pub fn new(kernel: &K, values: &'a GridValues<D>, volumes: [f64; 2]) -> Self {
         let numbers = K::Point::columns(&values.numbers);
-        let covers = |column: &[f64]| column.len() >= values.grid.slots();
+        let slots = values.grid.slots();
         assert!(
-            values.displacement.iter().all(|column| covers(column))
-                && (0..K::Point::COUNT).all(|k| {
-                    let column = K::Point::column(&numbers, k);
-                    covers(column) || K::Point::PADDED && column.is_empty()
-                }),
+            (values.displacement.iter()).all(|column| column.len() >= slots)
+                && K::Point::covers(&numbers, slots),
             "an array is too short for the grid"
         );
         Self {
             displacement: values.displacement.each_ref().map(|column| &column[..]),
             numbers,
-            limits: ReadLimits::new(kernel.criterion(), &values.limits, values.grid.slots()),
-            rotations: ReadRotations::new::<D>(
-                kernel.criterion(),
-                &values.limits,
-                values.grid.slots(),
-            ),
+            limits: ReadLimits::new(kernel.criterion(), &values.limits, slots),
+            rotations: ReadRotations::new::<D>(kernel.criterion(), &values.limits, slots),
             limit: kernel.criterion().limit(),
             is_linear: kernel.is_linear(),
             volumes: volumes.map(Lanes::splat),
@@ -191,14 +184,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     /// The place must be one of the grid, with seven more after it.
     #[inline(always)]
     unsafe fn numbers(&self, place: usize) -> K::Point {
-        K::Point::each(|k| {
-            let column = K::Point::column(&self.numbers, k);
-            if K::Point::PADDED && column.is_empty() {
-                return Lanes::splat(0.0);
-            }
-            // SAFETY: `new` has checked the length.
-            unsafe { eight(column, place) }
-        })
+        // SAFETY: `new` has checked the length.
+        K::Point::load(&self.numbers, |column| unsafe { eight(column, place) })
     }
 
     /// # Safety
@@ -235,7 +222,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         (self.rotations).eight::<D>(|column| unsafe { eight(column, place) })
     }
 
-    /// The own ends of the bonds of eight points from a place on.
+    /// Load eight adjacent points i from a place on.
     ///
     /// # Safety
     /// The place must be that of a vector of the grid.
@@ -252,8 +239,8 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// The bonds of a vector at one offset; with `FAST_PATH` less of those that are marked, nothing of what
-    /// makes bonds break.
+    /// Load the bonds of a vector at one offset. `FAST_PATH` leaves out the data of the criterion and, for bonds beyond the
+    /// series, the extensions.
     ///
     /// # Safety
     /// The vector must be one of the grid, the offset one of its.

@@ -109,10 +109,6 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Load the bits of all bonds, broken ones included.
     const READS_BROKEN: bool = false;
 
-    /// Sums can depend on reference positions and intact bits alone. A lattice then caches them per bit pattern. Such a
-    /// kernel must not break or change bonds.
-    const UNDEFORMED: bool = false;
-
     /// Load the numbers of points j; otherwise they are 0.
     const READS_FAR: bool = true;
 
@@ -138,10 +134,17 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         wanted
     }
 
-    /// Whether sums are [those of the undeformed](Self::UNDEFORMED); asked only where that is possible.
+    /// Sums depend on reference positions and intact bits alone. A lattice then caches them per bit pattern. Such a kernel
+    /// must not break or change bonds.
     #[inline(always)]
     fn is_undeformed(&self) -> bool {
-        Self::UNDEFORMED
+        false
+    }
+
+    /// The bits of broken bonds are needed; asked only with [`Self::READS_BROKEN`].
+    #[inline(always)]
+    fn needs_broken(&self) -> bool {
+        Self::READS_BROKEN
     }
 
     /// Failure criterion. The sweep loads only the columns it reads.

@@ -11,7 +11,7 @@ use super::interaction::BlockLaws;
 pub struct LimitsRead {
     /// Thresholds.
     pub thresholds: bool,
-    /// Overloads.
+    /// Truncation factors.
     pub truncation_factors: bool,
     /// Rotations.
     pub rotations: bool,

@@ -82,11 +82,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         limits: &'a LimitColumns,
     ) -> Self {
         let numbers = K::Point::columns(numbers);
-        let covers =
-            |column: &[f64]| column.len() >= reach || K::Point::PADDED && column.is_empty();
         assert!(
-            nodes.len() >= reach
-                && (0..K::Point::COUNT).all(|k| covers(K::Point::column(&numbers, k))),
+            nodes.len() >= reach && K::Point::covers(&numbers, reach),
             "an array is too short for the bonds"
         );
         Self {
@@ -103,14 +100,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     /// The indices must be below the reach.
     #[inline(always)]
     unsafe fn numbers(&self, indices: &[u32; 8]) -> K::Point {
-        K::Point::each(|k| {
-            let column = K::Point::column(&self.numbers, k);
-            if K::Point::PADDED && column.is_empty() {
-                return Lanes::splat(0.0);
-            }
-            // SAFETY: `new` has checked the length.
-            unsafe { gather(column, indices) }
-        })
+        // SAFETY: `new` has checked the length.
+        K::Point::load(&self.numbers, |column| unsafe { gather(column, indices) })
     }
 
     /// # Safety

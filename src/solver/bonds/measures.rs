@@ -46,6 +46,10 @@ impl<const D: usize> Kernel<D> for Stored {
         self.law.is_linear::<D>()
     }
 
+    fn needs_broken(&self) -> bool {
+        self.keeps_history
+    }
+
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 4]) {
         let (family, own) = (group.family(), group.own);
@@ -74,8 +78,11 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Rotation = [Lanes; 0];
     // At every set-up, after every refinement, and for outputs.
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const UNDEFORMED: bool = true;
     const WANTED: Wanted = wanted(true);
+
+    fn is_undeformed(&self) -> bool {
+        true
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 2]) {
@@ -118,7 +125,6 @@ impl<const D: usize> Kernel<D> for Stiffness {
     type Rotation = [Lanes; 0];
     // At every set-up and after every refinement.
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const UNDEFORMED: bool = true;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = wanted(false);
 

@@ -85,7 +85,6 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     type Rotation = [Lanes; 0];
     const READS_BROKEN: bool = true;
     const ISA_SET: IsaSet = IsaSet::Avx2;
-    const UNDEFORMED: bool = true;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = extension_only(false);
 
@@ -94,8 +93,11 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     }
 
     fn is_undeformed(&self) -> bool {
-        // Else broken bonds count as well.
-        !Law::<D>::needs_shape(&self.law)
+        !self.needs_broken()
+    }
+
+    fn needs_broken(&self) -> bool {
+        Law::<D>::needs_shape(&self.law)
     }
 
     #[inline(always)]

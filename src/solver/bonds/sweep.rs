@@ -150,7 +150,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
         }
         BlockBonds::Lattice(lattice) => {
             let vectors = lattice.vectors_below(points.start)..lattice.vectors_below(points.end);
-            let whole = if K::READS_BROKEN {
+            let whole = if K::READS_BROKEN && kernel.needs_broken() {
                 lattice.whole()
             } else {
                 Vec::new()
@@ -167,7 +167,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
                 points,
                 whole,
             };
-            let most = if K::UNDEFORMED && kernel.is_undeformed() {
+            let most = if kernel.is_undeformed() {
                 UNDEFORMED_LEAF
             } else {
                 LEAF
@@ -350,25 +350,22 @@ const FAST_PATH_BACKOFF: usize = 7;
 /// Choice of the loop for the next vector. Lists have no fast path: there, loading points j takes the time.
 struct FastPathGate {
     /// The fast path is allowed.
-    near: bool,
+    is_allowed: bool,
     /// Vectors left that skip it.
-    waiting: usize,
+    skipped: usize,
 }
 
 impl FastPathGate {
     fn new<K: Kernel<D>, const D: usize>(kernel: &K) -> Self {
         Self {
-            near: kernel.may_skip_criterion(),
-            waiting: 0,
+            is_allowed: kernel.may_skip_criterion(),
+            skipped: 0,
         }
     }
 
     /// Sums over the bonds of a vector and the bits of those that break.
-    ///
-    /// # Safety
-    /// As for [`fast_vector`].
     #[inline(always)]
-    unsafe fn sum<K: Kernel<D>, S: Simd, const D: usize>(
+    fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
         simd: S,
         task: WholeVector<'_, '_, '_, K, D>,
@@ -376,21 +373,21 @@ impl FastPathGate {
         if const { !K::HAS_FAST_PATH } {
             return task.run(simd);
         }
-        if self.near && self.waiting == 0 {
-            // SAFETY: passed on to the caller.
+        if self.is_allowed && self.skipped == 0 {
+            // SAFETY: the points of a task were made for the grid of its vector.
             let sums = unsafe { fast_vector(simd, task.kernel, task.points, task.vector) };
             if let Some(sums) = sums {
                 return (sums, 0);
             }
-            self.waiting = FAST_PATH_BACKOFF;
+            self.skipped = FAST_PATH_BACKOFF;
         } else {
-            self.waiting = self.waiting.saturating_sub(1);
+            self.skipped = self.skipped.saturating_sub(1);
         }
         simd.aside(task)
     }
 }
 
-/// Cache of the sums over the bonds of a vector by their intact bits, for [undeformed](Kernel::UNDEFORMED) kernels.
+/// Cache of the sums over the bonds of a vector by their intact bits, for [undeformed](Kernel::is_undeformed) kernels.
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
 impl<N: LaneTuple> Known<N> {
@@ -403,7 +400,7 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sums over the bonds of a vector; `None` if one is beyond the series limit.
+/// Sums over the bonds of a vector; `None` if one is beyond the series limit. Takes copies, which stay in registers.
 ///
 /// # Safety
 /// The vector must be one of the grid that `points` was made for.
@@ -416,10 +413,10 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
 ) -> Option<K::Sums> {
     let mut sums = kernel.start();
     // SAFETY: passed on to the caller.
-    let here = unsafe { points.load_point_i(vector.slot) };
+    let own = unsafe { points.load_point_i(vector.slot) };
     for o in 0..vector.offsets.len() {
         // SAFETY: as above.
-        let mut bonds = unsafe { points.load::<S, true>(simd, &here, vector, o) };
+        let mut bonds = unsafe { points.load::<S, true>(simd, &own, vector, o) };
         if bonds.bond.beyond_series != 0 {
             return None;
         }
@@ -428,7 +425,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// The sums over all bonds of a vector, and the bits of those that break.
+/// Sums over all bonds of a vector, with the bits of those that break.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Made for the grid of the vector.
@@ -606,7 +603,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         for k in 0..vectors.len() {
             let mut vector: VectorBonds<'_> = vectors.vector(k);
             let whole = whole.get(vector.bits.clone());
-            let known_sums = if K::UNDEFORMED && is_undeformed {
+            let known_sums = if is_undeformed {
                 known.0.get(&*vector.groups.intact).copied()
             } else {
                 None
@@ -620,9 +617,8 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
                         whole,
                         vector: &mut vector,
                     };
-                    // SAFETY: the vectors are those of the grid that `points` was made for.
-                    let found = unsafe { gate.sum::<K, S, D>(simd, task) };
-                    if K::UNDEFORMED && is_undeformed {
+                    let found = gate.sum(simd, task);
+                    if is_undeformed {
                         known.insert(&vector, found.0);
                     }
                     found
