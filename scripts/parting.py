@@ -34,7 +34,7 @@ def table(program):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--picture", type=pathlib.Path, default=ROOT / "docs/parting.png")
+    parser.add_argument("--picture", type=pathlib.Path, default=ROOT / "docs/src/theory/parting.png")
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "target/release/examples/parting")
     arguments = parser.parse_args()
     figure, axes = pyplot.subplots(2, 2, figsize=(9, 6.5), sharex=True, sharey=True, constrained_layout=True)

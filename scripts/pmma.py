@@ -29,7 +29,7 @@ examples:
   scripts/pmma --laws correspondence --dx 0.31e-3
                                              the paper's grid; eight minutes of two cores
   scripts/pmma --set fracture_energy=100 --set family_correction=0
-                                             as in the paper, see docs/pmma.md
+                                             as in the paper, see docs/src/verification/pmma.md
   scripts/pmma --relaxation 60               from equilibrium to equilibrium, in 60 load steps
   scripts/pmma --set speed=0.01              another parameter of the deck; may be repeated
   scripts/pmma --reuse                       tables and pictures of runs that are there

@@ -56,7 +56,7 @@ impl Law {
     }
 
     /// Floating-point operations of the equations per bond and end, for known ξ and |ξ|; see
-    /// docs/performance.md.
+    /// docs/src/developers/performance.md.
     fn operations(self, failure: bool) -> u64 {
         match self {
             Self::Pmb => 23 + u64::from(failure),

@@ -251,7 +251,7 @@ struct InitArguments {
 /// A cubic lattice with 122 neighbours within the horizon, a fixed step, no output. Prints the bond
 /// updates per second and core, the time by phase, the memory of the whole process, the halo, and
 /// which part of what the machine can do that is: its bandwidth and its rate of arithmetic are
-/// measured on the same threads. docs/performance.md explains the figures.
+/// measured on the same threads. docs/src/developers/performance.md explains the figures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -1,4 +1,4 @@
-//! What a law declares of itself, as data. The deck's grammar, the table of laws in the README and the
+//! What a law declares of itself, as data. The deck's grammar, the table of laws in the book and the
 //! tests of what every law must do follow from it.
 
 use std::fmt;

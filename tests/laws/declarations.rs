@@ -1,4 +1,4 @@
-//! What follows from the laws' declarations: the README's table, and laws for problems made in Rust.
+//! What follows from the laws' declarations: the table of laws in the book, and laws for problems made in Rust.
 
 use fissure::comm::threads;
 use fissure::dimension::{Constraint, Dimension};
@@ -53,14 +53,17 @@ fn row(law: &Declaration) -> String {
 }
 
 #[test]
-fn the_readme_has_the_table_of_laws() {
+fn the_reference_has_the_table_of_laws() {
     let rows: Vec<String> = declarations().map(row).collect();
     let table = format!(
         "| law | force | its own keys |\n|---|---|---|\n{}\n",
         rows.join("\n")
     );
-    let readme = include_str!("../../README.md");
-    assert!(readme.contains(&table), "not in README.md:\n{table}");
+    let page = include_str!("../../docs/src/reference/laws.md");
+    assert!(
+        page.contains(&table),
+        "not in docs/src/reference/laws.md:\n{table}"
+    );
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Edge-on impact on ALON, Diehl & Schweitzer (2016): variants of the deck that are cheap enough here.
-//! What its fronts do at finer spacings stands in docs/eoi_alon.md.
+//! What its fronts do at finer spacings stands in docs/src/verification/eoi_alon.md.
 
 use crate::support::history::{column, row};
 use crate::support::simulate;

@@ -210,7 +210,7 @@ fn a_uniform_strain_has_uniform_energy_but_at_interfaces() {
     let [least, _] = energies(&format!("{none}\nrefinement.interface_factor = 1"), patch);
     assert!(least < 0.5, "{least}");
     let [least, most] = energies("", patch);
-    // No theory gives these: measured were 0.930 and 1.083, as docs/refinement.md has it.
+    // No theory gives these: measured were 0.930 and 1.083, as docs/src/verification/dipasquale.md has it.
     assert!(least > 0.92 && most < 1.09, "{least} {most}");
 }
 
@@ -254,7 +254,7 @@ fn least_energy_at_rest(bonds: &str) -> f64 {
 #[test]
 fn patches_lose_less_with_bonds_of_mean_horizons() {
     let [own, mean] = ["own", "average"].map(least_energy_at_rest);
-    // A wave, whose energy is half kinetic, loses 17.1 and 8.2 % in such a patch (docs/refinement.md).
+    // A wave, whose energy is half kinetic, loses 17.1 and 8.2 % in such a patch (docs/src/verification/dipasquale.md).
     assert!(own < 0.75, "{own}");
     assert!((0.78..0.9).contains(&mean), "{mean}");
 }

@@ -216,8 +216,8 @@ mod tests {
     }
 
     #[test]
-    fn the_readme_describes_every_section() {
-        let readme = include_str!("../../../README.md");
+    fn the_reference_describes_every_section() {
+        let page = include_str!("../../../docs/src/reference/deck.md");
         for Section { path, form, .. } in &SECTIONS {
             let row = match form {
                 Key => format!("`{path}`"),
@@ -226,7 +226,10 @@ mod tests {
                 Named => format!("\n| `[{path}.NAME]` |"),
                 NamedKind => format!("\n| `[{path}.NAME."),
             };
-            assert!(readme.contains(&row), "not in README.md: {row}");
+            assert!(
+                page.contains(&row),
+                "not in docs/src/reference/deck.md: {row}"
+            );
         }
     }
 }
