@@ -400,7 +400,7 @@ fn of_mixed_modes_of_correspondence() {
 #[test]
 fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     let associated = format!("bond_associated_{CORRESPONDENCE}");
-    // The figures of docs/src/theory/state_based.md; those of correspondence scatter by some per cent.
+    // The figures of docs/src/theory/damage.md; those of correspondence scatter by some per cent.
     for (law, plane, space) in [
         (ordinary(0.1, "constant"), 0.94..1.01, 0.9..0.97),
         (ordinary(0.4, "constant"), 0.97..1.14, 0.95..1.09),

@@ -136,7 +136,7 @@ fn strengths<const D: usize>(law: &'static str, correction: f64, across: f64) ->
     [Part::Sides, Part::All, Part::Inside].map(|part| of(correction, part) / inside)
 }
 
-/// Holds the figures of docs/src/theory/state_based.md; strains grow by 1 % a step, and surfaces are known to 2 %.
+/// Holds the figures of docs/src/theory/damage.md; strains grow by 1 % a step, and surfaces are known to 2 %.
 fn check<const D: usize>(law: &'static str, across: f64) {
     let [sides, all, _] = strengths::<D>(law, 0.0, across);
     assert!(sides < 0.88 && all < 0.75, "{law}: {sides} {all} without");
