@@ -29,6 +29,7 @@ mod laws {
 mod physics {
     mod contact;
     mod dynamics;
+    mod impact;
     mod refinement;
     mod relaxation;
     mod stable_step;

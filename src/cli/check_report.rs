@@ -8,7 +8,9 @@ use fissure::deck::Deck;
 use fissure::dimension::Dimension;
 use fissure::error::Warning;
 use fissure::problem::Problem;
-use fissure::problem::{Block, Body, DamageRule, PointSource, Sense, Time};
+use fissure::problem::{
+    Block, Body, ContactModel, ContactRule, DamageRule, PointSource, Sense, Time,
+};
 use fissure::solver::assign::block_laws;
 use fissure::solver::calibration::separation_energy_ratio;
 use fissure::survey::{BodyFigures, Cost, Interior, Survey};
@@ -163,6 +165,9 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     }
 }
 
+/// The most bodies of which every pair is listed.
+const MOST_PAIRS: usize = 6;
+
 /// The bonds between bodies.
 pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
@@ -175,6 +180,45 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     for (pair, bonds) in &survey.joints {
         let [a, b] = pair.map(|body| &problem.bodies[body].name);
         report.line(&format!("{a} and {b}"), count(*bonds));
+    }
+}
+
+/// Which bodies touch, and by which rule.
+pub fn contact(report: &mut Report, problem: &Problem) {
+    let Some(contact) = &problem.contact else {
+        return;
+    };
+    report.heading("contact");
+    let described = |rule: Option<ContactRule>| match rule {
+        None => "none".to_owned(),
+        Some(rule) => {
+            let model = match rule.model {
+                ContactModel::Penalty => "penalty",
+                ContactModel::ShortRange => "short-range",
+            };
+            format!(
+                "{model}, friction {} (static {}), restitution {}",
+                rule.kinetic_friction, rule.static_friction, rule.restitution
+            )
+        }
+    };
+    if problem.bodies.len() > MOST_PAIRS {
+        report.line("all pairs", described(contact.rule));
+        for pair in &contact.pairs {
+            let [a, b] = &pair.bodies;
+            report.line(&format!("{a} and {b}"), described(pair.rule));
+        }
+        return;
+    }
+    for (second, there) in problem.bodies.iter().enumerate() {
+        for here in &problem.bodies[..=second] {
+            let name = if here.name == there.name {
+                format!("{} with itself", here.name)
+            } else {
+                format!("{} and {}", here.name, there.name)
+            };
+            report.line(&name, described(contact.between(here, there)));
+        }
     }
 }
 

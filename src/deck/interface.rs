@@ -18,8 +18,16 @@ pub fn interface(
     bodies: &[problem::Body],
 ) -> Result<problem::Interface> {
     let mut pairs: Vec<(String, [usize; 2], &Spanned<Rule>)> = Vec::new();
+    let default = Spanned::new(
+        0..0,
+        match deck.contact {
+            Some(_) => Rule::None,
+            None => Rule::Own,
+        },
+    );
+    let all = deck.interface.rule.as_ref().unwrap_or(&default);
     let mut interface = problem::Interface {
-        rule: rule(&deck.interface.rule),
+        rule: rule(all),
         pairs: Vec::new(),
     };
     for (name, table) in &deck.interface.pair {
@@ -40,10 +48,8 @@ pub fn interface(
         for first in 0..second {
             let pair = [first, second];
             let own = pairs.iter().find(|(_, other, _)| *other == pair);
-            let (key, rule) = own
-                .map_or(("[interface]", &deck.interface.rule), |(key, _, rule)| {
-                    (key.as_str(), *rule)
-                });
+            let (key, rule) =
+                own.map_or(("[interface]", all), |(key, _, rule)| (key.as_str(), *rule));
             if *rule.get_ref() != Rule::None {
                 let pair = pair.map(|body| &bodies[body]);
                 one_direction(scope, pair)?;

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod conditions;
+mod contact;
 mod damage;
 mod difference;
 mod explain;
@@ -16,6 +17,7 @@ mod outputs;
 mod parameters;
 mod refinement;
 mod resolve;
+mod rigid;
 mod sets;
 mod shapes;
 pub mod source;

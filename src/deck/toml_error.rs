@@ -341,6 +341,12 @@ direction = [1, 0]
 every_time = 1
 [balance]
 imbalance = 1.5
+[contact]
+friction = 0.1
+[contact.pair.NAME]
+bodies = ['a', 'b']
+[rigid.NAME]
+mass = 1
 ";
 
     /// The first line of the error of a deck.

@@ -8,8 +8,8 @@ use super::grammar::{
 use super::number::{Edges, Number};
 use super::resolve::{Scope, resolve_each};
 use super::{
-    bodies, conditions, damage, history, interface, materials, names, outputs, refinement, sets,
-    shapes, time,
+    bodies, conditions, contact, damage, history, interface, materials, names, outputs, refinement,
+    rigid, sets, shapes, time,
 };
 use crate::dimension::{Constraint, Dimension};
 use crate::error::Result;
@@ -39,6 +39,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let volume_correction = volume_correction(scope, deck, &bodies)?;
     let family = family(scope, deck)?;
     let interface = interface::interface(scope, deck, &bodies)?;
+    let contact = contact::contact(scope, deck, &bodies)?;
     let refinement = refinement::refinement(scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
     let time = time::time(scope, deck)?;
@@ -56,6 +57,8 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
         },
         family,
         interface,
+        contact,
+        rigid: rigid::rigid(scope, deck)?,
         bodies,
         refinement,
         cracks: cracks.into_values().collect(),

@@ -30,6 +30,8 @@ impl Problem {
                 rule: InterfaceRule::Own,
                 pairs: Vec::new(),
             },
+            contact: None,
+            rigid: Vec::new(),
             bodies: Vec::new(),
             refinement: None,
             sets: vec![Set {

@@ -9,9 +9,11 @@ mod blocks;
 mod bodies;
 mod build;
 mod conditions;
+mod contact;
 pub mod law;
 mod outputs;
 mod refinement;
+mod rigid;
 pub mod single_body;
 mod time;
 
@@ -24,9 +26,11 @@ pub use crate::damage::{Calibration, Sense, WorkMeasure, WorkRule};
 pub use blocks::{Block, Kind};
 pub use bodies::*;
 pub use conditions::*;
+pub use contact::*;
 pub use law::Law;
 pub use outputs::*;
 pub use refinement::*;
+pub use rigid::*;
 pub use time::*;
 
 /// Everything that a run needs to know.
@@ -50,6 +54,10 @@ pub struct Problem {
     pub family: FamilyRule,
     /// The bonds between blocks.
     pub interface: Interface,
+    /// Contact between points that no bond joins.
+    pub contact: Option<Contact>,
+    /// Rigid bodies that points can touch.
+    pub rigid: Vec<Rigid>,
     /// Bodies in the order of the deck.
     pub bodies: Vec<Body>,
     /// Finer grids in parts of the bodies.

@@ -174,8 +174,10 @@ pub enum Field {
     Velocity,
     /// ü, m/s².
     Acceleration,
-    /// Internal force density, N/m³.
+    /// Internal force density, N/m³, that of contact included.
     ForceDensity,
+    /// Force density of contact, N/m³.
+    ContactForceDensity,
     /// φ, share of the family's volume that is cut off.
     Damage,
     /// W, J/m³.
@@ -211,11 +213,12 @@ pub enum Field {
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
         Self::ForceDensity,
+        Self::ContactForceDensity,
         Self::Damage,
         Self::StrainEnergyDensity,
         Self::Dilatation,
@@ -239,6 +242,7 @@ impl Field {
             Self::Velocity => "velocity",
             Self::Acceleration => "acceleration",
             Self::ForceDensity => "force_density",
+            Self::ContactForceDensity => "contact_force_density",
             Self::Damage => "damage",
             Self::StrainEnergyDensity => "strain_energy_density",
             Self::Dilatation => "dilatation",
@@ -262,7 +266,7 @@ impl Field {
             Self::Displacement => "m",
             Self::Velocity => "m/s",
             Self::Acceleration => "m/s^2",
-            Self::ForceDensity => "N/m^3",
+            Self::ForceDensity | Self::ContactForceDensity => "N/m^3",
             Self::Damage
             | Self::Dilatation
             | Self::DeformationGradient
@@ -281,7 +285,11 @@ impl Field {
     /// 3 for vectors, 6 for symmetric tensors and 9 for others (padded in 1-D and 2-D), 1 for scalars.
     pub fn components(self) -> usize {
         match self {
-            Self::Displacement | Self::Velocity | Self::Acceleration | Self::ForceDensity => 3,
+            Self::Displacement
+            | Self::Velocity
+            | Self::Acceleration
+            | Self::ForceDensity
+            | Self::ContactForceDensity => 3,
             Self::Stress | Self::CauchyStress => 6,
             Self::DeformationGradient => 9,
             _ => 1,

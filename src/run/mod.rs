@@ -260,7 +260,9 @@ impl<'a> Job<'a> {
         let limit = self.options.wall_time.map(|limit| (started, limit));
         let mut watch = Watch::new(signals.as_ref(), self.problem.checkpoint, limit);
         let simulation = stepper.at_full_step();
-        let mut contact = Some(ContactWatch::new(simulation));
+        let without_contact = self.problem.contact.is_none();
+        let mut contact = without_contact.then(|| ContactWatch::new(simulation));
+        let mut follows_contact = false;
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
@@ -277,6 +279,10 @@ impl<'a> Job<'a> {
                     regridded,
                     points: simulation.model.total,
                 });
+            }
+            if !follows_contact && let Some(step) = stepper.step_for_contact() {
+                self.warn_of_stiff_contact(stepper.clock(), step);
+                follows_contact = true;
             }
             stepper.advance();
             let clock = *stepper.clock();

@@ -5,6 +5,7 @@ use super::observer::Message;
 use super::recorder::Recorder;
 use crate::error::Result;
 use crate::message::format_number;
+use crate::solver::motion::Clock;
 use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
 use crate::solver::{Simulation, Stepper};
@@ -26,8 +27,21 @@ impl<'a> Job<'a> {
         let position: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
         let text = format!(
             "at t = {time:.4e} s points of `{a}` and `{b}` have come nearer than their spacing, at ({}) m; \
-             there is no contact between bodies: where no bond joins them they go through one another",
+             without `[contact]` they go through one another where no bond joins them",
             position.join(", ")
+        );
+        self.observer.message(&Message::Warning(text));
+    }
+
+    /// Tell that steps become shorter because of contact: from here on they have this size (s), later ones may be shorter
+    /// still.
+    pub(super) fn warn_of_stiff_contact(&mut self, clock: &Clock, step: f64) {
+        let text = format!(
+            "after step {} (t = {:.4e} s) contact is too stiff for a time step of {:.4e} s: steps of {step:.4e} s or \
+             shorter follow",
+            clock.number(),
+            clock.time(),
+            clock.step(),
         );
         self.observer.message(&Message::Warning(text));
     }

@@ -98,6 +98,7 @@ impl<const D: usize> Simulation<'_, D> {
     pub(super) fn release(&mut self) {
         self.model = Model::empty();
         self.forces.release();
+        self.contact = None;
         let columns = self.fields.each_mut().flat_map(|(_, columns)| columns);
         columns.for_each(|column| *column = Vec::new());
     }

@@ -7,13 +7,14 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, Time};
+use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, StepRule, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
 use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
+use super::contact::{Contact, StepEnd};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
@@ -31,6 +32,9 @@ use super::steps::choose_steps;
 /// cell off their grid.
 const SLACK: f64 = 1e-5;
 
+/// A step that contact has made too long becomes so much shorter than it must, for contact most likely stiffens further.
+const CONTACT_RESERVE: f64 = 0.95;
+
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
     /// The validated deck.
@@ -43,6 +47,8 @@ pub struct Simulation<'a, const D: usize> {
     pub fields: Fields<D>,
     /// Their bonds.
     pub forces: Forces<D>,
+    /// Contact between points that no bond joins, if there is any.
+    pub contact: Option<Contact<D>>,
     /// Loads and supports that act in the present stage.
     pub conditions: Conditions<D>,
     /// Those of the other stages, by stage.
@@ -88,6 +94,8 @@ pub struct Times {
     pub set_up: Duration,
     /// Bonds and halo in the time loop.
     pub forces: ForceTimes,
+    /// Search and forces of contact.
+    pub contact: Duration,
     /// Integration and conditions, and showing the bonds where points are.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
@@ -199,6 +207,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             relaxation: problem.relaxes(),
             damage: problem.bodies.iter().any(|body| body.damage.is_some()),
             plasticity: forces.has_plasticity(),
+            contact: problem.has_contact(),
             coarsening: refinement::may_coarsen(problem),
         };
         let mut fields = Fields::new(&model, needs);
@@ -212,12 +221,14 @@ impl<'a, const D: usize> Simulation<'a, D> {
             forces.for_each_intact(|_, _| intact += 1);
             intact
         });
+        let contact = Contact::new(problem, comm, &model)?;
         let mut simulation = Self {
             problem,
             comm,
             model,
             fields,
             forces,
+            contact,
             conditions: waiting[0].take().unwrap_or_default(),
             waiting,
             stages,
@@ -282,6 +293,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         } = self.time_rule();
         match (method, adaptive) {
             (Method::Explicit, None) => {
+                if let Some(step) = self.step_for_contact() {
+                    self.clock.set_step(step);
+                }
                 self.make_step(half_kick_pending);
                 true
             }
@@ -294,6 +308,27 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 false
             }
         }
+    }
+
+    /// The step (s) from here on, where contact has become too stiff for the present one. It divides the rest of the stage
+    /// evenly.
+    pub fn step_for_contact(&self) -> Option<f64> {
+        let limit = self.contact_limit()?;
+        if self.clock.step() <= limit {
+            return None;
+        }
+        let left = self.clock.end() - self.clock.time();
+        Some(left / (left / (CONTACT_RESERVE * limit)).ceil())
+    }
+
+    /// The longest step (s) with contact as it is now.
+    pub(super) fn contact_limit(&self) -> Option<f64> {
+        let contact = self.contact.as_ref()?;
+        let safety = match self.time_rule().step {
+            StepRule::Automatic(safety) => safety,
+            StepRule::Fixed(_) => 1.0,
+        };
+        Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
     /// Makes the second half kick of the present step.
@@ -319,6 +354,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         self.clock.advance();
         self.conditions.set_places(self.clock.time(), step);
+        if let Some(contact) = &mut self.contact {
+            contact.drift(self.clock.time(), step);
+        }
         let finite = self.walk(|part, mut here| {
             let finite = if half_kick_pending && here.is_empty() && part.damping.is_none() {
                 verlet::kick_and_drift(part, step)
@@ -396,6 +434,18 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .evaluate(self.comm, &self.model, acting, bond_update, times);
         if let BondUpdate::Step(step) = bond_update {
             fields.book_broken(&self.model, self.forces.broken(), step);
+        }
+        if let Some(contact) = &mut self.contact {
+            let start = Instant::now();
+            let end = match bond_update {
+                BondUpdate::Step(step) => Some(StepEnd {
+                    time: self.clock.time(),
+                    step,
+                }),
+                BondUpdate::None | BondUpdate::Trial(_) => None,
+            };
+            contact.add_forces(self.comm, &self.model, &self.forces, fields, end);
+            self.times.contact += start.elapsed();
         }
     }
 

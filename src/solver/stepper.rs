@@ -34,7 +34,8 @@ impl<'a, const D: usize> Stepper<'a, D> {
 
     /// Makes one step, or one iteration of a load step. Collective.
     pub fn advance(&mut self) {
-        if self.simulation.next_stage().is_some() {
+        let simulation = &self.simulation;
+        if simulation.next_stage().is_some() || simulation.step_for_contact().is_some() {
             self.at_full_step();
         }
         self.half_kick_pending = self.simulation.leap(self.half_kick_pending);
@@ -76,6 +77,11 @@ impl<'a, const D: usize> Stepper<'a, D> {
     /// As [`Simulation::time_rule`].
     pub fn time_rule(&self) -> Time {
         self.simulation.time_rule()
+    }
+
+    /// As [`Simulation::step_for_contact`].
+    pub fn step_for_contact(&self) -> Option<f64> {
+        self.simulation.step_for_contact()
     }
 
     /// How far the load step has come.

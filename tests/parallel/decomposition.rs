@@ -184,6 +184,26 @@ relaxation = { load_steps = 6, tolerance = 1e-4 }
 on = ['down']
 ";
 
+/// A turning block that breaks at another one, with friction and damping, and a third body beside the way of the fragments.
+const COLLISION: &str = "
+dimension = 'plane-strain'
+contact = { friction = 0.2, static_friction = 0.4, restitution = 0.8, pair.hit = { bodies = ['flying', 'target'], model = 'short-range' } }
+grid = { spacing = 1, horizon = 3 }
+material.rubber.ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }
+material.steel.pmb = { density = 3, youngs_modulus = 9 }
+damage.brittle.critical_stretch = { critical_stretch = 0.06 }
+body.flying = { material = 'rubber', damage = 'brittle', shape.box = { lower = [0, 0], upper = [10, 8] } }
+body.target = { material = 'rubber', damage = 'brittle', shape.box = { lower = [12, -4], upper = [18, 12] } }
+rigid.wall = { half_space = { through = [0, -10.5], normal = [0.1, 1] }, friction = 0.1 }
+rigid.hammer = { shape.disc = { centre = [17, 14.2], radius = 2 }, mass = 30, velocity = [-0.1, -0.3], angular_velocity = [0.2], friction = 0.5 }
+body.beside = { material = 'steel', shape.box = { lower = [19, -2], upper = [24, 5] } }
+crack.notch.segment = { from = [3, 4], to = [11, 4] }
+initial.throw = { set = 'flying', velocity = ['0.5 - 0.03*(y - 4)', '0.03*(x - 5)'] }
+time.end = 20
+output = { every_steps = 5, fields = ['displacement', 'velocity', 'damage', 'contact_force_density', 'force_density'] }
+history.every_steps = 3
+";
+
 /// Fewer points than ranks.
 const FEW: &str = "
 dimension = '1d'
@@ -413,6 +433,24 @@ fn blocks_of_different_laws_that_are_dealt_out_anew() {
         &(with_one_law(law) + "\n" + RESTLESS),
         true,
     );
+}
+
+#[test]
+fn bodies_that_collide() {
+    same_everywhere("collision", COLLISION, true);
+    same_everywhere(
+        "collision-balance",
+        &(COLLISION.to_owned() + RESTLESS),
+        true,
+    );
+    let adaptive = "time = { end = 20, adaptive = { most_broken = 3, stable_broken = 1, steps = 5, reduce = 0.5, raise = 1.5 } }";
+    let adaptive = COLLISION.replace("time.end = 20", adaptive);
+    same_everywhere("collision-adaptive", &adaptive, true);
+}
+
+#[test]
+fn bodies_that_collide_under_mpirun() {
+    same_under_mpirun("collision", COLLISION, true);
 }
 
 #[test]

@@ -446,6 +446,47 @@ fn points_that_flow_go_on_as_if_they_had_never_stopped() {
     dissipates(&goes_on("flowing", law, "auto"));
 }
 
+#[test]
+fn a_collision_goes_on_as_if_it_had_never_stopped() {
+    let folder = Folder::new("collision");
+    let text = "
+        dimension = 'plane-stress'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        damage.brittle.critical_stretch = { critical_stretch = 0.05 }
+        parameters.end = 6
+        contact = { friction = 0.3, restitution = 0.5 }
+        body.flying = { material = 'rubber', damage = 'brittle', shape.box = { lower = [0, 0], upper = [10, 8] } }
+        body.target = { material = 'rubber', damage = 'brittle', shape.box = { lower = [10.5, -4], upper = [16, 12] } }
+        rigid.hammer = { shape.box = { lower = [10, 12.5], upper = [15, 14] }, mass = 30, velocity = [-0.1, -0.3], angular_velocity = [0.2], friction = 0.5 }
+        initial.throw = { set = 'flying', velocity = [0.4, '0.02*(x - 5)'] }
+        time = { end = 'end', step = 0.1 }
+        output.every_steps = 10
+        ";
+    let deck = folder.write("deck.toml", text);
+    let out = folder.join("out");
+    succeed(&mut run(2, &deck, &out, &[]));
+    let further = ["--restart", "--set", "end=16"];
+    succeed(&mut run(3, &deck, &out, &further));
+    let whole = folder.join("whole");
+    succeed(&mut run(1, &deck, &whole, &["--set", "end=16"]));
+    let whole = datasets(&result(&whole));
+    assert_eq!(difference(&whole, &datasets(&result(&out))), None);
+    let column = |name: &str| {
+        let bits = whole[&format!("history {name}")].iter();
+        bits.map(|bits| f64::from_bits(*bits)).collect::<Vec<_>>()
+    };
+    // They touch where the run is stopped, and bonds break before and after.
+    let (time, touching, broken) = (
+        column("time"),
+        column("touching_pairs"),
+        column("broken_bonds"),
+    );
+    let middle = time.iter().position(|time| *time >= 6.0).unwrap();
+    assert!(touching[middle] > 0.0 && column("friction_energy")[middle] > 0.0);
+    assert!(broken[middle] > 0.0 && *broken.last().unwrap() > broken[middle]);
+}
+
 /// A run has dissipated energy before and after its middle.
 fn dissipates(result: &BTreeMap<String, Vec<u64>>) {
     let dissipated = result["history dissipated_energy"].iter();

@@ -74,30 +74,17 @@ pub enum Quadrature {
 }
 
 /// The bonds between blocks.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Interface {
     /// What constants they have: `"own"`, `"average"` or `"minimum"`. With `"own"` each end exerts its
     /// half with its own modulus and horizon; else both have the mean or the smaller of each. `"none"`:
-    /// there are none, however near the bodies are.
-    #[serde(default = "own")]
-    pub rule: Spanned<Rule>,
+    /// there are none, however near the bodies are. If not given, `"own"`, or `"none"` with `[contact]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rule: Option<Spanned<Rule>>,
     /// Pairs of bodies with a rule of their own, by any name.
     #[serde(default)]
     pub pair: Tables<Pair>,
-}
-
-impl Default for Interface {
-    fn default() -> Self {
-        Self {
-            rule: own(),
-            pair: Tables::default(),
-        }
-    }
-}
-
-fn own() -> Spanned<Rule> {
-    Spanned::new(0..0, Rule::Own)
 }
 
 /// The bonds between two bodies.

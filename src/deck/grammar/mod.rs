@@ -6,11 +6,13 @@
 
 mod bodies;
 mod conditions;
+mod contact;
 mod count;
 mod grid;
 mod material;
 mod outputs;
 mod refinement;
+mod rigid;
 mod sections;
 mod time;
 
@@ -21,11 +23,13 @@ use serde_spanned::Spanned;
 use crate::deck::number::Number;
 pub use bodies::*;
 pub use conditions::*;
+pub use contact::*;
 pub use count::Count;
 pub use grid::*;
 pub use material::*;
 pub use outputs::*;
 pub use refinement::*;
+pub use rigid::*;
 pub use sections::*;
 pub use time::*;
 
@@ -61,6 +65,12 @@ pub struct Deck {
     /// The bonds between blocks.
     #[serde(default)]
     pub interface: Interface,
+    /// Contact between points that no bond joins; none if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<Spanned<Contact>>,
+    /// Rigid bodies by name.
+    #[serde(default)]
+    pub rigid: Tables<Rigid>,
     /// Finer grids in parts of the bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refinement: Option<Spanned<Refinement>>,

@@ -49,7 +49,7 @@ use Form::{Array, Key, Named, NamedKind, Table};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
-pub const SECTIONS: [Section; 32] = [
+pub const SECTIONS: [Section; 35] = [
     Section::new("title", Key, Free),
     Section::new("dimension", Key, Fixed),
     Section::new("thickness", Key, Fixed),
@@ -60,6 +60,9 @@ pub const SECTIONS: [Section; 32] = [
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),
     Section::new("interface.pair", Named, Fixed),
+    Section::new("contact", Table, Fixed),
+    Section::new("contact.pair", Named, Fixed),
+    Section::new("rigid", Named, Fixed),
     Section::new("refinement", Table, Fixed),
     Section::new("refinement.region", Named, Fixed),
     Section::new("refinement.trigger", Table, Fixed),
@@ -160,6 +163,10 @@ impl Deck {
         add(&mut found, "initial", &self.initial);
         add(&mut found, "condition", &self.condition);
         add(&mut found, "interface.pair", &self.interface.pair);
+        if let Some(contact) = &self.contact {
+            add(&mut found, "contact.pair", &contact.get_ref().pair);
+        }
+        add(&mut found, "rigid", &self.rigid);
         if let Some(refinement) = &self.refinement {
             let region = &refinement.get_ref().region;
             add(&mut found, "refinement.region", region);

@@ -302,6 +302,13 @@ impl<const D: usize> Forces<D> {
         }
     }
 
+    /// Calls `found` with the local index of every intact neighbour of an owned point.
+    pub fn for_each_neighbour(&self, point: usize, mut found: impl FnMut(usize)) {
+        for interaction in &self.interactions {
+            interaction.bonds.for_each_neighbour(point, &mut found);
+        }
+    }
+
     /// Whether bonds of any law keep numbers from step to step; the same on all ranks.
     pub fn has_history(&self) -> bool {
         self.has_history

@@ -225,6 +225,44 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
+    /// What contact exerts, N/m³, part of the internal force; none without contact.
+    contact_force: Option<[Vec<f64>; D]> = Description {
+        name: "contact_force",
+        output: Some(Field::ContactForceDensity),
+        ..FORCE_DENSITY
+    };
+    /// The share of friction in it, N/m³; none without contact.
+    friction: Option<[Vec<f64>; D]> = Description {
+        name: "friction",
+        unit: "N/m^3",
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// The share of contact damping in it, N/m³; none without contact.
+    contact_damping: Option<[Vec<f64>; D]> = Description {
+        name: "contact_damping",
+        unit: "N/m^3",
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// Potential energy of contact, J; none without contact.
+    contact_energy: Option<Vec<f64>> = Description {
+        name: "contact_energy",
+        unit: "J",
+        state: false,
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// Energy taken by friction, J; none without contact.
+    friction_energy: Option<Vec<f64>> = Description {
+        name: "friction_energy",
+        ..ENERGY
+    };
+    /// Energy taken by contact damping, J; none without contact.
+    contact_damping_energy: Option<Vec<f64>> = Description {
+        name: "contact_damping_energy",
+        ..ENERGY
+    };
     /// u̇ of the relaxation at half iterations, m an iteration; none without relaxation.
     relaxation_velocity: Option<[Vec<f64>; D]> = Description {
         name: "relaxation_velocity",
@@ -283,6 +321,8 @@ pub struct Needs {
     pub damage: bool,
     /// Whether points keep a plastic state.
     pub plasticity: bool,
+    /// Whether there is contact.
+    pub contact: bool,
     /// Whether grids become coarser again.
     pub coarsening: bool,
 }
@@ -351,6 +391,12 @@ impl<const D: usize> Fields<D> {
             plastic_work: needs.plasticity.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
             damping_power: needs.damping.then(scalar),
+            contact_force: needs.contact.then(|| vector(owned)),
+            friction: needs.contact.then(|| vector(owned)),
+            contact_damping: needs.contact.then(|| vector(owned)),
+            contact_energy: needs.contact.then(scalar),
+            friction_energy: needs.contact.then(scalar),
+            contact_damping_energy: needs.contact.then(scalar),
             relaxation_velocity: needs.relaxation.then(|| vector(owned)),
             equilibrium_displacement: needs.relaxation.then(|| vector(owned)),
             equilibrium_reaction: (needs.relaxation && needs.supports).then(|| vector(owned)),
@@ -401,6 +447,62 @@ impl<const D: usize> Fields<D> {
         }
     }
 
+    /// Adds the forces of contact on an owned point to the internal ones: repulsion (N/m³) with its potential (J), and
+    /// friction and damping as they were [booked](Self::book_dissipation).
+    pub fn add_contact(&mut self, point: usize, repulsion: [f64; D], energy: f64) {
+        let (Some(contact), Some(friction), Some(damping), Some(potential)) = (
+            &mut self.contact_force,
+            &self.friction,
+            &self.contact_damping,
+            &mut self.contact_energy,
+        ) else {
+            return;
+        };
+        for d in 0..D {
+            contact[d][point] = repulsion[d] + damping[d][point] + friction[d][point];
+            self.internal_force[d][point] += contact[d][point];
+        }
+        potential[point] = energy;
+    }
+
+    /// An owned point touches nothing.
+    pub fn clear_contact(&mut self, point: usize) {
+        let columns = self.contact_force.iter_mut().flatten();
+        for column in columns.chain(&mut self.contact_energy) {
+            column[point] = 0.0;
+        }
+    }
+
+    /// Takes note of friction and contact damping (N/m³) on an owned point at the end of a step (s), and books what they
+    /// took in it, by the trapezoid rule. Velocities are those in the middle of the step.
+    pub fn book_dissipation(
+        &mut self,
+        point: usize,
+        volume: f64,
+        step: f64,
+        [friction, damping]: [[f64; D]; 2],
+    ) {
+        let velocity = &self.velocity;
+        let both = [
+            (&mut self.friction, friction, &mut self.friction_energy),
+            (
+                &mut self.contact_damping,
+                damping,
+                &mut self.contact_damping_energy,
+            ),
+        ];
+        for (column, force, energy) in both {
+            let (Some(column), Some(energy)) = (column, energy) else {
+                continue;
+            };
+            for d in 0..D {
+                let sum = column[d][point] + force[d];
+                column[d][point] = force[d];
+                energy[point] -= 0.5 * step * volume * sum * velocity[d][point];
+            }
+        }
+    }
+
     /// Counts bonds that break from now on as new.
     pub fn forget_newly_broken(&mut self) {
         if let Some(new) = &mut self.newly_broken_bonds {
@@ -432,6 +534,6 @@ mod tests {
                 offered += 1;
             }
         }
-        assert_eq!(offered, 6);
+        assert_eq!(offered, 7);
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::solver::Simulation;
 use crate::solver::bonds::KeptBonds;
+use crate::solver::contact::{Contact, RigidState};
 
 use super::Clock;
 
@@ -11,6 +12,7 @@ pub struct Kept {
     clock: Option<Clock>,
     fields: Vec<Vec<f64>>,
     bonds: KeptBonds,
+    rigid: Vec<RigidState>,
 }
 
 impl<const D: usize> Simulation<'_, D> {
@@ -28,6 +30,9 @@ impl<const D: usize> Simulation<'_, D> {
             })
             .collect();
         self.forces.keep(&mut kept.bonds);
+        kept.rigid.clear();
+        kept.rigid
+            .extend(self.contact.iter().flat_map(Contact::rigid_states));
     }
 
     /// Goes back to the state that was noted last; to make the same steps again gives the same bits.
@@ -40,6 +45,10 @@ impl<const D: usize> Simulation<'_, D> {
             column.copy_from_slice(kept);
         }
         self.forces.undo(&kept.bonds);
+        if let Some(contact) = &mut self.contact {
+            contact.set_stale();
+            contact.set_rigid_states(kept.rigid.iter().copied());
+        }
         // Loads know their values at the present time.
         self.apply_loads(clock.time(), true);
     }

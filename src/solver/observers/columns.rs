@@ -1,5 +1,6 @@
 //! The columns of the history: each with its name, its unit and what its value is, in one place.
 
+use crate::solver::contact::ContactNow;
 use crate::solver::motion::Clock;
 use crate::solver::motion::relaxation::LoadStep;
 
@@ -49,6 +50,8 @@ pub struct GlobalState {
     pub cracks: Vec<(f64, usize)>,
     /// Of each crack tip.
     pub tips: Vec<TipNow>,
+    /// Contact.
+    pub contact: ContactNow,
 }
 
 /// The value of a column.

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::problem::{self, Reaction};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
+use crate::solver::contact::contact_now;
 
 use super::centre_line::{self, Branch};
 use super::columns::{Columns, GlobalState};
@@ -43,7 +44,7 @@ pub struct HistoryObserver {
 /// Energies of the whole body at one moment, J.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Energies {
-    /// ½ Σ ρ V u̇².
+    /// ½ Σ ρ V u̇² of the points.
     pub kinetic: f64,
     /// Σ W V.
     pub strain: f64,
@@ -53,9 +54,9 @@ pub struct Energies {
     pub overshoot: f64,
     /// Work done by loads and supports.
     pub work: f64,
-    /// Taken by viscous damping and by bonds that yield.
+    /// Taken by viscous damping, bonds that yield, friction and contact damping.
     pub dissipated: f64,
-    /// Kinetic + strain + fracture + dissipated − work, less its value at the start and what refinements
+    /// Kinetic (that of rigid bodies included) + strain + contact + fracture + dissipated − work, less its value at the start and what refinements
     /// and changes of the density scale have added: 0 for an exact integrator.
     pub error: f64,
 }
@@ -121,6 +122,46 @@ impl HistoryObserver {
         columns.add("overshoot_energy", "J", |now| now.energies.overshoot);
         if simulation.forces.can_be_singular() {
             columns.add("singular_points", "1", |now| now.singular_points as f64);
+        }
+        if problem.has_contact() {
+            columns.add("contact_energy", "J", |now| now.contact.energy);
+            columns.add("friction_energy", "J", |now| now.contact.friction);
+            columns.add("contact_damping_energy", "J", |now| now.contact.damping);
+        }
+        for (k, rigid) in problem.rigid.iter().enumerate() {
+            let of = |quantity: &str| format!("rigid_{}_{quantity}", rigid.name);
+            columns.add_vector(&of("force"), "N", move |now, d| {
+                now.contact.rigid[k].0.contact[d]
+            });
+            let axes = if D == 3 { 0..3 } else { 2..3 };
+            for axis in axes.filter(|_| D > 1) {
+                let name = format!("{}_{}", of("torque"), ["x", "y", "z"][axis]);
+                columns.add(name, "N m", move |now| {
+                    now.contact.rigid[k].0.contact[3 + axis]
+                });
+            }
+            columns.add_vector(&of("position"), "m", move |now, d| {
+                now.contact.rigid[k].0.position[d]
+            });
+            columns.add_vector(&of("velocity"), "m/s", move |now, d| {
+                now.contact.rigid[k].0.velocity[d]
+            });
+            columns.add(of("kinetic_energy"), "J", move |now| now.contact.rigid[k].1);
+        }
+        if let Some(contact) = &problem.contact {
+            columns.add("touching_pairs", "1", |now| now.contact.all.count as f64);
+            columns.add("deepest_overlap", "m", |now| now.contact.all.overlap);
+            for (k, pair) in contact.pairs.iter().enumerate() {
+                let of = |quantity: &str| format!("contact_{}_{quantity}", pair.name);
+                columns.add_vector(&of("force"), "N", move |now, d| {
+                    now.contact.pairs[k].force[d]
+                });
+                let count = move |now: &GlobalState| now.contact.pairs[k].count as f64;
+                columns.add(of("touching_pairs"), "1", count);
+                columns.add(of("deepest_overlap"), "m", move |now| {
+                    now.contact.pairs[k].overlap
+                });
+            }
         }
         let mut reactions = Vec::new();
         for (k, Reaction { set, span }) in problem.history.reactions.iter().enumerate() {
@@ -244,6 +285,7 @@ impl HistoryObserver {
         snapshot: &Snapshot,
     ) -> HistoryRow {
         let comm = simulation.comm;
+        let contact = contact_now(simulation);
         let (model, fields) = (&simulation.model, &simulation.fields);
         let mut sums = point_sums(simulation, snapshot);
         sums.push(sum(fields.external_work.as_deref().unwrap_or_default()));
@@ -276,7 +318,14 @@ impl HistoryObserver {
         let [intact, cracked_points, at_start, singular_points] = counts;
         let (lower, upper) = cracked.extent(comm);
 
-        let energy = own[0] + own[1] + own[2] + dissipated - work;
+        let dissipated = dissipated + contact.friction + contact.damping;
+        let rigid = contact.rigid.iter();
+        let (mut kinetic, mut work) = (own[0], work);
+        for (state, energy) in rigid {
+            kinetic += energy;
+            work += state.work;
+        }
+        let energy = kinetic + own[1] + own[2] + contact.energy + dissipated - work;
         let (first_energy, first_intact) = *self.start.get_or_insert((energy, at_start));
         let energies = Energies {
             kinetic: own[0],
@@ -333,6 +382,7 @@ impl HistoryObserver {
             fronts,
             cracks,
             tips,
+            contact,
         });
         HistoryRow {
             values,

@@ -119,7 +119,8 @@ impl Snapshot {
             }
             Field::Singular => simulation.forces.singular(model),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
-            // Where no bonds can break, and no points flow.
+            // Where nothing touches, no bonds can break, and no points flow.
+            Field::ContactForceDensity => vec![0.0; 3 * count],
             Field::BrokenBonds | Field::NewlyBrokenBonds | Field::PlasticStrainEquivalent => {
                 vec![0.0; count]
             }

@@ -1,0 +1,175 @@
+//! Contact, validated.
+
+use serde_spanned::Spanned;
+
+use super::grammar::{self, ContactName, Deck};
+use super::number::Number;
+use super::resolve::{Scope, find};
+use crate::error::Result;
+use crate::problem::{self, ContactModel, ContactRule};
+
+/// Damping beyond that of this coefficient of restitution makes steps very short.
+const LEAST_RESTITUTION: f64 = 0.01;
+
+/// The keys of a rule, as `[contact]`, its pairs and rigid bodies have them.
+#[derive(Clone, Copy)]
+pub(super) struct Keys<'a> {
+    pub model: ContactName,
+    pub stiffness: Option<&'a Number>,
+    pub radius: Option<&'a Number>,
+    pub friction: Option<&'a Number>,
+    pub static_friction: Option<&'a Number>,
+    pub restitution: Option<&'a Number>,
+}
+
+/// Validates contact.
+///
+/// # Errors
+/// On numbers out of range, on pairs that are given twice, and where the run has a method that knows no contact.
+pub fn contact(
+    scope: &Scope,
+    deck: &Deck,
+    bodies: &[problem::Body],
+) -> Result<Option<problem::Contact>> {
+    if deck.contact.is_some() || !deck.rigid.is_empty() {
+        is_explicit(scope, deck)?;
+    }
+    let Some(table) = &deck.contact else {
+        return Ok(None);
+    };
+    let table = table.get_ref();
+    let all = Keys {
+        model: *table.model.get_ref(),
+        stiffness: table.stiffness.as_ref(),
+        radius: table.radius.as_ref(),
+        friction: table.friction.as_ref(),
+        static_friction: table.static_friction.as_ref(),
+        restitution: table.restitution.as_ref(),
+    };
+    let mut contact = problem::Contact {
+        rule: rule(scope, "[contact]", all)?,
+        pairs: Vec::new(),
+    };
+    for (name, table) in &table.pair {
+        let key = format!("[contact.pair.{name}]");
+        let table = table.get_ref();
+        let own = Keys {
+            model: table
+                .model
+                .as_ref()
+                .map_or(all.model, |model| *model.get_ref()),
+            stiffness: table.stiffness.as_ref().or(all.stiffness),
+            radius: table.radius.as_ref().or(all.radius),
+            friction: table.friction.as_ref().or(all.friction),
+            static_friction: (table.static_friction.as_ref().or(table.friction.as_ref()))
+                .or(all.static_friction),
+            restitution: table.restitution.as_ref().or(all.restitution),
+        };
+        let names = pair(scope, &format!("{key} bodies"), &table.bodies, bodies)?;
+        if let Some(earlier) = contact
+            .pairs
+            .iter()
+            .find(|pair| pair.is_of(names.each_ref()))
+        {
+            let message = format!(
+                "{key} bodies: [contact.pair.{}] has `{}` and `{}` already",
+                earlier.name, names[0], names[1]
+            );
+            return Err(scope.error(table.bodies.span(), message));
+        }
+        contact.pairs.push(problem::ContactPair {
+            name: name.clone(),
+            bodies: names,
+            rule: rule(scope, &key, own)?,
+        });
+    }
+    Ok(Some(contact))
+}
+
+/// An error if a stage of a run with contact is a relaxation.
+fn is_explicit(scope: &Scope, deck: &Deck) -> Result<()> {
+    let of_time = ("[time]", &deck.time.get_ref().method);
+    let of_stages = deck.stage.iter();
+    let of_stages =
+        of_stages.filter_map(|stage| Some(("[[stage]]", stage.get_ref().method.as_ref()?)));
+    for (section, method) in std::iter::once(of_time).chain(of_stages) {
+        if *method.get_ref() == grammar::Method::Relaxation {
+            let message = format!(
+                "{section} method: a relaxation knows no contact; take \"explicit\" steps, or leave [contact] and [rigid] out"
+            );
+            return Err(scope.error(method.span(), message));
+        }
+    }
+    Ok(())
+}
+
+/// Validates a rule; `None` where there is no contact.
+pub(super) fn rule(scope: &Scope, section: &str, keys: Keys<'_>) -> Result<Option<ContactRule>> {
+    let positive = |number: Option<&Number>, key: &str| {
+        let number = number.map(|number| scope.positive(number, &format!("{section} {key}")));
+        number.transpose()
+    };
+    let coefficient = |number: Option<&Number>, key: &str| {
+        let key = format!("{section} {key}");
+        let number =
+            number.map(|number| scope.within(number, &key, 0.0..f64::INFINITY, "0 or more"));
+        number.transpose()
+    };
+    let radius = keys
+        .radius
+        .map(|radius| scope.length(radius, &format!("{section} radius")));
+    let radius = radius.transpose()?;
+    let stiffness = positive(keys.stiffness, "stiffness")?;
+    let kinetic_friction = coefficient(keys.friction, "friction")?.unwrap_or(0.0);
+    let static_friction =
+        coefficient(keys.static_friction, "static_friction")?.unwrap_or(kinetic_friction);
+    if let Some(number) = keys
+        .static_friction
+        .filter(|_| static_friction < kinetic_friction)
+    {
+        let message = format!(
+            "{section} static_friction: must be at least `friction`, {kinetic_friction}, is {static_friction}"
+        );
+        return Err(scope.error(number.span(), message));
+    }
+    let restitution = match keys.restitution {
+        Some(number) => {
+            let key = format!("{section} restitution");
+            let range = LEAST_RESTITUTION..1.0 + f64::EPSILON;
+            scope.within(number, &key, range, "between 0.01 and 1")?
+        }
+        None => 1.0,
+    };
+    let model = match keys.model {
+        ContactName::None => return Ok(None),
+        ContactName::Penalty => ContactModel::Penalty,
+        ContactName::ShortRange => ContactModel::ShortRange,
+    };
+    Ok(Some(ContactRule {
+        model,
+        stiffness,
+        radius,
+        static_friction,
+        kinetic_friction,
+        restitution,
+    }))
+}
+
+/// The names of the bodies of a pair.
+fn pair(
+    scope: &Scope,
+    key: &str,
+    written: &Spanned<Vec<grammar::Text>>,
+    bodies: &[problem::Body],
+) -> Result<[String; 2]> {
+    let [first, second] = &written.get_ref()[..] else {
+        let count = written.get_ref().len();
+        let message = format!("{key}: must name two bodies, names {count}");
+        return Err(scope.error(written.span(), message));
+    };
+    let name = |text| {
+        let names = bodies.iter().map(|body| body.name.as_str());
+        find(scope.source, text, names, key).map(|index| bodies[index].name.clone())
+    };
+    Ok([name(first)?, name(second)?])
+}

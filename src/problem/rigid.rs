@@ -1,0 +1,77 @@
+//! Rigid bodies that points can touch.
+
+use std::ops::Range;
+
+use super::{ContactRule, Problem};
+use crate::expression::Expression;
+
+/// A rigid body.
+#[derive(Debug, Clone)]
+pub struct Rigid {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    /// Its shape.
+    pub shape: RigidShape,
+    /// Its centre at the start, m; of a half space, a point of its surface.
+    pub centre: [f64; 3],
+    /// How it moves.
+    pub motion: RigidMotion,
+    /// Contact with points; its model is [`Penalty`](super::ContactModel::Penalty).
+    pub rule: ContactRule,
+}
+
+/// The shape of a rigid body about its centre, lengths in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RigidShape {
+    /// A ball; a disc in the plane.
+    Ball {
+        /// Its radius.
+        radius: f64,
+    },
+    /// A cylinder.
+    Cylinder {
+        /// Its direction, a unit vector.
+        axis: [f64; 3],
+        /// Half its length.
+        half_length: f64,
+        /// Its radius.
+        radius: f64,
+    },
+    /// A box along the axes.
+    Box {
+        /// Half its edges.
+        half: [f64; 3],
+    },
+    /// All that lies behind a plane.
+    HalfSpace {
+        /// Out of the half space, a unit vector.
+        normal: [f64; 3],
+    },
+}
+
+/// How a rigid body moves.
+#[derive(Debug, Clone)]
+pub enum RigidMotion {
+    /// By this displacement (m), an expression of t a component, without rotation.
+    Driven(Vec<Expression>),
+    /// By the forces on it.
+    Free {
+        /// Its mass, kg.
+        mass: f64,
+        /// Velocity of its centre at the start, m/s.
+        velocity: [f64; 3],
+        /// Angular velocity at the start, 1/s.
+        angular_velocity: [f64; 3],
+        /// Force at its centre, N, an expression of t a component; may be empty.
+        force: Vec<Expression>,
+    },
+}
+
+impl Problem {
+    /// Whether points can touch one another or a rigid body.
+    pub fn has_contact(&self) -> bool {
+        self.contact.is_some() || !self.rigid.is_empty()
+    }
+}

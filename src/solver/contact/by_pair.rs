@@ -1,0 +1,132 @@
+//! What touches now, over all ranks: in all, and by pair of bodies.
+
+use super::rigid::RigidState;
+use crate::comm::sum::{ExactSum, reduce};
+use crate::problem::Problem;
+use crate::solver::Simulation;
+
+/// Contact at one moment; the same on all ranks.
+#[derive(Debug, Clone, Default)]
+pub struct ContactNow {
+    /// Potential energy, J.
+    pub energy: f64,
+    /// Energy taken by friction so far, J.
+    pub friction: f64,
+    /// Energy taken by contact damping so far, J.
+    pub damping: f64,
+    /// All pairs of points.
+    pub all: Touching,
+    /// Those of each pair of bodies with a rule of its own.
+    pub pairs: Vec<Touching>,
+    /// Rigid bodies and their kinetic energies, J.
+    pub rigid: Vec<(RigidState, f64)>,
+}
+
+/// The pairs of points that touch.
+#[derive(Debug, Clone, Default)]
+pub struct Touching {
+    /// Number of them.
+    pub count: u64,
+    /// How much nearer the nearest ones are than where they begin to touch, m.
+    pub overlap: f64,
+    /// Force on the first of two bodies by component, N; friction and damping follow from the velocities at the full step.
+    pub force: Vec<f64>,
+}
+
+/// Sums of a pair of bodies on one rank.
+struct PairSum<const D: usize> {
+    /// Touches of owned points, so that a pair of points counts twice over all ranks.
+    count: u64,
+    overlap: f64,
+    force: [ExactSum; D],
+}
+
+/// Contact of a run at this moment; nothing where the run has none. Collective.
+pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> ContactNow {
+    let (comm, model, fields) = (simulation.comm, &simulation.model, &simulation.fields);
+    let Some(contact) = &mut simulation.contact else {
+        return ContactNow::default();
+    };
+    contact.update_foreign(comm, fields);
+    let contact = &*contact;
+    let bodies = bodies_of_pairs(simulation.problem);
+    let new = || PairSum {
+        count: 0,
+        overlap: 0.0,
+        force: [ExactSum::ZERO; D],
+    };
+    // All, then each pair.
+    let mut sums: Vec<PairSum<D>> = (0..=bodies.len()).map(|_| new()).collect();
+    for point in contact.open.iter().map(|point| *point as usize) {
+        let body = simulation.problem.body_of(usize::from(model.block[point]));
+        contact.for_each_touch(model, fields, point, |block, touch| {
+            let other = simulation.problem.body_of(block);
+            let of_pair = bodies.iter().position(|[first, second]| {
+                [*first, *second] == [body, other] || [*first, *second] == [other, body]
+            });
+            for place in [Some(0), of_pair.map(|pair| pair + 1)]
+                .into_iter()
+                .flatten()
+            {
+                sums[place].count += 1;
+                sums[place].overlap = sums[place].overlap.max(touch.overlap);
+            }
+            if let Some(pair) = of_pair.filter(|pair| bodies[*pair][0] == body && body != other) {
+                for d in 0..D {
+                    let force = touch.repulsion[d] + touch.damping[d] + touch.friction[d];
+                    sums[pair + 1].force[d].add(force);
+                }
+            }
+        });
+    }
+    let mut counts: Vec<u64> = sums.iter().map(|sum| sum.count).collect();
+    comm.sum(&mut counts);
+    let mut overlaps: Vec<f64> = sums.iter().map(|sum| sum.overlap).collect();
+    comm.max(&mut overlaps);
+    let columns = [
+        &fields.contact_energy,
+        &fields.friction_energy,
+        &fields.contact_damping_energy,
+    ];
+    let mut exact: Vec<ExactSum> = columns
+        .into_iter()
+        .map(|column| {
+            let mut sum = ExactSum::ZERO;
+            column.iter().flatten().for_each(|value| sum.add(*value));
+            sum
+        })
+        .collect();
+    exact.extend(sums.into_iter().flat_map(|sum| sum.force));
+    let exact = reduce(comm, &mut exact);
+    let mut all = counts.iter().zip(overlaps).zip(exact[3..].chunks_exact(D));
+    let mut touching = std::iter::from_fn(|| {
+        let ((count, overlap), force) = all.next()?;
+        Some(Touching {
+            count: count / 2,
+            overlap,
+            force: force.to_vec(),
+        })
+    });
+    let rigid: Vec<_> = contact
+        .rigid
+        .iter()
+        .map(|it| (it.state, it.kinetic_energy()))
+        .collect();
+    let taken = |of: fn(&RigidState) -> f64| rigid.iter().map(|(state, _)| of(state)).sum::<f64>();
+    ContactNow {
+        energy: exact[0],
+        friction: exact[1] + taken(|state| state.friction_energy),
+        damping: exact[2] + taken(|state| state.damping_energy),
+        all: touching.next().unwrap_or_default(),
+        pairs: touching.collect(),
+        rigid,
+    }
+}
+
+/// The bodies of each pair with a rule of its own.
+fn bodies_of_pairs(problem: &Problem) -> Vec<[usize; 2]> {
+    let index = |name: &String| problem.bodies.iter().position(|body| body.name == *name);
+    let pairs = problem.contact.iter().flat_map(|contact| &contact.pairs);
+    let bodies = pairs.filter_map(|pair| Some([index(&pair.bodies[0])?, index(&pair.bodies[1])?]));
+    bodies.collect()
+}

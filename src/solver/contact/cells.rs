@@ -1,0 +1,117 @@
+//! Points in cells of present space, for the search of contact. Cells are hashed, so that a fragment may fly as far as
+//! it likes.
+
+/// A cell by its coordinates; 0 beyond the dimension.
+pub(super) type Cell = [i64; 3];
+
+/// The cell of a place (m), for cells with this edge (m).
+pub(super) fn cell_of(place: [f64; 3], edge: f64) -> Cell {
+    place.map(|x| (x / edge).floor() as i64)
+}
+
+/// A number of a cell, as evenly spread as can be.
+pub(super) fn hash(cell: Cell) -> u64 {
+    cell.into_iter().fold(0_u64, |hash, k| {
+        let mixed = (hash ^ k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        mixed ^ mixed >> 29
+    })
+}
+
+/// The cells around a cell and itself, in a space of so many dimensions.
+pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item = Cell> {
+    (0..3_usize.pow(dimension as u32)).map(move |k| {
+        let shift = [k % 3, k / 3 % 3, k / 9].map(|shift| shift as i64 - 1);
+        std::array::from_fn(|d| {
+            if d < dimension {
+                cell[d].wrapping_add(shift[d])
+            } else {
+                cell[d]
+            }
+        })
+    })
+}
+
+/// Points by cell.
+pub(super) struct Cells {
+    edge: f64,
+    dimension: usize,
+    /// Where the points of each bucket begin in `entries`.
+    starts: Vec<u32>,
+    /// Cell and index of each point.
+    entries: Vec<(Cell, u32)>,
+}
+
+impl Cells {
+    /// Places (m) in cells of this edge (m).
+    pub fn new(places: &[[f64; 3]], edge: f64, dimension: usize) -> Self {
+        let buckets = places.len().next_power_of_two();
+        let mut starts = vec![0_u32; buckets + 1];
+        let cells: Vec<Cell> = places.iter().map(|place| cell_of(*place, edge)).collect();
+        let bucket = |cell: Cell| (hash(cell) as usize) & (buckets - 1);
+        for cell in &cells {
+            starts[bucket(*cell) + 1] += 1;
+        }
+        for k in 1..starts.len() {
+            starts[k] += starts[k - 1];
+        }
+        let mut next = starts.clone();
+        let mut entries = vec![([0; 3], 0); places.len()];
+        for (index, cell) in cells.into_iter().enumerate() {
+            let slot = &mut next[bucket(cell)];
+            entries[*slot as usize] = (cell, index as u32);
+            *slot += 1;
+        }
+        Self {
+            edge,
+            dimension,
+            starts,
+            entries,
+        }
+    }
+
+    /// Calls `visit` with the index of every point in the cell of a place (m) and in those around it: all within an edge
+    /// of the place are among them.
+    pub fn near(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
+        let mask = self.starts.len() - 2;
+        for cell in neighbourhood(cell_of(place, self.edge), self.dimension) {
+            let bucket = (hash(cell) as usize) & mask;
+            let entries = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
+            for (other, index) in &self.entries[entries] {
+                if *other == cell {
+                    visit(*index as usize);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_points_within_an_edge_are_found_however_far_others_are() {
+        let mut places: Vec<[f64; 3]> = (0..500)
+            .map(|k| {
+                let k = f64::from(k);
+                [
+                    (7.3 * k) % 10.0 - 5.0,
+                    (3.7 * k) % 9.0 - 4.5,
+                    (1.3 * k) % 8.0,
+                ]
+            })
+            .collect();
+        places.push([1e30, -1e200, 0.0]);
+        let cells = Cells::new(&places, 1.5, 3);
+        for place in &places {
+            let mut found = Vec::new();
+            cells.near(*place, |index| found.push(index));
+            found.sort_unstable();
+            assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "found once");
+            for (index, other) in places.iter().enumerate() {
+                let square: f64 = (0..3).map(|d| (place[d] - other[d]).powi(2)).sum();
+                assert!(square > 1.5 * 1.5 || found.contains(&index));
+            }
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Points of other ranks that may touch own ones: which they are, and how their motion arrives.
+//!
+//! Any two ranks can meet, however the points were dealt out. A cell of present space has a home rank, which hears who
+//! has points in it and who has points beside it, and brings both together.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::comm::halo::Neighbour;
+use crate::comm::{Communicator, Halo};
+
+use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
+
+/// Edge of a cell in reaches: few points are near a border then.
+const CELL: f64 = 4.0;
+
+/// A point as other ranks see it.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Foreign {
+    /// Its id.
+    pub id: u64,
+    /// Local index with its owner.
+    pub index: u64,
+    /// Its block.
+    pub block: u64,
+    /// Volume, m³.
+    pub volume: f64,
+    /// Reference position, m.
+    pub reference: [f64; 3],
+    /// Present position, m.
+    pub place: [f64; 3],
+}
+
+/// A rank has points in a cell, or beside it.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Claim {
+    cell: Cell,
+    /// 1 where it has points in the cell.
+    inside: u64,
+}
+
+/// Another rank has points in a cell or beside it.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Partner {
+    cell: Cell,
+    rank: u64,
+}
+
+/// The points of other ranks within `reach` (m) of own ones, in a space of so many dimensions, sorted by owner and then by
+/// id, and the plan by which values of them arrive, as many as `width` a point. Collective.
+pub(super) fn find(
+    comm: &dyn Communicator,
+    own: &[Foreign],
+    reach: f64,
+    dimension: usize,
+    width: usize,
+) -> (Vec<Foreign>, Halo) {
+    if comm.size() == 1 {
+        return (Vec::new(), Halo::default());
+    }
+    let edge = CELL * reach;
+    let mut inside: BTreeMap<Cell, Vec<u32>> = BTreeMap::new();
+    for (index, point) in own.iter().enumerate() {
+        let cell = cell_of(point.place, edge);
+        inside.entry(cell).or_default().push(index as u32);
+    }
+    let partners = partners(comm, &inside, dimension);
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    for Partner { cell, rank } in partners {
+        for index in &inside[&cell] {
+            outgoing[rank as usize].extend_from_slice(bytemuck::bytes_of(&own[*index as usize]));
+        }
+    }
+    let offered = comm.all_to_all(outgoing);
+
+    let places: Vec<[f64; 3]> = own.iter().map(|point| point.place).collect();
+    let cells = Cells::new(&places, reach, dimension);
+    let is_near = |point: &Foreign| {
+        let mut is_near = false;
+        cells.near(point.place, |index| {
+            let square = (0..dimension).map(|d| (places[index][d] - point.place[d]).powi(2));
+            is_near |= square.sum::<f64>() <= reach * reach;
+        });
+        is_near
+    };
+    let mut found: Vec<Foreign> = Vec::new();
+    let mut requests = vec![Vec::new(); comm.size()];
+    let mut received = vec![0..0; comm.size()];
+    for (rank, bytes) in offered.into_iter().enumerate() {
+        let mut points: Vec<Foreign> = bytemuck::pod_collect_to_vec(&bytes);
+        points.retain(is_near);
+        points.sort_unstable_by_key(|point| point.id);
+        for point in &points {
+            requests[rank].extend_from_slice(&point.index.to_ne_bytes());
+        }
+        received[rank] = found.len()..found.len() + points.len();
+        found.extend(points);
+    }
+    let requested = comm.all_to_all(requests);
+    let neighbours = requested.into_iter().zip(received).enumerate();
+    let neighbours = neighbours.filter_map(|(rank, (bytes, receive))| {
+        let send = bytemuck::pod_collect_to_vec::<u8, u64>(&bytes);
+        let send: Vec<u32> = send.into_iter().map(|index| index as u32).collect();
+        let talk = !send.is_empty() || !receive.is_empty();
+        talk.then_some(Neighbour {
+            rank,
+            send,
+            receive,
+        })
+    });
+    let halo = Halo::new(neighbours.collect(), width);
+    (found, halo)
+}
+
+/// For each other rank with points in or beside one of the cells that own points are in: the cell and the rank.
+/// Collective.
+fn partners(
+    comm: &dyn Communicator,
+    inside: &BTreeMap<Cell, Vec<u32>>,
+    dimension: usize,
+) -> Vec<Partner> {
+    let ranks = comm.size();
+    let near = inside
+        .keys()
+        .flat_map(|cell| neighbourhood(*cell, dimension));
+    let near: BTreeSet<Cell> = near.collect();
+    let mut claims = vec![Vec::new(); ranks];
+    for cell in near {
+        let claim = Claim {
+            cell,
+            inside: inside.contains_key(&cell).into(),
+        };
+        let home = (hash(cell) % ranks as u64) as usize;
+        claims[home].extend_from_slice(bytemuck::bytes_of(&claim));
+    }
+    let mut by_cell: BTreeMap<Cell, Vec<(usize, bool)>> = BTreeMap::new();
+    for (rank, bytes) in comm.all_to_all(claims).into_iter().enumerate() {
+        for claim in bytemuck::pod_collect_to_vec::<u8, Claim>(&bytes) {
+            let all = by_cell.entry(claim.cell).or_default();
+            all.push((rank, claim.inside == 1));
+        }
+    }
+    let mut replies = vec![Vec::new(); ranks];
+    for (cell, all) in by_cell {
+        for (owner, _) in all.iter().filter(|(_, inside)| *inside) {
+            for (other, _) in all.iter().filter(|(other, _)| other != owner) {
+                let partner = Partner {
+                    cell,
+                    rank: *other as u64,
+                };
+                replies[*owner].extend_from_slice(bytemuck::bytes_of(&partner));
+            }
+        }
+    }
+    let answers = comm.all_to_all(replies);
+    let answers = answers.iter();
+    answers
+        .flat_map(|bytes| bytemuck::pod_collect_to_vec::<u8, Partner>(bytes))
+        .collect()
+}

@@ -1,0 +1,308 @@
+//! The force between two points that touch.
+
+use std::f64::consts::PI;
+
+use crate::dimension::Dimension;
+use crate::material::Pmb;
+use crate::problem::{Body, ContactModel, ContactRule};
+
+/// Points touch with short-range forces at this share of the sum of their half edges (Silling & Askari 2005, §5).
+const SHORT_RANGE: f64 = 1.35;
+
+/// Short-range forces act below this share of the reference distance at most.
+const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
+
+/// Short-range forces are so many times as stiff as the bonds of a bond-based law (Macek & Silling 2007).
+const SHORT_RANGE_STIFFNESS: f64 = 15.0;
+
+/// Damping ratio of two points that stick by friction.
+const STICKING: f64 = 0.5;
+
+/// Contact between points of two blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PairRule {
+    /// The points touch at this distance, m; at `edge_share` times the mean of their edges if not given.
+    radius: Option<f64>,
+    edge_share: f64,
+    /// Points do not touch beyond this share of their reference distance, so no force acts at rest.
+    reference_share: f64,
+    stiffness: Stiffness,
+    response: Response,
+}
+
+/// How forces follow from the overlap and the velocities of what touches.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Response {
+    static_friction: f64,
+    kinetic_friction: f64,
+    /// Damping ratio of the collision of two points.
+    damping_ratio: f64,
+}
+
+/// The stiffness of a pair of points, N/m.
+#[derive(Debug, Clone, Copy)]
+enum Stiffness {
+    /// This times ℓ^(D − 1), ℓ the mean edge (m): a layer of material between them.
+    OfLayer(f64),
+    /// This (N/m⁷) times the volumes of both.
+    OfVolumes(f64),
+}
+
+/// What contact needs to know of a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ContactPoint<const D: usize> {
+    /// Reference position, m.
+    pub reference: [f64; D],
+    /// Displacement, m.
+    pub displacement: [f64; D],
+    /// Velocity, m/s.
+    pub velocity: [f64; D],
+    /// Volume, m³.
+    pub volume: f64,
+    /// Edge of a cell of that volume, m.
+    pub edge: f64,
+    /// Mass, kg.
+    pub mass: f64,
+}
+
+impl<const D: usize> ContactPoint<D> {
+    /// Present position, m.
+    pub fn place(&self) -> [f64; 3] {
+        let place = std::array::from_fn(|d| self.reference[d] + self.displacement[d]);
+        whole::<D>(place)
+    }
+}
+
+/// A vector in space; components beyond the dimension are 0.
+pub(super) fn whole<const D: usize>(vector: [f64; D]) -> [f64; 3] {
+    let mut whole = [0.0; 3];
+    whole[..D].copy_from_slice(&vector);
+    whole
+}
+
+/// What a point that touches another one feels of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Touch<const D: usize> {
+    /// Repulsive force on the first point, N; it has the potential `energy`.
+    pub repulsion: [f64; D],
+    /// Force of normal damping on the first point, N.
+    pub damping: [f64; D],
+    /// Friction on the first point, N.
+    pub friction: [f64; D],
+    /// Potential energy of the pair, J.
+    pub energy: f64,
+    /// Stiffness that an explicit step has to resolve, damping included, N/m.
+    pub stiffness: f64,
+    /// How much nearer the points are than where they begin to touch, m.
+    pub overlap: f64,
+}
+
+impl PairRule {
+    /// Contact between points of two bodies.
+    pub fn new(dimension: Dimension, rule: &ContactRule, bodies: [&Body; 2]) -> Self {
+        let elastic = bodies.map(|body| body.material.elastic);
+        let horizon = bodies[0].horizon.min(bodies[1].horizon);
+        let (edge_share, reference_share, stiffness) = match rule.model {
+            ContactModel::Penalty => {
+                // Half a horizon of each material, one after the other.
+                let [first, second] = elastic.map(|elastic| elastic.youngs_modulus);
+                let series = 2.0 * first * second / (first + second);
+                let modulus = rule.stiffness.unwrap_or(series);
+                let layer = modulus * dimension.out_of_plane_measure() / horizon;
+                (1.0, 1.0, Stiffness::OfLayer(layer))
+            }
+            ContactModel::ShortRange => {
+                let [first, second] = elastic.map(|elastic| elastic.bulk_modulus());
+                let stiffest = SHORT_RANGE_STIFFNESS * first.min(second);
+                let modulus = rule.stiffness.unwrap_or(stiffest);
+                let constant = micromodulus(dimension, modulus, horizon) / horizon;
+                let (share, reference) = (SHORT_RANGE, SHORT_RANGE_OF_REFERENCE);
+                (share, reference, Stiffness::OfVolumes(constant))
+            }
+        };
+        Self {
+            radius: rule.radius,
+            edge_share,
+            reference_share,
+            stiffness,
+            response: Response::new(rule),
+        }
+    }
+
+    /// The largest distance (m) at which points with edges of at most `edge` (m) touch.
+    pub fn largest_distance(&self, edge: f64) -> f64 {
+        self.radius.unwrap_or(self.edge_share * edge)
+    }
+
+    /// Whether forces depend on velocities.
+    pub fn has_dissipation(&self) -> bool {
+        self.response.is_rough() || self.response.damping_ratio > 0.0
+    }
+
+    /// The distance (m) at which points with these edges (m) begin to touch, `reference` (m) apart at the start.
+    pub fn distance(&self, edges: [f64; 2], reference: f64) -> f64 {
+        let distance = self.largest_distance(0.5 * (edges[0] + edges[1]));
+        distance.min(self.reference_share * reference)
+    }
+
+    /// What the first of two points feels of the second, if they touch. With the points exchanged, all forces have the
+    /// opposite sign to the bit.
+    pub fn touch<const D: usize>(
+        &self,
+        first: &ContactPoint<D>,
+        second: &ContactPoint<D>,
+    ) -> Option<Touch<D>> {
+        let reference: [f64; D] = std::array::from_fn(|d| second.reference[d] - first.reference[d]);
+        let place: [f64; D] = std::array::from_fn(|d| {
+            reference[d] + (second.displacement[d] - first.displacement[d])
+        });
+        let apart = norm(place);
+        let overlap = self.distance([first.edge, second.edge], norm(reference)) - apart;
+        if overlap <= 0.0 || apart == 0.0 {
+            return None;
+        }
+        let normal = place.map(|component| component / apart);
+        let stiffness = match self.stiffness {
+            Stiffness::OfLayer(layer) => {
+                let edge = 0.5 * (first.edge + second.edge);
+                layer * edge.powi(D as i32 - 1)
+            }
+            Stiffness::OfVolumes(constant) => constant * (first.volume * second.volume),
+        };
+        let mass = first.mass * second.mass / (first.mass + second.mass);
+        let velocity = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);
+        Some(
+            self.response
+                .touch(stiffness, overlap, normal, velocity, mass),
+        )
+    }
+}
+
+impl Response {
+    /// Friction and damping of a rule.
+    pub fn new(rule: &ContactRule) -> Self {
+        Self {
+            static_friction: rule.static_friction,
+            kinetic_friction: rule.kinetic_friction,
+            damping_ratio: damping_ratio(rule.restitution),
+        }
+    }
+
+    fn is_rough(&self) -> bool {
+        self.static_friction > 0.0 || self.kinetic_friction > 0.0
+    }
+
+    /// What a point feels of something that it overlaps by so much (m), with a stiffness in N/m. `normal` points from it to
+    /// the other, `velocity` (m/s) is its own as the other sees it, and `mass` the reduced one of both, kg.
+    pub fn touch<const D: usize>(
+        &self,
+        stiffness: f64,
+        overlap: f64,
+        normal: [f64; D],
+        velocity: [f64; D],
+        mass: f64,
+    ) -> Touch<D> {
+        let repulsion = stiffness * overlap;
+        let critical = 2.0 * (stiffness * mass).sqrt();
+        let approach = dot(velocity, normal);
+        // Damping never pulls.
+        let pressure = (repulsion + self.damping_ratio * critical * approach).max(0.0);
+        let sliding: [f64; D] = std::array::from_fn(|d| velocity[d] - approach * normal[d]);
+        let speed = norm(sliding);
+        let drag = if self.is_rough() && speed > 0.0 {
+            let sticking = STICKING * critical * speed;
+            if sticking <= self.static_friction * pressure {
+                sticking
+            } else {
+                sticking.min(self.kinetic_friction * pressure)
+            }
+        } else {
+            0.0
+        };
+        let ratio = if self.is_rough() {
+            STICKING.max(self.damping_ratio)
+        } else {
+            self.damping_ratio
+        };
+        Touch {
+            repulsion: normal.map(|component| -repulsion * component),
+            damping: normal.map(|component| -(pressure - repulsion) * component),
+            friction: sliding.map(|component| {
+                if speed > 0.0 {
+                    -drag * (component / speed)
+                } else {
+                    0.0
+                }
+            }),
+            energy: 0.5 * repulsion * overlap,
+            stiffness: stiffness * (libm::hypot(1.0, ratio) + ratio).powi(2),
+            overlap,
+        }
+    }
+}
+
+/// The damping ratio with which two points have this coefficient of restitution, above 0 and up to 1.
+fn damping_ratio(restitution: f64) -> f64 {
+    if restitution == 1.0 {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    while restitution_of(high) > restitution {
+        high *= 2.0;
+    }
+    // Halved until no number lies between them.
+    for _ in 0..64 {
+        let middle = 0.5 * (low + high);
+        if restitution_of(middle) >= restitution {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+/// The coefficient of restitution of a damped linear spring that never pulls (Schwager & Pöschel 2007, eq. 19 to 21).
+fn restitution_of(ratio: f64) -> f64 {
+    let root = (1.0 - ratio * ratio).abs().sqrt();
+    if root < 1e-8 {
+        return libm::exp(-2.0);
+    }
+    let turned = if ratio < 1.0 {
+        PI - libm::atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio * ratio)
+    } else {
+        libm::log((ratio + root) / (ratio - root))
+    };
+    libm::exp(-ratio / root * turned)
+}
+
+/// c of a bond-based law with this bulk modulus (Pa) and horizon (m), N/m⁶.
+fn micromodulus(dimension: Dimension, modulus: f64, horizon: f64) -> f64 {
+    let youngs_modulus = 3.0 * (1.0 - 2.0 * dimension.bond_based_poisson_ratio()) * modulus;
+    Pmb::new(dimension, youngs_modulus, horizon).micromodulus
+}
+
+fn dot<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
+    (0..D).map(|d| a[d] * b[d]).sum()
+}
+
+fn norm<const D: usize>(a: [f64; D]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn restitution_falls_with_damping() {
+        assert_eq!(damping_ratio(1.0), 0.0);
+        let mut last = 0.0;
+        for restitution in [0.9, 0.5, 0.2, 0.1353, 0.1, 0.02] {
+            let ratio = damping_ratio(restitution);
+            assert!(ratio > last);
+            assert!((restitution_of(ratio) / restitution - 1.0).abs() < 1e-9);
+            last = ratio;
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! A rigid body: its motion, and where points touch it.
+
+use bytemuck::{Pod, Zeroable};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+use crate::comm::sum::ExactSum;
+use crate::dimension::Dimension;
+use crate::expression::Expression;
+use crate::problem::{self, Body, RigidMotion};
+
+use super::pair::{ContactPoint, Response, Touch, whole};
+use super::shape::{distance, inertia};
+
+/// Numbers of a [`Wrench`].
+const WRENCH: usize = 6;
+
+/// A force (N) and its torque about the centre (N m).
+type Wrench = [f64; WRENCH];
+
+/// What of a rigid body changes; the same on all ranks.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RigidState {
+    /// Its centre, m.
+    pub position: [f64; 3],
+    /// m/s; of a driven body the mean of the last step.
+    pub velocity: [f64; 3],
+    /// From its axes to those of space: i, j, k, w.
+    pub rotation: [f64; 4],
+    /// kg m²/s.
+    pub angular_momentum: [f64; 3],
+    /// What points exert on it.
+    pub contact: Wrench,
+    /// The shares of friction and damping in that.
+    friction: Wrench,
+    damping: Wrench,
+    /// Prescribed force, N.
+    load: [f64; 3],
+    /// Work done on it by its load, or by what drives it, J.
+    pub work: f64,
+    /// What friction has taken of it, J; the rest has been taken of the points.
+    pub friction_energy: f64,
+    /// As `friction_energy`, by contact damping.
+    pub damping_energy: f64,
+}
+
+/// A rigid body of a run.
+#[derive(Debug)]
+pub(super) struct RigidBody {
+    problem: problem::Rigid,
+    dimension: Dimension,
+    pub state: RigidState,
+    /// 0 for a driven one, kg.
+    mass: f64,
+    /// In its own axes, kg m², and its inverse.
+    inertia: [Matrix3<f64>; 2],
+    response: Response,
+    /// The modulus of its surface over the thickness of the layer, N/m³, by block.
+    layers: Vec<f64>,
+}
+
+/// The sums of what points exert on a body.
+pub(super) struct WrenchSums {
+    /// Contact, friction, damping.
+    sums: [[ExactSum; WRENCH]; 3],
+}
+
+impl WrenchSums {
+    pub fn new() -> Self {
+        Self {
+            sums: std::array::from_fn(|_| [const { ExactSum::ZERO }; WRENCH]),
+        }
+    }
+
+    pub fn flat(self) -> impl Iterator<Item = ExactSum> {
+        self.sums.into_iter().flatten()
+    }
+
+    /// How many sums there are.
+    pub const COUNT: usize = 3 * WRENCH;
+}
+
+impl RigidBody {
+    /// Its name and place in the deck.
+    pub fn problem(&self) -> &problem::Rigid {
+        &self.problem
+    }
+
+    /// At the start of a run.
+    pub fn new(problem: &problem::Rigid, dimension: Dimension, bodies: &[&Body]) -> Self {
+        let (mass, velocity, spin) = match &problem.motion {
+            RigidMotion::Driven(_) => (0.0, [0.0; 3], [0.0; 3]),
+            RigidMotion::Free {
+                mass,
+                velocity,
+                angular_velocity,
+                ..
+            } => (*mass, *velocity, *angular_velocity),
+        };
+        let moments = mass.max(f64::MIN_POSITIVE) * inertia(&problem.shape, dimension.count());
+        let inverse = moments.try_inverse().unwrap_or_else(Matrix3::identity);
+        let layer = |body: &&Body| {
+            // Half a horizon of the points' material.
+            let modulus = problem
+                .rule
+                .stiffness
+                .unwrap_or(body.material.elastic.youngs_modulus);
+            2.0 * modulus * dimension.out_of_plane_measure() / body.horizon
+        };
+        Self {
+            problem: problem.clone(),
+            dimension,
+            state: RigidState {
+                position: problem.centre,
+                velocity,
+                rotation: [0.0, 0.0, 0.0, 1.0],
+                angular_momentum: (moments * Vector3::from(spin)).into(),
+                ..RigidState::zeroed()
+            },
+            mass,
+            inertia: [moments, inverse],
+            response: Response::new(&problem.rule),
+            layers: bodies.iter().map(layer).collect(),
+        }
+    }
+
+    fn rotation(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_unchecked(Quaternion::from(nalgebra::Vector4::from(
+            self.state.rotation,
+        )))
+    }
+
+    /// ω for an angular momentum, with the axes turned so.
+    fn angular_velocity(&self, rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
+        if self.mass == 0.0 {
+            return Vector3::zeros();
+        }
+        let own = rotation.inverse_transform_vector(&self.state.angular_momentum.into());
+        rotation.transform_vector(&(self.inertia[1] * own))
+    }
+
+    /// Kinetic energy, J.
+    pub fn kinetic_energy(&self) -> f64 {
+        if self.mass == 0.0 {
+            return 0.0;
+        }
+        let spin = self.angular_velocity(&self.rotation());
+        let turning = spin.dot(&Vector3::from(self.state.angular_momentum));
+        0.5 * (self.mass * Vector3::from(self.state.velocity).norm_squared() + turning)
+    }
+
+    /// Expressions of t at a time (s); 0 where there are none.
+    fn values(expressions: &[Expression], time: f64) -> [f64; 3] {
+        std::array::from_fn(|d| {
+            let value = expressions.get(d).map(|it| it.evaluate([0.0; 3], time));
+            value.unwrap_or(0.0)
+        })
+    }
+
+    /// Moves on to a time (s) by a step (s), with half a kick before.
+    pub fn drift(&mut self, time: f64, step: f64) {
+        match &self.problem.motion {
+            RigidMotion::Driven(displacement) => {
+                let moved = Self::values(displacement, time);
+                for d in 0..3 {
+                    let new = self.problem.centre[d] + moved[d];
+                    self.state.velocity[d] = (new - self.state.position[d]) / step;
+                    self.state.position[d] = new;
+                }
+            }
+            RigidMotion::Free { .. } => {
+                self.kick(0.5 * step);
+                for d in 0..3 {
+                    self.state.position[d] += step * self.state.velocity[d];
+                }
+                // The midpoint rule: angular momentum stays, and so does energy to second order.
+                let rotation = self.rotation();
+                let middle = turned(&rotation, self.angular_velocity(&rotation), 0.5 * step);
+                let new = turned(&rotation, self.angular_velocity(&middle), step);
+                self.state.rotation = new.coords.into();
+            }
+        }
+    }
+
+    fn kick(&mut self, time: f64) {
+        if self.mass > 0.0 {
+            for d in 0..3 {
+                let force = self.state.contact[d] + self.state.load[d];
+                self.state.velocity[d] += time * (force / self.mass);
+                self.state.angular_momentum[d] += time * self.state.contact[3 + d];
+            }
+        }
+    }
+
+    /// Takes note of what points exert after a step (s) that has come to a time (s), and makes the second half kick.
+    pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
+        let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
+        let [contact, friction, damping] = [0, 1, 2].map(wrench);
+        let spin = self.angular_velocity(&self.rotation());
+        let state = &mut self.state;
+        let velocity = [state.velocity, spin.into()].concat();
+        // The trapezoid of both ends of the step.
+        let work = |before: &Wrench, after: &Wrench| -> f64 {
+            let powers = (0..WRENCH).map(|c| (before[c] + after[c]) * velocity[c]);
+            0.5 * step * powers.sum::<f64>()
+        };
+        state.friction_energy -= work(&state.friction, &friction);
+        state.damping_energy -= work(&state.damping, &damping);
+        match &self.problem.motion {
+            RigidMotion::Driven(_) => state.work -= work(&state.contact, &contact),
+            RigidMotion::Free { force, .. } => {
+                let load = Self::values(force, time);
+                let both = (0..3).map(|d| (state.load[d] + load[d]) * state.velocity[d]);
+                state.work += 0.5 * step * both.sum::<f64>();
+                state.load = load;
+            }
+        }
+        (state.contact, state.friction, state.damping) = (contact, friction, damping);
+        self.kick(0.5 * step);
+    }
+
+    fn surface(&self, place: [f64; 3]) -> (f64, Vector3<f64>) {
+        let rotation = self.rotation();
+        let seen = Vector3::from(place) - Vector3::from(self.state.position);
+        let own = rotation.inverse_transform_vector(&seen);
+        let (apart, normal) = distance(&self.problem.shape, own, self.dimension.count());
+        (apart, rotation.transform_vector(&normal))
+    }
+
+    /// Whether a point touches the body.
+    pub fn touches<const D: usize>(&self, point: &ContactPoint<D>) -> bool {
+        self.overlap(point).0 > 0.0
+    }
+
+    /// How much nearer (m) a point is to the surface than where it begins to touch, and the normal there. It touches at half
+    /// the edge of its cell, or as near as it began.
+    fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
+        let (apart, normal) = self.surface(point.place());
+        let half = 0.5 * point.edge;
+        if apart >= half {
+            return (0.0, normal);
+        }
+        (
+            half.min(self.start_distance(whole(point.reference))) - apart,
+            normal,
+        )
+    }
+
+    /// How far (m) a place is from the surface at the start, negative inside.
+    pub fn start_distance(&self, place: [f64; 3]) -> f64 {
+        let seen = Vector3::from(place) - Vector3::from(self.problem.centre);
+        distance(&self.problem.shape, seen, self.dimension.count()).0
+    }
+
+    /// What a point of a block feels of the body if it touches it.
+    pub fn touch<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> Option<Touch<D>> {
+        let (overlap, normal) = self.overlap(point);
+        if overlap <= 0.0 {
+            return None;
+        }
+        let stiffness = self.layers[block] * point.edge.powi(D as i32 - 1);
+        let mass = if self.mass > 0.0 {
+            point.mass * self.mass / (point.mass + self.mass)
+        } else {
+            point.mass
+        };
+        let (place, velocity) = (point.place(), point.velocity);
+        let spin = self.angular_velocity(&self.rotation());
+        let arm = Vector3::from(place) - Vector3::from(self.state.position);
+        let surface = Vector3::from(self.state.velocity) + spin.cross(&arm);
+        let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
+        // Out of the point, as between points.
+        let normal = std::array::from_fn(|d| -normal[d]);
+        Some(
+            self.response
+                .touch(stiffness, overlap, normal, relative, mass),
+        )
+    }
+
+    /// Adds the opposite of what a point at a place (m) feels. Returns how far it is from the centre, m.
+    pub fn add_opposite<const D: usize>(
+        &self,
+        sums: &mut WrenchSums,
+        place: [f64; 3],
+        touch: &Touch<D>,
+    ) -> f64 {
+        let arm = Vector3::from(place) - Vector3::from(self.state.position);
+        let all: [f64; D] =
+            std::array::from_fn(|d| touch.repulsion[d] + touch.damping[d] + touch.friction[d]);
+        let forces = [all, touch.friction, touch.damping];
+        let forces = forces.map(|force| -Vector3::from(whole(force)));
+        for (sums, force) in sums.sums.iter_mut().zip(forces) {
+            let torque = arm.cross(&force);
+            for d in 0..3 {
+                sums[d].add(force[d]);
+                sums[3 + d].add(torque[d]);
+            }
+        }
+        arm.norm()
+    }
+
+    /// What its acceleration adds to the bound of the frequencies, for a sum of stiffnesses (N/m): 2 Σ k (1/m + r²/I) at
+    /// most, with the distance r of the touching points (m).
+    pub fn stiffness(&self, sum: f64, reach: f64) -> f64 {
+        if self.mass == 0.0 {
+            return 0.0;
+        }
+        let inverse = self.inertia[1].diagonal().max();
+        2.0 * sum * (1.0 / self.mass + reach * reach * inverse)
+    }
+}
+
+/// Turned on with an angular velocity (1/s) for a time (s).
+fn turned(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
+    let half = 0.5 * time * spin;
+    // (1 + ½ Δt ω) q: the angle is right to third order, and needs no sine.
+    let turn = Quaternion::from_parts(1.0, half);
+    UnitQuaternion::new_normalize(turn * rotation.quaternion())
+}

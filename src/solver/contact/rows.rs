@@ -1,0 +1,118 @@
+//! The pairs of points that may touch before the next search.
+
+use rayon::prelude::*;
+
+/// Points handled by one task.
+const CHUNK: usize = 1024;
+
+/// The points that may touch each owned point, in ascending order of ids.
+#[derive(Debug, Default)]
+pub(super) struct Rows {
+    /// Where the pairs of each owned point begin.
+    starts: Vec<usize>,
+    /// Index of the other point: owned points, then those of other ranks.
+    others: Vec<u32>,
+    ids: Vec<u64>,
+    /// Whether an intact bond joins the pair: it does not touch then.
+    is_bonded: Vec<bool>,
+}
+
+/// A pair that is searched for bonds.
+pub(super) struct FoundPair {
+    /// Id of the other point.
+    pub id: u64,
+    /// Its index.
+    pub other: u32,
+}
+
+impl Rows {
+    /// Rows of so many points, those of each found by `find`. Which pairs are bonded is still to be said.
+    pub fn new(points: usize, find: impl Fn(usize, &mut Vec<FoundPair>) + Sync) -> Self {
+        let chunks = points.div_ceil(CHUNK);
+        let chunks: Vec<(Vec<usize>, Vec<FoundPair>)> = (0..chunks)
+            .into_par_iter()
+            .map(|chunk| {
+                let (mut lengths, mut all, mut row) = (Vec::new(), Vec::new(), Vec::new());
+                for point in chunk * CHUNK..((chunk + 1) * CHUNK).min(points) {
+                    find(point, &mut row);
+                    row.sort_unstable_by_key(|found| found.id);
+                    lengths.push(row.len());
+                    all.append(&mut row);
+                }
+                (lengths, all)
+            })
+            .collect();
+        let mut rows = Self {
+            starts: vec![0],
+            ..Self::default()
+        };
+        for (lengths, all) in chunks {
+            for length in lengths {
+                rows.starts
+                    .push(rows.starts[rows.starts.len() - 1] + length);
+            }
+            rows.others.extend(all.iter().map(|found| found.other));
+            rows.ids.extend(all.iter().map(|found| found.id));
+        }
+        rows.is_bonded = vec![false; rows.ids.len()];
+        rows
+    }
+
+    /// The indices of the points that may touch an owned point: no bond joins them.
+    pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
+        let row = self.starts[point]..self.starts[point + 1];
+        row.filter(|pair| !self.is_bonded[*pair])
+            .map(|pair| self.others[pair] as usize)
+    }
+
+    /// Whether there are [points that may touch](Self::touching) an owned point.
+    pub fn is_open(&self, point: usize) -> bool {
+        let row = self.starts[point]..self.starts[point + 1];
+        self.is_bonded[row].contains(&false)
+    }
+
+    /// Whether a bond may join an owned point to one of its row.
+    pub fn is_empty(&self, point: usize) -> bool {
+        self.starts[point] == self.starts[point + 1]
+    }
+
+    /// Takes note that a bond joins an owned point to the point with this id.
+    pub fn set_bonded(&mut self, point: usize, id: u64) {
+        let row = self.starts[point]..self.starts[point + 1];
+        if let Ok(place) = self.ids[row.clone()].binary_search(&id) {
+            self.is_bonded[row.start + place] = true;
+        }
+    }
+
+    /// Takes note that no bond joins an owned point to any of its row.
+    pub fn set_unbonded(&mut self, point: usize) {
+        self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
+    }
+
+    /// Takes over which pairs are bonded from earlier rows of the same points, and returns the points with pairs that were
+    /// not in them.
+    pub fn inherit(&mut self, earlier: &Self) -> Vec<usize> {
+        let mut new = Vec::new();
+        for point in 0..self.starts.len() - 1 {
+            let row = self.starts[point]..self.starts[point + 1];
+            let before = earlier.starts[point]..earlier.starts[point + 1];
+            let mut is_new = false;
+            for pair in row {
+                match earlier.ids[before.clone()].binary_search(&self.ids[pair]) {
+                    Ok(place) => self.is_bonded[pair] = earlier.is_bonded[before.start + place],
+                    Err(_) => is_new = true,
+                }
+            }
+            if is_new {
+                new.push(point);
+            }
+        }
+        new
+    }
+
+    /// Memory, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.starts[..])
+            + self.ids.len() * (size_of::<u32>() + size_of::<u64>() + size_of::<bool>())
+    }
+}

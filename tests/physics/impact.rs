@@ -1,0 +1,371 @@
+//! Contact: bodies that collide, stick and slide; momentum, energy and the faces of a crack.
+
+use crate::support::history::{column, row};
+use crate::support::{largest_force, problem, simulate};
+use fissure::comm::threads;
+use fissure::solver::Simulation;
+use fissure::solver::observers::HistoryObserver;
+
+/// Rows of the named columns, one each `every` steps until the end.
+fn history<const D: usize>(deck: &str, every: u64, names: &[&str]) -> Vec<Vec<f64>> {
+    simulate::<D, _>(deck, |mut simulation| {
+        let mut observer = HistoryObserver::new(&simulation).unwrap();
+        let places: Vec<usize> = names.iter().map(|name| column(&observer, name)).collect();
+        let mut rows = Vec::new();
+        let mut look = |simulation: &mut Simulation<'_, D>| {
+            let values = row(&mut observer, simulation).values;
+            rows.push(places.iter().map(|place| values[*place]).collect());
+        };
+        look(&mut simulation);
+        while !simulation.is_over() {
+            simulation.advance();
+            if simulation.clock.number().is_multiple_of(every) || simulation.is_over() {
+                look(&mut simulation);
+            }
+        }
+        simulation.check().unwrap();
+        rows
+    })
+}
+
+/// Two equal bars of steel, 0.1 m long, that run into each other with 10 m/s.
+fn bars(contact: &str) -> String {
+    format!(
+        "dimension = '1d'
+        grid = {{ spacing = 1e-3, horizon = 3.015e-3 }}
+        material.steel.pmb = {{ density = 8000, youngs_modulus = 200e9 }}
+        contact = {{ pair.hit.bodies = ['left', 'right'], {contact} }}
+        body.left = {{ material = 'steel', shape.box = {{ lower = [0], upper = [0.1] }} }}
+        body.right = {{ material = 'steel', shape.box = {{ lower = [0.1], upper = [0.2] }} }}
+        initial.left = {{ set = 'left', velocity = [10] }}
+        initial.right = {{ set = 'right', velocity = [-10] }}
+        time.end = 60e-6
+        "
+    )
+}
+
+#[test]
+fn equal_bars_exchange_their_velocities_in_the_time_of_two_waves() {
+    for model in ["penalty", "short-range"] {
+        let names = [
+            "time",
+            "kinetic_energy",
+            "energy_error",
+            "momentum_x",
+            "touching_pairs",
+            "contact_hit_force_x",
+        ];
+        let rows = history::<1>(&bars(&format!("model = '{model}'")), 1, &names);
+        // 2 L/c with c = √(E/ρ).
+        let touching: Vec<f64> = rows
+            .iter()
+            .filter(|row| row[4] > 0.0)
+            .map(|row| row[0])
+            .collect();
+        let lasted = touching.last().unwrap() - touching[0];
+        assert!((lasted / 40e-6 - 1.0).abs() < 0.02, "{model}: {lasted} s");
+        let [first, last] = [&rows[0], rows.last().unwrap()];
+        assert!((last[1] / first[1] - 1.0).abs() < 0.02, "{model}: {last:?}");
+        assert!((last[2] / first[1]).abs() < 0.01, "{model}: {last:?}");
+        let momentum = 0.1 * 8000.0 * 10.0;
+        for row in &rows {
+            assert!(row[3].abs() < 1e-12 * momentum, "{model}: {row:?}");
+            assert!(row[5] <= 0.0, "contact pulls: {row:?}");
+        }
+    }
+}
+
+#[test]
+fn damping_takes_what_the_motion_loses() {
+    let names = [
+        "kinetic_energy",
+        "energy_error",
+        "contact_damping_energy",
+        "friction_energy",
+        "momentum_x",
+    ];
+    let deck = bars("restitution = 0.3") + "time.safety = 0.4\n";
+    let rows = history::<1>(&deck, 20, &names);
+    let [first, last] = [&rows[0], rows.last().unwrap()];
+    assert!(last[2] > 0.005 * first[0], "{last:?}");
+    assert_eq!(last[3], 0.0);
+    assert!(last[1].abs() < 0.1 * last[2], "{last:?}");
+    assert!(last[4].abs() < 1e-9, "{last:?}");
+}
+
+/// Two single points in the plane, `apart` spacings of 1 m apart along x, of mass 2 kg.
+fn two_points(contact: &str, apart: f64, velocities: [[f64; 2]; 2], end: f64) -> String {
+    let [[a, b], [c, d]] = velocities;
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3, volume_correction = 'none' }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        contact = {{ {contact} }}
+        body.first = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [1, 1] }} }}
+        body.second = {{ material = 'rubber', shape.box = {{ lower = [{apart}, 0], upper = [{}, 1] }} }}
+        initial.first = {{ set = 'first', velocity = [{a}, {b}] }}
+        initial.second = {{ set = 'second', velocity = [{c}, {d}] }}
+        time = {{ end = {end}, step = 1e-3 }}
+        history.probe = {{ first.at = [0.5, 0.5], second.at = [{}, 0.5] }}
+        ",
+        apart + 1.0,
+        apart + 0.5
+    )
+}
+
+#[test]
+fn restitution_is_that_of_two_points() {
+    for restitution in [1.0, 0.7, 0.2] {
+        let deck = two_points(
+            &format!("restitution = {restitution}"),
+            1.1,
+            [[0.1, 0.0], [-0.1, 0.0]],
+            8.0,
+        );
+        let names = [
+            "probe_first_velocity_x",
+            "probe_second_velocity_x",
+            "energy_error",
+        ];
+        let rows = history::<2>(&deck, 50, &names);
+        let last = rows.last().unwrap();
+        let after = (last[1] - last[0]) / 0.2;
+        assert!((after - restitution).abs() < 2e-3, "{restitution}: {after}");
+        assert!(last[2].abs() < 1e-5, "{last:?}");
+    }
+}
+
+#[test]
+fn points_that_stick_move_together() {
+    let names = ["probe_first_velocity_y", "friction_energy", "energy_error"];
+    let deck = two_points("friction = 50", 1.0, [[0.2, 0.004], [0.0, 0.0]], 4.0);
+    let rows = history::<2>(&deck, 1, &names);
+    let last = rows.last().unwrap();
+    // Without friction it is 0.0052: the contact turns.
+    assert!((last[0] / 0.002 - 1.0).abs() < 0.25, "{last:?}");
+    assert!(last[1] > 0.0 && last[2].abs() < 1e-2 * last[1], "{last:?}");
+}
+
+/// A block on an incline of this slope, which is a rigid half space, with gravity 0.01 m/s²; it begins with a speed down.
+fn incline(angle: f64, friction: &str, speed: f64) -> String {
+    let (sine, cosine) = (angle.sin(), angle.cos());
+    let (x, y) = (2.0 * 0.01 * sine, -2.0 * 0.01 * cosine);
+    format!(
+        "dimension = 'plane-strain'
+        grid = {{ spacing = 1, horizon = 3 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        rigid.slope = {{ half_space = {{ through = [0, 0], normal = [0, 1] }}, {friction}, restitution = 0.2 }}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [8, 4] }} }}
+        initial.slide = {{ set = 'block', velocity = [{speed}, 0] }}
+        condition.gravity = {{ set = 'block', body_force = [{x}, {y}] }}
+        time.end = 100
+        "
+    )
+}
+
+#[test]
+fn a_block_on_an_incline_slides_or_sticks() {
+    let names = [
+        "time",
+        "momentum_x",
+        "rigid_slope_force_x",
+        "energy_error",
+        "friction_energy",
+    ];
+    let mass = 2.0 * 32.0;
+    for (angle, friction) in [(0.3_f64, 0.1), (0.5, 0.3), (0.2, 0.0)] {
+        let deck = incline(angle, &format!("friction = {friction}"), 0.02);
+        let rows = history::<2>(&deck, 10, &names);
+        // The block has settled by half of the time.
+        let [middle, last] = [&rows[rows.len() / 2], rows.last().unwrap()];
+        let found = (last[1] - middle[1]) / (last[0] - middle[0]) / mass;
+        let expected = 0.01 * (angle.sin() - friction * angle.cos());
+        assert!(
+            (found / expected - 1.0).abs() < 0.02,
+            "{angle}: {found} for {expected}"
+        );
+        assert!(last[3].abs() < 0.01 * (last[4] + 0.02), "{last:?}");
+    }
+    // tan 0.2 = 0.203
+    let rows = history::<2>(
+        &incline(0.2, "static_friction = 0.4, friction = 0.15", 0.0),
+        10,
+        &names,
+    );
+    let last = rows.last().unwrap();
+    assert!((last[1] / mass).abs() < 1e-3 * 0.01 * 100.0, "{last:?}");
+    let weight = mass * 0.01 * 0.2_f64.sin();
+    assert!(
+        (last[2] / weight - 1.0).abs() < 0.02,
+        "{last:?} for {weight}"
+    );
+    let rows = history::<2>(
+        &incline(0.2, "static_friction = 0.15, friction = 0.1", 0.0),
+        10,
+        &names,
+    );
+    assert!(
+        rows.last().unwrap()[1] > 0.5 * mass * 0.01 * 100.0 * (0.2_f64.sin() - 0.1 * 0.2_f64.cos())
+    );
+}
+
+#[test]
+fn a_rigid_ball_and_a_block_keep_momentum_and_energy() {
+    let deck = "
+        dimension = '3d'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.block = { material = 'rubber', shape.box = { lower = [0, 0, 0], upper = [6, 6, 4] } }
+        rigid.ball = { shape.sphere = { centre = [3.3, 2.8, 6.2], radius = 2 }, mass = 100, velocity = [0, 0, -0.05], angular_velocity = [0.01, 0.02, 0], friction = 0.3, restitution = 0.7 }
+        time = { end = 60, safety = 0.4 }
+        ";
+    let names = [
+        "momentum_z",
+        "rigid_ball_velocity_z",
+        "energy_error",
+        "friction_energy",
+        "contact_damping_energy",
+        "rigid_ball_kinetic_energy",
+        "momentum_x",
+        "rigid_ball_velocity_x",
+    ];
+    let rows = history::<3>(deck, 20, &names);
+    let [first, last] = [&rows[0], rows.last().unwrap()];
+    assert!(last[1] > -0.03, "it bounces off or slows down: {last:?}");
+    assert!(last[3] > 0.0 && last[4] > 0.0, "{last:?}");
+    for row in &rows {
+        for (of_block, of_ball) in [(row[0] - first[0], row[1] - first[1]), (row[6], row[7])] {
+            assert!(
+                (of_block + 100.0 * of_ball).abs() < 1e-12 * 5.0 * 100.0,
+                "{row:?}"
+            );
+        }
+        assert!(row[2].abs() < 0.005 * first[5], "{row:?}");
+    }
+}
+
+#[test]
+fn a_free_rigid_box_tumbles_with_its_energy() {
+    let deck = |step: f64| {
+        format!(
+            "dimension = '3d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.far = {{ material = 'rubber', shape.box = {{ lower = [90, 0, 0], upper = [92, 2, 2] }} }}
+            rigid.brick = {{ shape.box = {{ lower = [-1, -2, -3], upper = [1, 2, 3] }}, mass = 5, velocity = [0, 1, 0], angular_velocity = [0.01, 1, 0.02], force = ['5*sin(t)', 0, 0] }}
+            time = {{ end = 20, step = {step} }}
+            "
+        )
+    };
+    // Rotation about the middle axis is unstable, so it turns over.
+    let error = |step: f64| {
+        let names = [
+            "energy_error",
+            "rigid_brick_velocity_x",
+            "rigid_brick_position_y",
+        ];
+        let rows = history::<3>(&deck(step), 1, &names);
+        let last = rows.last().unwrap();
+        assert!(
+            (last[1] - (1.0 - 20.0_f64.cos())).abs() < step * step,
+            "{last:?}"
+        );
+        assert!((last[2] - 20.0).abs() < 1e-9, "{last:?}");
+        rows.iter().map(|row| row[0].abs()).fold(0.0, f64::max)
+    };
+    let [coarse, fine] = [0.04, 0.02].map(error);
+    assert!(
+        fine < 0.02 && (3.0..5.0).contains(&(coarse / fine)),
+        "{coarse} {fine}"
+    );
+}
+
+#[test]
+fn a_point_in_a_rigid_body_is_an_error() {
+    let deck = problem(
+        "dimension = 'plane-strain'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.block = { material = 'rubber', shape.box = { lower = [0, 0], upper = [8, 4] } }
+        rigid.ball.shape.disc = { centre = [3, 5], radius = 1.6 }
+        time.end = 1
+        ",
+    );
+    let comm = threads::alone();
+    let error = Simulation::<2>::new(&deck, &comm);
+    let message = error.err().unwrap().message;
+    assert!(message.starts_with("[rigid.ball]: point "), "{message}");
+    assert!(
+        message.contains("of [body.block] begins 1.886e-2 m"),
+        "{message}"
+    );
+}
+
+/// A block with a crack through it, whose halves are pressed together.
+fn cracked_block(contact: &str) -> String {
+    format!(
+        "dimension = 'plane-strain'
+        grid = {{ spacing = 1, horizon = 3.015 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5, damping = 0.3 }}
+        {contact}
+        body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [10, 20] }} }}
+        crack.through.segment = {{ from = [-1, 10], to = [11, 10] }}
+        set = {{ top.where = 'y > 18', bottom.where = 'y < 2' }}
+        condition.hold = {{ set = 'bottom', displacement = ['free', 0] }}
+        condition.push = {{ set = 'top', displacement = ['free', '-0.2*ramp(t, 0, 20)'] }}
+        history.force.top = {{ set = 'top', direction = [0, -1] }}
+        time.end = 80
+        "
+    )
+}
+
+#[test]
+fn a_closed_crack_carries_load() {
+    let force = |deck: &str| history::<2>(deck, 100, &["force_top"]).last().unwrap()[0];
+    let whole = force(&cracked_block("").replace("crack.through", "#"));
+    let closed = force(&cracked_block("contact = {}"));
+    let open = force(&cracked_block(""));
+    assert!(open.abs() < 0.02 * whole, "{open} of {whole}");
+    assert!(
+        (0.7..1.05).contains(&(closed / whole)),
+        "{closed} of {whole}"
+    );
+}
+
+#[test]
+fn bodies_at_rest_feel_no_contact() {
+    // Touching and overlapping bodies, and a crack.
+    let deck = "
+        dimension = '3d'
+        grid = { spacing = 1, horizon = 2.5 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        contact.friction = 0.3
+        body.first = { material = 'rubber', shape.box = { lower = [0, 0, 0], upper = [5, 5, 5] } }
+        body.second = { material = 'rubber', shape.box = { lower = [5, 0, 0], upper = [9, 5, 5] } }
+        body.third = { material = 'rubber', spacing = 0.8, shape.sphere = { centre = [2.5, 2.5, 6.4], radius = 2 } }
+        crack.slit.rectangle = { corner = [2.5, -1, -1], edge_a = [0, 7, 0], edge_b = [0, 0, 7] }
+        time.end = 1
+        ";
+    simulate::<3, _>(deck, |mut simulation| {
+        assert!(simulation.contact.is_some());
+        assert_eq!(largest_force(&simulation), 0.0);
+        for _ in 0..5 {
+            simulation.advance();
+        }
+        assert_eq!(largest_force(&simulation), 0.0);
+    });
+}
+
+#[test]
+fn steps_become_shorter_where_contact_is_stiff() {
+    let deck = bars("stiffness = 8e12");
+    simulate::<1, _>(&deck, |mut simulation| {
+        let before = simulation.clock.step();
+        while !simulation.is_over() {
+            simulation.advance();
+        }
+        assert!(simulation.clock.step() < 0.5 * before);
+        assert!((simulation.clock.time() - 60e-6).abs() < 1e-18);
+        simulation.check().unwrap();
+    });
+}
