@@ -101,7 +101,7 @@ impl<'a> PlotStyle<'a> {
             found.map(|(_, value)| value.clone()).unwrap_or_default()
         };
         let dimension: usize = attribute("dimension").parse().unwrap_or(3);
-        let section: f64 = attribute("section").parse().unwrap_or(1.0);
+        let section: f64 = attribute("out_of_plane_measure").parse().unwrap_or(1.0);
         let fields = result.fields()?;
         let Some(field) = fields.iter().find(|field| field.name == arguments.field) else {
             let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
