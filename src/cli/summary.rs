@@ -36,7 +36,9 @@ pub fn print(outcome: &Outcome, threads: usize) {
     }
     outln!("time by phase");
     let phases = phases(&summary.seconds).into_iter();
-    for (name, seconds) in phases.filter(|(name, _)| regrids || *name != REGRIDDING) {
+    let happened =
+        |(name, seconds): &(&str, f64)| ![CONTACT, REGRIDDING].contains(name) || *seconds > 0.0;
+    for (name, seconds) in phases.filter(happened) {
         let share = 100.0 * seconds / summary.seconds.whole;
         outln!("  {name:<17}{seconds:8.3} s {share:5.1} %");
     }
@@ -61,15 +63,17 @@ pub fn print(outcome: &Outcome, threads: usize) {
     );
 }
 
-/// The phase that is omitted if 0.
+/// The phases that are omitted if 0.
+const CONTACT: &str = "contact";
 const REGRIDDING: &str = "other points";
 
 /// Names and times (s) of the phases.
-fn phases(seconds: &Phases) -> [(&'static str, f64); 9] {
+fn phases(seconds: &Phases) -> [(&'static str, f64); 10] {
     [
         ("set-up", seconds.set_up),
         ("bonds", seconds.bonds),
         ("halo", seconds.halo),
+        (CONTACT, seconds.contact),
         ("motion", seconds.motion),
         (REGRIDDING, seconds.regridding),
         ("output", seconds.output),
@@ -82,6 +86,6 @@ fn phases(seconds: &Phases) -> [(&'static str, f64); 9] {
 /// Bond updates per second of the time loop, counted at both ends.
 fn bond_updates(summary: &Summary) -> f64 {
     let seconds = &summary.seconds;
-    let time_loop = seconds.bonds + seconds.halo + seconds.motion;
+    let time_loop = seconds.bonds + seconds.halo + seconds.contact + seconds.motion;
     2.0 * summary.bonds as f64 * summary.evaluations as f64 / time_loop
 }

@@ -69,6 +69,7 @@ pub fn history(
             .map(reaction)
             .collect::<Result<_>>()?,
         support_forces: forces.into_values().collect(),
+        fragments: history.fragments,
         damage_threshold,
         probes: probes.into_values().collect(),
         fronts: fronts.into_values().collect(),
@@ -126,7 +127,8 @@ fn front(
         Some(number) => scope.positive(number, &format!("{key} {name}")),
     };
     // The ranks are no property of the solid.
-    let fields = Field::ALL.into_iter().filter(|field| *field != Field::Rank);
+    let fields = Field::ALL.into_iter();
+    let fields = fields.filter(|field| !matches!(field, Field::Rank | Field::Fragment));
     let fields: Vec<Field> = fields.collect();
     let names = fields.iter().map(|field| field.name());
     let field = fields[find(scope.source, &front.field, names, &format!("{key} field"))?];

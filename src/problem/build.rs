@@ -60,6 +60,7 @@ impl Problem {
                 every: None,
                 reactions: Vec::new(),
                 support_forces: Vec::new(),
+                fragments: false,
                 damage_threshold: DEFAULT_DAMAGE_THRESHOLD,
                 probes: Vec::new(),
                 fronts: Vec::new(),

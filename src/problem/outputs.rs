@@ -60,6 +60,8 @@ pub struct History {
     pub reactions: Vec<Reaction>,
     /// Forces of supports along a direction.
     pub support_forces: Vec<SupportForce>,
+    /// Whether fragments are counted.
+    pub fragments: bool,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
     /// Places that are watched.
@@ -207,13 +209,15 @@ pub enum Field {
     PlasticStrainEquivalent,
     /// 1 where a point has too few bonds left for its law and carries no force, else 0.
     Singular,
+    /// The smallest id of the points that intact bonds connect to the point.
+    Fragment,
     /// The rank that owns the point.
     Rank,
 }
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -232,6 +236,7 @@ impl Field {
         Self::NewlyBrokenBonds,
         Self::PlasticStrainEquivalent,
         Self::Singular,
+        Self::Fragment,
         Self::Rank,
     ];
 
@@ -256,6 +261,7 @@ impl Field {
             Self::NewlyBrokenBonds => "newly_broken_bonds",
             Self::PlasticStrainEquivalent => "plastic_strain_equivalent",
             Self::Singular => "singular",
+            Self::Fragment => "fragment",
             Self::Rank => "rank",
         }
     }
@@ -275,6 +281,7 @@ impl Field {
             | Self::NewlyBrokenBonds
             | Self::PlasticStrainEquivalent
             | Self::Singular
+            | Self::Fragment
             | Self::Rank => "1",
             Self::WeightedVolume => "m^5",
             Self::Stress | Self::CauchyStress | Self::VonMisesStress => "Pa",

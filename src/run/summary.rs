@@ -39,6 +39,8 @@ pub struct Phases {
     pub bonds: f64,
     /// Halo exchange that is not overlapped.
     pub halo: f64,
+    /// Search and forces of contact.
+    pub contact: f64,
     /// Integration, conditions, and copies of positions to the bond loops.
     pub motion: f64,
     /// Refinement and rebalancing.
@@ -67,6 +69,7 @@ impl Summary {
             times.set_up,
             times.forces.bonds,
             times.forces.halo,
+            times.contact,
             times.motion,
             times.regridding,
             output,
@@ -80,6 +83,7 @@ impl Summary {
             set_up,
             bonds,
             halo,
+            contact,
             motion,
             regridding,
             output,
@@ -101,6 +105,7 @@ impl Summary {
                 set_up,
                 bonds,
                 halo,
+                contact,
                 motion,
                 regridding,
                 output,

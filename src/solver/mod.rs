@@ -4,6 +4,7 @@ pub mod assign;
 pub mod bonds;
 pub mod calibration;
 pub mod conditions;
+mod connected;
 pub mod contact;
 mod grids;
 pub mod model;

@@ -1,7 +1,9 @@
 //! Contact: bodies that collide, stick and slide; momentum, energy and the faces of a crack.
 
+use std::collections::BTreeSet;
+
 use crate::support::history::{column, row};
-use crate::support::{largest_force, problem, simulate};
+use crate::support::{largest_force, problem, simulate, simulate_on};
 use fissure::comm::threads;
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
@@ -377,4 +379,49 @@ fn steps_become_shorter_where_contact_is_stiff() {
         assert!((simulation.clock.time() - 60e-6).abs() < 1e-18);
         simulation.check().unwrap();
     });
+}
+
+#[test]
+fn fragments_are_counted_and_weighed() {
+    // A block that two cracks cut in three, one of its points alone.
+    let deck = "
+        dimension = '3d'
+        grid = { spacing = 1, horizon = 2, volume_correction = 'none' }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.block = { material = 'rubber', shape.box = { lower = [0, 0, 0], upper = [9, 2, 2] } }
+        body.alone = { material = 'rubber', shape.box = { lower = [20, 0, 0], upper = [21, 1, 1] } }
+        crack.first.rectangle = { corner = [3, -1, -1], edge_a = [0, 4, 0], edge_b = [0, 0, 4] }
+        crack.second.rectangle = { corner = [5, -1, -1], edge_a = [0, 4, 0], edge_b = [0, 0, 4] }
+        initial.fly.velocity = [0.5, 0, 0]
+        history.fragments = true
+        time.end = 1
+        ";
+    let names = [
+        "fragments",
+        "loose_points",
+        "largest_fragment_mass",
+        "largest_fragment_momentum_x",
+    ];
+    for ranks in [1, 2, 3] {
+        let found = simulate_on::<3, _>(ranks, deck, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let values = row(&mut observer, &mut simulation).values;
+            let ids = simulation.fragment_ids();
+            let pieces: BTreeSet<u64> = ids.into_iter().map(|id| id as u64).collect();
+            (names.map(|name| values[column(&observer, name)]), pieces)
+        });
+        let pieces: BTreeSet<u64> = found
+            .iter()
+            .flat_map(|(_, pieces)| pieces)
+            .copied()
+            .collect();
+        assert_eq!(pieces.len(), 4, "on {ranks} ranks");
+        for (values, _) in found {
+            assert_eq!(
+                values,
+                [3.0, 1.0, 2.0 * 16.0, 2.0 * 16.0 * 0.5],
+                "on {ranks} ranks"
+            );
+        }
+    }
 }

@@ -55,6 +55,9 @@ pub struct History {
     /// Forces of supports along a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
+    /// Whether fragments are counted, and the largest one weighed; not if not given.
+    #[serde(default)]
+    pub fragments: bool,
     /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage_threshold: Option<Number>,

@@ -96,11 +96,6 @@ impl<const D: usize> Simulation<'_, D> {
     /// Find the pieces of all bodies. Collective.
     fn find_pieces(&mut self) -> Pieces<D> {
         let (model, local) = (&self.model, self.model.volume.len());
-        let mut roots: Vec<usize> = (0..local).collect();
-        self.forces.for_each_intact(|i, j| {
-            let (i, j) = (root(&mut roots, i), root(&mut roots, j));
-            roots[i.max(j)] = i.min(j);
-        });
         let mut pieces = Pieces {
             first: model.ids.iter().map(|id| *id as f64).collect(),
             is_free: self.conditions.free_components(local),
@@ -117,25 +112,8 @@ impl<const D: usize> Simulation<'_, D> {
                 }
             }
         }
-        loop {
-            // The minimum over the points of a piece on this rank, then those of the other ranks.
-            self.forces.bring_all(self.comm, &mut pieces.columns());
-            let mut changed = 0;
-            for column in pieces.columns() {
-                for point in 0..local {
-                    let root = root(&mut roots, point);
-                    column[root] = column[root].min(column[point]);
-                }
-                for point in 0..local {
-                    let least = column[root(&mut roots, point)];
-                    changed += u64::from(column[point] > least);
-                    column[point] = least;
-                }
-            }
-            if total(self.comm, changed) == 0 {
-                return pieces;
-            }
-        }
+        self.spread_least(&mut pieces.columns());
+        pieces
     }
 }
 
@@ -153,13 +131,4 @@ impl<const D: usize> Pieces<D> {
             .map(|column| &mut column[..])
             .collect()
     }
-}
-
-/// The root of a point's tree; shortens the path to it.
-fn root(parents: &mut [usize], mut point: usize) -> usize {
-    while parents[point] != point {
-        parents[point] = parents[parents[point]];
-        point = parents[point];
-    }
-    point
 }

@@ -4,6 +4,7 @@ use crate::solver::contact::ContactNow;
 use crate::solver::motion::Clock;
 use crate::solver::motion::relaxation::LoadStep;
 
+use super::fragments::Fragments;
 use super::history::Energies;
 use super::tip::TipNow;
 
@@ -52,6 +53,8 @@ pub struct GlobalState {
     pub tips: Vec<TipNow>,
     /// Contact.
     pub contact: ContactNow,
+    /// Fragments, where the history has them.
+    pub fragments: Fragments,
 }
 
 /// The value of a column.

@@ -13,6 +13,7 @@ use super::centre_line::{self, Branch};
 use super::columns::{Columns, GlobalState};
 use super::crack_path::CrackPath;
 use super::cracked::Cracked;
+use super::fragments::Fragments;
 use super::front::Front;
 use super::nearest::nearest;
 use super::snapshot::Snapshot;
@@ -127,6 +128,16 @@ impl HistoryObserver {
             columns.add("contact_energy", "J", |now| now.contact.energy);
             columns.add("friction_energy", "J", |now| now.contact.friction);
             columns.add("contact_damping_energy", "J", |now| now.contact.damping);
+        }
+        if problem.history.fragments {
+            columns.add("fragments", "1", |now| now.fragments.count as f64);
+            columns.add("loose_points", "1", |now| now.fragments.loose as f64);
+            columns.add("largest_fragment_mass", "kg", |now| {
+                now.fragments.largest_mass
+            });
+            columns.add_vector("largest_fragment_momentum", "kg m/s", |now, d| {
+                now.fragments.largest_momentum[d]
+            });
         }
         for (k, rigid) in problem.rigid.iter().enumerate() {
             let of = |quantity: &str| format!("rigid_{}_{quantity}", rigid.name);
@@ -286,6 +297,11 @@ impl HistoryObserver {
     ) -> HistoryRow {
         let comm = simulation.comm;
         let contact = contact_now(simulation);
+        let fragments = if simulation.problem.history.fragments {
+            Fragments::now(simulation)
+        } else {
+            Fragments::default()
+        };
         let (model, fields) = (&simulation.model, &simulation.fields);
         let mut sums = point_sums(simulation, snapshot);
         sums.push(sum(fields.external_work.as_deref().unwrap_or_default()));
@@ -383,6 +399,7 @@ impl HistoryObserver {
             cracks,
             tips,
             contact,
+            fragments,
         });
         HistoryRow {
             values,

@@ -6,6 +6,7 @@ mod columns;
 mod contact;
 mod crack_path;
 mod cracked;
+mod fragments;
 mod front;
 pub mod history;
 pub mod nearest;

@@ -118,6 +118,7 @@ impl Snapshot {
                     .collect()
             }
             Field::Singular => simulation.forces.singular(model),
+            Field::Fragment => simulation.fragment_ids(),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
             // Where nothing touches, no bonds can break, and no points flow.
             Field::ContactForceDensity => vec![0.0; 3 * count],

@@ -1,0 +1,54 @@
+//! Points that intact bonds connect, on any ranks.
+
+use crate::comm::total;
+
+use super::Simulation;
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Gives all points that intact bonds connect the least value of any of them, in each column over the local points.
+    /// Collective.
+    pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
+        let local = self.model.volume.len();
+        let mut roots: Vec<usize> = (0..local).collect();
+        self.forces.for_each_intact(|i, j| {
+            let (i, j) = (root(&mut roots, i), root(&mut roots, j));
+            roots[i.max(j)] = i.min(j);
+        });
+        loop {
+            // The minimum over the points of a piece on this rank, then those of the other ranks.
+            self.forces.bring_all(self.comm, columns);
+            let mut changed = 0;
+            for column in columns.iter_mut() {
+                for point in 0..local {
+                    let root = root(&mut roots, point);
+                    column[root] = column[root].min(column[point]);
+                }
+                for point in 0..local {
+                    let least = column[root(&mut roots, point)];
+                    changed += u64::from(column[point] > least);
+                    column[point] = least;
+                }
+            }
+            if total(self.comm, changed) == 0 {
+                return;
+            }
+        }
+    }
+
+    /// The smallest id of the points that intact bonds connect to each owned point, itself included. Collective.
+    pub fn fragment_ids(&mut self) -> Vec<f64> {
+        let mut ids: Vec<f64> = self.model.ids.iter().map(|id| *id as f64).collect();
+        self.spread_least(&mut [&mut ids]);
+        ids.truncate(self.model.owned());
+        ids
+    }
+}
+
+/// The root of a point's tree; shortens the path to it.
+fn root(parents: &mut [usize], mut point: usize) -> usize {
+    while parents[point] != point {
+        parents[point] = parents[parents[point]];
+        point = parents[point];
+    }
+    point
+}
