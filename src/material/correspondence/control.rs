@@ -2,8 +2,9 @@
 
 use nalgebra::SMatrix;
 
-use super::super::{Given, Key, Kind, Pmb, Word};
-use super::hooke::Hooke;
+use super::super::{Given, Key, Kind, LawFault, Pmb, Values, Word};
+use super::hooke::{self, Hooke};
+use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
 use std::f64::consts::PI;
 
@@ -16,8 +17,8 @@ use std::f64::consts::PI;
 pub enum Control {
     /// B = 0.
     None,
-    /// B = C : K⁻¹, B_ik = C_ijkl K⁻¹_jl (Wan, Chen, Chu & Chen 2019): of the same stiffness as the solid,
-    /// without a coefficient, and as anisotropic as it.
+    /// B = C : K⁻¹, B_ij = C_ijkl K⁻¹_kl (Wan, Chen, Chu & Chen 2019; Willberg et al. 2022, eq. 15): of the same
+    /// stiffness as the solid, without a coefficient, and as anisotropic as it.
     Wan2019(Hooke),
     /// B = G (c/δ) (V_δ/ω₀) I with the micromodulus c of a bond-based solid, the volume V_δ within a
     /// horizon and ω₀ = Σ ω Ṽ (Silling 2017).
@@ -48,6 +49,18 @@ pub const COEFFICIENT: Key = Key {
         default: Some(1.0),
     },
 };
+
+/// The control of Wan et al. with constants that make its matrix indefinite.
+pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
+    let least = hooke::least_under_dilation(values, dimension)?;
+    (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
+        key: Some(KIND.name),
+        message: format!(
+            "the control C : K⁻¹ of this solid has a negative stiffness: C : I has the eigenvalue {least:.4e} Pa, and \
+             all must be above 0; take \"silling2017\""
+        ),
+    })
+}
 
 impl Control {
     /// That of a law.
@@ -89,7 +102,7 @@ impl Control {
     ) -> SMatrix<f64, D, D> {
         match self {
             Self::None => SMatrix::zeros(),
-            Self::Wan2019(hooke) => hooke.contracted(inverse),
+            Self::Wan2019(hooke) => matrix(&hooke.stress(&rows(inverse))),
             Self::Silling2017 { .. } => SMatrix::from_diagonal_element(constant),
         }
     }
@@ -103,5 +116,117 @@ impl Control {
                 format!("coefficient {coefficient} (Silling 2017)")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Matrix3};
+
+    use super::*;
+    use crate::elastic::Isotropic;
+
+    const YOUNG: f64 = 3.0;
+
+    /// The control of a law with these words and numbers.
+    fn control(
+        dimension: Dimension,
+        poisson_ratio: f64,
+        kind: &str,
+        more: &[(&str, f64)],
+    ) -> Control {
+        let mut values = Values::defaults(super::super::KEYS);
+        values.set(KIND.name, super::super::super::Value::Word(kind.to_owned()));
+        for (key, number) in more {
+            values.set(key, (*number).into());
+        }
+        let elastic = Isotropic {
+            youngs_modulus: YOUNG,
+            poisson_ratio,
+        };
+        let given = Given {
+            dimension,
+            elastic,
+            horizon: 2.0,
+            values: &values,
+            from_fracture_energy: false,
+        };
+        Control::of(&given, Hooke::of(&given).unwrap())
+    }
+
+    const PLANES: [Dimension; 2] = [
+        Dimension::PlaneStress { thickness: 0.5 },
+        Dimension::PlaneStrain { thickness: 0.5 },
+    ];
+
+    /// λ (that of the sheet in plane stress) and G, Pa.
+    fn constants(dimension: Dimension, ratio: f64) -> [f64; 2] {
+        let shear = YOUNG / (2.0 * (1.0 + ratio));
+        let across = match dimension {
+            Dimension::PlaneStress { .. } => 1.0 - ratio,
+            _ => 1.0 - 2.0 * ratio,
+        };
+        [2.0 * shear * ratio / across, shear]
+    }
+
+    #[test]
+    fn that_of_wan_is_the_stress_of_the_inverse_shape_tensor() {
+        let space = Matrix3::new(3.0, 0.4, -0.2, 0.4, 2.0, 0.5, -0.2, 0.5, 4.0);
+        let plane = Matrix2::new(3.0, 0.4, 0.4, 2.0);
+        for ratio in [-0.3, 0.0, 0.25, 1.0 / 3.0, 0.4] {
+            let of = |dimension| control(dimension, ratio, "wan2019", &[]);
+            let [lambda, shear] = constants(Dimension::Space, ratio);
+            let wanted = Matrix3::identity() * (lambda * space.trace()) + space * (2.0 * shear);
+            let found = of(Dimension::Space).matrix(&space, 0.0);
+            assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
+            for dimension in PLANES {
+                let [lambda, shear] = constants(dimension, ratio);
+                let wanted = Matrix2::identity() * (lambda * plane.trace()) + plane * (2.0 * shear);
+                let found = of(dimension).matrix(&plane, 0.0);
+                assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
+            }
+            // C_ijkl K⁻¹_jl of a whole family is λ + (D + 1) G, which is the same where λ = G.
+            let other = lambda + 4.0 * shear;
+            let found = of(Dimension::Space).matrix(&Matrix3::identity(), 0.0)[(0, 0)];
+            let are_equal = (found / other - 1.0).abs() < 1e-14;
+            assert_eq!(are_equal, ratio == 0.25, "{ratio}: {found} {other}");
+        }
+    }
+
+    #[test]
+    fn that_of_wan_contracts_an_anisotropic_solid_with_the_shape_tensor() {
+        let entries = [
+            ("c11", 9.0),
+            ("c12", 3.0),
+            ("c13", 2.0),
+            ("c16", 0.3),
+            ("c22", 8.0),
+            ("c23", 2.5),
+            ("c24", 0.1),
+            ("c33", 7.0),
+            ("c35", 0.2),
+            ("c44", 2.0),
+            ("c45", 0.1),
+            ("c55", 3.0),
+            ("c66", 2.5),
+        ];
+        let entry = |a: usize, b: usize| {
+            let name = format!("c{}{}", a.min(b) + 1, a.max(b) + 1);
+            let found = entries.iter().find(|(key, _)| *key == name);
+            found.map_or(0.0, |(_, number)| *number)
+        };
+        let voigt = |a: usize, b: usize| if a == b { a } else { 6 - a - b };
+        let inverse = Matrix3::new(3.0, 0.4, -0.2, 0.4, 2.0, 0.5, -0.2, 0.5, 4.0);
+        let wanted = Matrix3::from_fn(|i, j| {
+            let pairs = (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+            pairs
+                .map(|(k, l)| entry(voigt(i, j), voigt(k, l)) * inverse[(k, l)])
+                .sum()
+        });
+        let found = control(Dimension::Space, 0.25, "wan2019", &entries).matrix(&inverse, 0.0);
+        assert!(
+            (found - wanted).norm() < 1e-14 * wanted.norm(),
+            "{found} {wanted}"
+        );
     }
 }
