@@ -2,7 +2,7 @@
 
 use nalgebra::SMatrix;
 
-use super::super::{Given, Key, Kind, LawFault, Pmb, Values, Word};
+use super::super::{Given, Influence, Key, Kind, LawFault, Pmb, Values, Word};
 use super::hooke::{self, Hooke};
 use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
@@ -17,6 +17,16 @@ use std::f64::consts::PI;
 pub enum Control {
     /// B = 0.
     None,
+    /// B = (4/3) G/k I with the shear modulus G and the diagonal entry k of the shape tensor of a whole family:
+    /// the dispersion of long shear waves vanishes.
+    ///
+    /// For a wave of wavenumber κ along an axis, H loses the share κ²q/(6k), q = Σ ω ξ_x⁴ Ṽ, and the energy of a wave
+    /// of modulus M is ½ M κ² (1 − κ²q/(3k)) by |u|². z is −½ (κ·ξ)² u, and a control b/k I stores ½ b κ⁴q/(4k). The sum
+    /// of both is free of q for b = (4/3) M, whatever the dimension, the influence and the lattice.
+    Dispersion {
+        /// (4/3) G/k, N/m⁷.
+        strength: f64,
+    },
     /// B = C : K⁻¹, B_ij = C_ijkl K⁻¹_kl (Wan, Chen, Chu & Chen 2019; Willberg et al. 2022, eq. 15): of the same
     /// stiffness as the solid, without a coefficient, and as anisotropic as it.
     Wan2019(Hooke),
@@ -34,6 +44,7 @@ pub const KIND: Key = Key {
     name: "zero_energy",
     meaning: "what works against motions that leave the deformation gradient as it is",
     kind: Kind::Word(&[
+        Word::new("dispersion"),
         Word::new("wan2019"),
         Word::new("silling2017"),
         Word::new("none"),
@@ -57,7 +68,7 @@ pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
         key: Some(KIND.name),
         message: format!(
             "the control C : K⁻¹ of this solid has a negative stiffness: C : I has the eigenvalue {least:.4e} Pa, and \
-             all must be above 0; take \"silling2017\""
+             all must be above 0; take \"dispersion\" or \"silling2017\""
         ),
     })
 }
@@ -68,6 +79,14 @@ impl Control {
         match given.values.word(KIND.name) {
             "none" => Self::None,
             "wan2019" => Self::Wan2019(hooke),
+            "dispersion" => {
+                let (dimension, horizon) = (given.dimension, given.horizon);
+                let trace = Influence::Constant.weighted_volume(dimension, horizon);
+                let whole = trace / dimension.count() as f64;
+                Self::Dispersion {
+                    strength: 4.0 / 3.0 * hooke.shear_modulus(dimension) / whole,
+                }
+            }
             _ => {
                 let coefficient = given.values.number(COEFFICIENT.name);
                 let horizon = given.horizon;
@@ -90,6 +109,7 @@ impl Control {
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,
+            Self::Dispersion { strength } => *strength,
             _ => 0.0,
         }
     }
@@ -103,7 +123,9 @@ impl Control {
         match self {
             Self::None => SMatrix::zeros(),
             Self::Wan2019(hooke) => matrix(&hooke.stress(&rows(inverse))),
-            Self::Silling2017 { .. } => SMatrix::from_diagonal_element(constant),
+            Self::Dispersion { .. } | Self::Silling2017 { .. } => {
+                SMatrix::from_diagonal_element(constant)
+            }
         }
     }
 
@@ -111,6 +133,9 @@ impl Control {
     pub fn described(&self) -> String {
         match self {
             Self::None => "none".to_owned(),
+            Self::Dispersion { strength } => {
+                format!("{strength:.4e} N/m⁷, long shear waves without dispersion")
+            }
             Self::Wan2019(_) => "as stiff as the solid (Wan et al. 2019)".to_owned(),
             Self::Silling2017 { coefficient, .. } => {
                 format!("coefficient {coefficient} (Silling 2017)")
@@ -228,5 +253,55 @@ mod tests {
             (found - wanted).norm() < 1e-14 * wanted.norm(),
             "{found} {wanted}"
         );
+    }
+
+    #[test]
+    fn that_without_dispersion_has_four_thirds_of_the_shear_modulus() {
+        let horizon = 2.0_f64;
+        for ratio in [-0.3, 0.25, 0.4] {
+            let of = |dimension| control(dimension, ratio, "dispersion", &[]).constant(1.0);
+            let close = |found: f64, wanted: f64| {
+                assert!(
+                    (found / wanted - 1.0).abs() < 1e-11,
+                    "{ratio}: {found} {wanted}"
+                );
+            };
+            let shear = YOUNG / (2.0 * (1.0 + ratio));
+            let space = 4.0 * PI / 15.0 * horizon.powi(5);
+            close(of(Dimension::Space), 4.0 / 3.0 * shear / space);
+            for dimension in PLANES {
+                let plane = 0.5 * PI / 4.0 * horizon.powi(4);
+                close(of(dimension), 4.0 / 3.0 * shear / plane);
+            }
+        }
+    }
+
+    #[test]
+    fn that_without_dispersion_follows_the_softest_shears_of_an_orthotropic_solid() {
+        let fibres = [
+            ("youngs_modulus_x", 140.0),
+            ("youngs_modulus_y", 10.0),
+            ("youngs_modulus_z", 10.0),
+            ("poisson_ratio_xy", 0.3),
+            ("poisson_ratio_yz", 0.4),
+            ("poisson_ratio_xz", 0.3),
+            ("shear_modulus_xy", 5.0),
+            ("shear_modulus_yz", 3.5),
+            ("shear_modulus_xz", 5.0),
+        ];
+        let of = |more: &[(&'static str, f64)]| {
+            let all = [&fibres[..], more].concat();
+            control(Dimension::Space, 0.25, "dispersion", &all).constant(1.0)
+        };
+        let space = 4.0 * PI / 15.0 * 2.0_f64.powi(5);
+        // 15/(4 (S11 + S22 + S33 − S12 − S23 − S13) + 3 (S44 + S55 + S66)).
+        let normal = 1.0 / 140.0 + 2.0 / 10.0;
+        let coupled = -2.0 * 0.3 / 140.0 - 0.4 / 10.0;
+        let shear = 15.0 / (4.0 * (normal - coupled) + 3.0 * (2.0 / 5.0 + 1.0 / 3.5));
+        let wanted = 4.0 / 3.0 * shear / space;
+        assert!((of(&[]) / wanted - 1.0).abs() < 1e-11);
+        // Axes do not change it.
+        let turned = of(&[("angle_1", 20.0), ("angle_2", 50.0), ("angle_3", -70.0)]);
+        assert!((turned / wanted - 1.0).abs() < 1e-11);
     }
 }

@@ -393,6 +393,25 @@ impl Hooke {
         stress
     }
 
+    /// Shear modulus of the isotropic solid with the same compliance on average over all directions (Reuss), Pa: that of
+    /// the softest shears, where these differ.
+    pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
+        let used = used(dimension);
+        let own = DMatrix::from_fn(used.len(), used.len(), |a, b| {
+            self.matrix[(used[a], used[b])]
+        });
+        let s = own
+            .try_inverse()
+            .expect("the constants have been looked at");
+        if used.len() == 3 {
+            return 2.0 / (s[(0, 0)] + s[(1, 1)] - 2.0 * s[(0, 1)] + s[(2, 2)]);
+        }
+        let normal = s[(0, 0)] + s[(1, 1)] + s[(2, 2)];
+        let coupled = s[(0, 1)] + s[(1, 2)] + s[(0, 2)];
+        let shear = s[(3, 3)] + s[(4, 4)] + s[(5, 5)];
+        15.0 / (4.0 * (normal - coupled) + 3.0 * shear)
+    }
+
     fn least_of_unit_strain<const D: usize>(&self) -> f64 {
         let unit = tensor(|a, b| if a == b { 1.0 } else { 0.0 });
         extremes(&matrix::<D>(&self.stress(&unit)))[0]
