@@ -24,6 +24,7 @@ mod laws {
     mod invariants;
     mod ordinary_history;
     mod plasticity;
+    mod slender_bodies;
 }
 
 mod physics {

@@ -34,7 +34,8 @@ impl Law {
                 "ordinary = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.25 }"
             }
             Self::Correspondence => {
-                "correspondence = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.25 }"
+                "correspondence = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.25, \
+                 zero_energy = 'wan2019' }"
             }
         }
     }

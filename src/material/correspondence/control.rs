@@ -2,8 +2,9 @@
 
 use nalgebra::SMatrix;
 
-use super::super::{Given, Key, Kind, Pmb, Word};
-use super::hooke::Hooke;
+use super::super::{Given, Influence, Key, Kind, LawFault, Pmb, Values, Word};
+use super::hooke::{self, Hooke};
+use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
 use std::f64::consts::PI;
 
@@ -16,8 +17,18 @@ use std::f64::consts::PI;
 pub enum Control {
     /// B = 0.
     None,
-    /// B = C : K⁻¹, B_ik = C_ijkl K⁻¹_jl (Wan, Chen, Chu & Chen 2019): of the same stiffness as the solid,
-    /// without a coefficient, and as anisotropic as it.
+    /// B = (4/3) G/k I with the shear modulus G and the diagonal entry k of the shape tensor of a whole family:
+    /// the dispersion of long shear waves vanishes.
+    ///
+    /// For a wave of wavenumber κ along an axis, H loses the share κ²q/(6k), q = Σ ω ξ_x⁴ Ṽ, and the energy of a wave
+    /// of modulus M is ½ M κ² (1 − κ²q/(3k)) by |u|². z is −½ (κ·ξ)² u, and a control b/k I stores ½ b κ⁴q/(4k). The sum
+    /// of both is free of q for b = (4/3) M, whatever the dimension, the influence and the lattice.
+    Dispersion {
+        /// (4/3) G/k, N/m⁷.
+        strength: f64,
+    },
+    /// B = C : K⁻¹, B_ij = C_ijkl K⁻¹_kl (Wan, Chen, Chu & Chen 2019; Willberg et al. 2022, eq. 15): of the same
+    /// stiffness as the solid, without a coefficient, and as anisotropic as it.
     Wan2019(Hooke),
     /// B = G (c/δ) (V_δ/ω₀) I with the micromodulus c of a bond-based solid, the volume V_δ within a
     /// horizon and ω₀ = Σ ω Ṽ (Silling 2017).
@@ -33,6 +44,7 @@ pub const KIND: Key = Key {
     name: "zero_energy",
     meaning: "what works against motions that leave the deformation gradient as it is",
     kind: Kind::Word(&[
+        Word::new("dispersion"),
         Word::new("wan2019"),
         Word::new("silling2017"),
         Word::new("none"),
@@ -49,12 +61,32 @@ pub const COEFFICIENT: Key = Key {
     },
 };
 
+/// The control of Wan et al. with constants that make its matrix indefinite.
+pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
+    let least = hooke::least_under_dilation(values, dimension)?;
+    (values.word(KIND.name) == "wan2019" && least <= 0.0).then(|| LawFault {
+        key: Some(KIND.name),
+        message: format!(
+            "the control C : K⁻¹ of this solid has a negative stiffness: C : I has the eigenvalue {least:.4e} Pa, and \
+             all must be above 0; take \"dispersion\" or \"silling2017\""
+        ),
+    })
+}
+
 impl Control {
     /// That of a law.
     pub fn of(given: &Given, hooke: Hooke) -> Self {
         match given.values.word(KIND.name) {
             "none" => Self::None,
             "wan2019" => Self::Wan2019(hooke),
+            "dispersion" => {
+                let (dimension, horizon) = (given.dimension, given.horizon);
+                let trace = Influence::Constant.weighted_volume(dimension, horizon);
+                let whole = trace / dimension.count() as f64;
+                Self::Dispersion {
+                    strength: 4.0 / 3.0 * hooke.shear_modulus(dimension) / whole,
+                }
+            }
             _ => {
                 let coefficient = given.values.number(COEFFICIENT.name);
                 let horizon = given.horizon;
@@ -77,6 +109,7 @@ impl Control {
     pub fn constant(&self, weight: f64) -> f64 {
         match self {
             Self::Silling2017 { strength, .. } if weight > 0.0 => strength / weight,
+            Self::Dispersion { strength } => *strength,
             _ => 0.0,
         }
     }
@@ -89,8 +122,10 @@ impl Control {
     ) -> SMatrix<f64, D, D> {
         match self {
             Self::None => SMatrix::zeros(),
-            Self::Wan2019(hooke) => hooke.contracted(inverse),
-            Self::Silling2017 { .. } => SMatrix::from_diagonal_element(constant),
+            Self::Wan2019(hooke) => matrix(&hooke.stress(&rows(inverse))),
+            Self::Dispersion { .. } | Self::Silling2017 { .. } => {
+                SMatrix::from_diagonal_element(constant)
+            }
         }
     }
 
@@ -98,10 +133,175 @@ impl Control {
     pub fn described(&self) -> String {
         match self {
             Self::None => "none".to_owned(),
+            Self::Dispersion { strength } => {
+                format!("{strength:.4e} N/m⁷, long shear waves without dispersion")
+            }
             Self::Wan2019(_) => "as stiff as the solid (Wan et al. 2019)".to_owned(),
             Self::Silling2017 { coefficient, .. } => {
                 format!("coefficient {coefficient} (Silling 2017)")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Matrix3};
+
+    use super::*;
+    use crate::elastic::Isotropic;
+
+    const YOUNG: f64 = 3.0;
+
+    /// The control of a law with these words and numbers.
+    fn control(
+        dimension: Dimension,
+        poisson_ratio: f64,
+        kind: &str,
+        more: &[(&str, f64)],
+    ) -> Control {
+        let mut values = Values::defaults(super::super::KEYS);
+        values.set(KIND.name, super::super::super::Value::Word(kind.to_owned()));
+        for (key, number) in more {
+            values.set(key, (*number).into());
+        }
+        let elastic = Isotropic {
+            youngs_modulus: YOUNG,
+            poisson_ratio,
+        };
+        let given = Given {
+            dimension,
+            elastic,
+            horizon: 2.0,
+            values: &values,
+            from_fracture_energy: false,
+        };
+        Control::of(&given, Hooke::of(&given).unwrap())
+    }
+
+    const PLANES: [Dimension; 2] = [
+        Dimension::PlaneStress { thickness: 0.5 },
+        Dimension::PlaneStrain { thickness: 0.5 },
+    ];
+
+    /// λ (that of the sheet in plane stress) and G, Pa.
+    fn constants(dimension: Dimension, ratio: f64) -> [f64; 2] {
+        let shear = YOUNG / (2.0 * (1.0 + ratio));
+        let across = match dimension {
+            Dimension::PlaneStress { .. } => 1.0 - ratio,
+            _ => 1.0 - 2.0 * ratio,
+        };
+        [2.0 * shear * ratio / across, shear]
+    }
+
+    #[test]
+    fn that_of_wan_is_the_stress_of_the_inverse_shape_tensor() {
+        let space = Matrix3::new(3.0, 0.4, -0.2, 0.4, 2.0, 0.5, -0.2, 0.5, 4.0);
+        let plane = Matrix2::new(3.0, 0.4, 0.4, 2.0);
+        for ratio in [-0.3, 0.0, 0.25, 1.0 / 3.0, 0.4] {
+            let of = |dimension| control(dimension, ratio, "wan2019", &[]);
+            let [lambda, shear] = constants(Dimension::Space, ratio);
+            let wanted = Matrix3::identity() * (lambda * space.trace()) + space * (2.0 * shear);
+            let found = of(Dimension::Space).matrix(&space, 0.0);
+            assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
+            for dimension in PLANES {
+                let [lambda, shear] = constants(dimension, ratio);
+                let wanted = Matrix2::identity() * (lambda * plane.trace()) + plane * (2.0 * shear);
+                let found = of(dimension).matrix(&plane, 0.0);
+                assert!((found - wanted).norm() < 1e-14 * wanted.norm(), "{ratio}");
+            }
+            // C_ijkl K⁻¹_jl of a whole family is λ + (D + 1) G, which is the same where λ = G.
+            let other = lambda + 4.0 * shear;
+            let found = of(Dimension::Space).matrix(&Matrix3::identity(), 0.0)[(0, 0)];
+            let are_equal = (found / other - 1.0).abs() < 1e-14;
+            assert_eq!(are_equal, ratio == 0.25, "{ratio}: {found} {other}");
+        }
+    }
+
+    #[test]
+    fn that_of_wan_contracts_an_anisotropic_solid_with_the_shape_tensor() {
+        let entries = [
+            ("c11", 9.0),
+            ("c12", 3.0),
+            ("c13", 2.0),
+            ("c16", 0.3),
+            ("c22", 8.0),
+            ("c23", 2.5),
+            ("c24", 0.1),
+            ("c33", 7.0),
+            ("c35", 0.2),
+            ("c44", 2.0),
+            ("c45", 0.1),
+            ("c55", 3.0),
+            ("c66", 2.5),
+        ];
+        let entry = |a: usize, b: usize| {
+            let name = format!("c{}{}", a.min(b) + 1, a.max(b) + 1);
+            let found = entries.iter().find(|(key, _)| *key == name);
+            found.map_or(0.0, |(_, number)| *number)
+        };
+        let voigt = |a: usize, b: usize| if a == b { a } else { 6 - a - b };
+        let inverse = Matrix3::new(3.0, 0.4, -0.2, 0.4, 2.0, 0.5, -0.2, 0.5, 4.0);
+        let wanted = Matrix3::from_fn(|i, j| {
+            let pairs = (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+            pairs
+                .map(|(k, l)| entry(voigt(i, j), voigt(k, l)) * inverse[(k, l)])
+                .sum()
+        });
+        let found = control(Dimension::Space, 0.25, "wan2019", &entries).matrix(&inverse, 0.0);
+        assert!(
+            (found - wanted).norm() < 1e-14 * wanted.norm(),
+            "{found} {wanted}"
+        );
+    }
+
+    #[test]
+    fn that_without_dispersion_has_four_thirds_of_the_shear_modulus() {
+        let horizon = 2.0_f64;
+        for ratio in [-0.3, 0.25, 0.4] {
+            let of = |dimension| control(dimension, ratio, "dispersion", &[]).constant(1.0);
+            let close = |found: f64, wanted: f64| {
+                assert!(
+                    (found / wanted - 1.0).abs() < 1e-11,
+                    "{ratio}: {found} {wanted}"
+                );
+            };
+            let shear = YOUNG / (2.0 * (1.0 + ratio));
+            let space = 4.0 * PI / 15.0 * horizon.powi(5);
+            close(of(Dimension::Space), 4.0 / 3.0 * shear / space);
+            for dimension in PLANES {
+                let plane = 0.5 * PI / 4.0 * horizon.powi(4);
+                close(of(dimension), 4.0 / 3.0 * shear / plane);
+            }
+        }
+    }
+
+    #[test]
+    fn that_without_dispersion_follows_the_softest_shears_of_an_orthotropic_solid() {
+        let fibres = [
+            ("youngs_modulus_x", 140.0),
+            ("youngs_modulus_y", 10.0),
+            ("youngs_modulus_z", 10.0),
+            ("poisson_ratio_xy", 0.3),
+            ("poisson_ratio_yz", 0.4),
+            ("poisson_ratio_xz", 0.3),
+            ("shear_modulus_xy", 5.0),
+            ("shear_modulus_yz", 3.5),
+            ("shear_modulus_xz", 5.0),
+        ];
+        let of = |more: &[(&'static str, f64)]| {
+            let all = [&fibres[..], more].concat();
+            control(Dimension::Space, 0.25, "dispersion", &all).constant(1.0)
+        };
+        let space = 4.0 * PI / 15.0 * 2.0_f64.powi(5);
+        // 15/(4 (S11 + S22 + S33 − S12 − S23 − S13) + 3 (S44 + S55 + S66)).
+        let normal = 1.0 / 140.0 + 2.0 / 10.0;
+        let coupled = -2.0 * 0.3 / 140.0 - 0.4 / 10.0;
+        let shear = 15.0 / (4.0 * (normal - coupled) + 3.0 * (2.0 / 5.0 + 1.0 / 3.5));
+        let wanted = 4.0 / 3.0 * shear / space;
+        assert!((of(&[]) / wanted - 1.0).abs() < 1e-11);
+        // Axes do not change it.
+        let turned = of(&[("angle_1", 20.0), ("angle_2", 50.0), ("angle_3", -70.0)]);
+        assert!((turned / wanted - 1.0).abs() < 1e-11);
     }
 }

@@ -4,10 +4,11 @@
 //! are used of it: in plane stress the matrix is that of a thin sheet, in plane strain part of that of
 //! the solid.
 
-use nalgebra::{DMatrix, Matrix6, Rotation3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix6, Rotation3, Vector3};
 
 use super::super::{Given, Key, Kind, LawFault, Values};
-use super::tensor::{Number, Tensor};
+use super::family::extremes;
+use super::tensor::{Number, Tensor, matrix, tensor};
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 
@@ -246,10 +247,7 @@ fn indefinite(
 
 /// The smallest eigenvalue (Pa) of the matrix as decks have it, and its strain in words.
 fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
-    let used: Vec<usize> = match dimension {
-        Dimension::Space => (0..6).collect(),
-        _ => PLANE.to_vec(),
-    };
+    let used = used(dimension);
     let written = DMatrix::from_fn(used.len(), used.len(), |a, b| matrix[(used[a], used[b])]);
     let all = written.symmetric_eigen();
     let softest = all.eigenvalues.imin();
@@ -262,6 +260,26 @@ fn softest(matrix: &Matrix6<f64>, dimension: Dimension) -> (f64, String) {
         .map(|(component, part)| format!("{:.2} {}", part / largest, name(*component)))
         .collect();
     (all.eigenvalues[softest], parts.join(", "))
+}
+
+/// The components of Hooke's matrix that a dimension has.
+fn used(dimension: Dimension) -> Vec<usize> {
+    match dimension {
+        Dimension::Space => (0..6).collect(),
+        _ => PLANE.to_vec(),
+    }
+}
+
+/// The smallest eigenvalue of C : I (Pa) of constants that are not isotropic.
+pub fn least_under_dilation(values: &Values, dimension: Dimension) -> Option<f64> {
+    let hooke = Hooke {
+        matrix: unturned(values, dimension)?,
+        across: None,
+    };
+    Some(match dimension {
+        Dimension::Space => hooke.least_of_unit_strain::<3>(),
+        _ => hooke.least_of_unit_strain::<2>(),
+    })
 }
 
 /// The matrix along the material's own axes, where it is not isotropic.
@@ -375,17 +393,28 @@ impl Hooke {
         stress
     }
 
-    /// C_ijkl M_jl, for a symmetric M.
-    pub fn contracted<const D: usize>(&self, m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-        SMatrix::from_fn(|i, k| {
-            let mut sum = 0.0;
-            for j in 0..D {
-                for l in 0..D {
-                    sum += self.matrix[(voigt(i, j), voigt(k, l))] * m[(j, l)];
-                }
-            }
-            sum
-        })
+    /// Shear modulus of the isotropic solid with the same compliance on average over all directions (Reuss), Pa: that of
+    /// the softest shears, where these differ.
+    pub fn shear_modulus(&self, dimension: Dimension) -> f64 {
+        let used = used(dimension);
+        let own = DMatrix::from_fn(used.len(), used.len(), |a, b| {
+            self.matrix[(used[a], used[b])]
+        });
+        let s = own
+            .try_inverse()
+            .expect("the constants have been looked at");
+        if used.len() == 3 {
+            return 2.0 / (s[(0, 0)] + s[(1, 1)] - 2.0 * s[(0, 1)] + s[(2, 2)]);
+        }
+        let normal = s[(0, 0)] + s[(1, 1)] + s[(2, 2)];
+        let coupled = s[(0, 1)] + s[(1, 2)] + s[(0, 2)];
+        let shear = s[(3, 3)] + s[(4, 4)] + s[(5, 5)];
+        15.0 / (4.0 * (normal - coupled) + 3.0 * shear)
+    }
+
+    fn least_of_unit_strain<const D: usize>(&self) -> f64 {
+        let unit = tensor(|a, b| if a == b { 1.0 } else { 0.0 });
+        extremes(&matrix::<D>(&self.stress(&unit)))[0]
     }
 
     /// The largest eigenvalue of C : E = λ E, Pa.

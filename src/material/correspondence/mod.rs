@@ -80,11 +80,14 @@ impl Declared for Correspondence {
             "poisson_ratio = 0.3, stress = 'neo-hooke', zero_energy = 'silling2017'",
             "poisson_ratio = 0.2, stress = 'willberg2022'",
             "poisson_ratio = 0.25, zero_energy = 'none'",
+            "poisson_ratio = 0.35, zero_energy = 'wan2019'",
             "poisson_ratio = 0.3, yield_stress = 0.12, hardening_modulus = 0.5, \
              zero_energy = 'silling2017'",
         ],
         fault: Some(|values, dimension| {
-            hooke::fault(values, dimension).or_else(|| plastic::fault(values))
+            hooke::fault(values, dimension)
+                .or_else(|| control::fault(values, dimension))
+                .or_else(|| plastic::fault(values))
         }),
         elastic: Some(hooke::average),
         invariants,
@@ -100,7 +103,7 @@ fn invariants(values: &Values) -> Invariants {
     let stress = of_stress(values);
     let yields = values.get(plastic::YIELD_STRESS.name).is_some();
     // The control of Wan et al. has axes of its own where a family is not whole. They do not turn with the body, and it
-    // turns such points, by the square of z.
+    // turns such points, by the square of z. The others have none.
     let has_axes = values.word(control::KIND.name) == "wan2019";
     Invariants {
         conservative: stress.conservative && !yields,

@@ -1,0 +1,108 @@
+//! Bars that are few points thick, in bending and in torsion: their stiffness against that of the beam.
+
+use fissure::solver::Simulation;
+use fissure::solver::observers::HistoryObserver;
+
+use crate::support::history::row;
+use crate::support::simulate;
+
+const YOUNG: f64 = 1e9;
+const RATIO: f64 = 0.25;
+const SHEAR: f64 = YOUNG / (2.0 * (1.0 + RATIO));
+
+/// How a bar along x is strained.
+#[derive(Debug, Clone, Copy)]
+enum Load {
+    Torsion,
+    Bending,
+}
+
+impl Load {
+    /// The displacement of both ends at a curvature or twist k, 1/m, with the deflections across of a beam.
+    fn displacement(self) -> &'static str {
+        match self {
+            Self::Torsion => "['free', '-k*x*z', 'k*x*y']",
+            Self::Bending => "['-k*x*y', 'k*(x^2 + 0.25*(y^2 - z^2))/2', 'k*0.25*y*z']",
+        }
+    }
+
+    /// The stiffness of a beam (N m²) of a square section with this edge: G J and E I.
+    fn stiffness(self, edge: f64) -> f64 {
+        match self {
+            Self::Torsion => 0.140577 * SHEAR * edge.powi(4),
+            Self::Bending => YOUNG * edge.powi(4) / 12.0,
+        }
+    }
+}
+
+/// Stiffness over that of the beam, of the middle of a square bar with this many points of unit spacing across: from the
+/// strain energies of two lengths, so that the ends have no part in it.
+fn stiffness(control: &str, across: u32, load: Load) -> f64 {
+    let curvature = 1e-4 / f64::from(across);
+    let energy = |length: u32| {
+        let (half_length, half) = (f64::from(length) / 2.0, f64::from(across) / 2.0);
+        let text = format!(
+            "dimension = '3d'
+            parameters.k = {curvature}
+            grid = {{ spacing = 1, horizon = 3.015, volume_correction = 'none', origin = [-{half_length}, -{half}, -{half}] }}
+            material.solid.correspondence = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, {control} }}
+            body.bar = {{ material = 'solid', shape.box = {{ lower = [-{half_length}, -{half}, -{half}], upper = [{half_length}, {half}, {half}] }} }}
+            set.ends.where = 'abs(x) > {half_length} - 4'
+            condition.ends = {{ set = 'ends', displacement = {} }}
+            time = {{ end = 1, method = 'relaxation', relaxation = {{ load_steps = 1, tolerance = 1e-5 }} }}
+            ",
+            load.displacement()
+        );
+        simulate::<3, _>(&text, |mut simulation: Simulation<3>| {
+            let mut history = HistoryObserver::new(&simulation).unwrap();
+            while !simulation.is_over() {
+                simulation.advance();
+                simulation.check().unwrap();
+            }
+            row(&mut history, &mut simulation).energies.strain
+        })
+    };
+    let lengths = [3 * across + 8, 5 * across + 8];
+    let [short, long] = lengths.map(energy);
+    let by_length = (long - short) / f64::from(lengths[1] - lengths[0]);
+    by_length / (0.5 * load.stiffness(f64::from(across)) * curvature * curvature)
+}
+
+/// Rows of docs/state_based.md: torsion and bending of bars with this many points across, by control.
+fn check(across: u32, rows: &[(&str, [f64; 2])]) {
+    for (control, wanted) in rows {
+        for (load, wanted) in [Load::Torsion, Load::Bending].into_iter().zip(wanted) {
+            let found = stiffness(control, across, load);
+            println!("{across} {control} {load:?}: {found:.3}");
+            assert!(
+                (found - wanted).abs() < 0.011,
+                "{across} {control} {load:?}: {found}"
+            );
+        }
+    }
+}
+
+#[test]
+fn bars_of_four_points() {
+    check(
+        4,
+        &[
+            ("zero_energy = 'dispersion'", [0.90, 0.77]),
+            ("zero_energy = 'wan2019'", [5.68, 3.83]),
+        ],
+    );
+}
+
+#[test]
+fn bars_of_six_and_ten_points() {
+    check(
+        6,
+        &[
+            ("zero_energy = 'dispersion'", [1.04, 0.83]),
+            ("zero_energy = 'wan2019'", [3.24, 2.14]),
+            ("zero_energy = 'silling2017'", [4.52, 2.99]),
+            ("zero_energy = 'none'", [0.50, 0.51]),
+        ],
+    );
+    check(10, &[("zero_energy = 'dispersion'", [1.00, 0.93])]);
+}
