@@ -10,6 +10,7 @@ pub mod families;
 pub mod lanes;
 pub mod material;
 pub mod memory;
+pub mod mesh;
 pub mod message;
 pub mod output;
 pub mod partition;

@@ -97,8 +97,15 @@ pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimensio
         "volume",
         format_args!("{:.4e} m³{}", figures.volume, of_shape.unwrap_or_default()),
     );
-    if matches!(body.points, PointSource::File { .. }) {
+    if !matches!(body.points, PointSource::Lattice { .. }) {
         report.line("distance of points", si(figures.spacing, "m"));
+    }
+    if let Some([least, median, largest]) = figures.neighbours {
+        let [least, median, largest] = [least, median, largest].map(count);
+        report.line(
+            "neighbours",
+            format_args!("{least} at least, median {median}, {largest} at most"),
+        );
     }
     report.line("mass", format_args!("{:.4e} kg", figures.mass));
     report.line("centre", place(&figures.centre[..dimension]));

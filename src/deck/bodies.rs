@@ -6,10 +6,12 @@ use indexmap::IndexMap;
 use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck};
+use super::group_name::GroupName;
 use super::resolve::{Scope, resolve_each};
 use super::shapes;
 use super::validate;
 use crate::error::Result;
+use crate::mesh::{Format, GroupKey};
 use crate::message::format_number;
 use crate::problem;
 
@@ -127,7 +129,7 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
         problem::PointSource::Lattice { shape, spacing, .. } => {
             (*spacing == edges).then_some(shape)
         }
-        problem::PointSource::File { .. } => None,
+        problem::PointSource::File { .. } | problem::PointSource::Mesh { .. } => None,
     })
 }
 
@@ -167,26 +169,35 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// An error if a body asks for rows of a point file that an earlier one takes.
+/// An error if a body asks for rows of a point file, or elements of a mesh, that an earlier one takes.
 fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
     let rows = |body: &problem::Body| match &body.points {
         problem::PointSource::File { path, block, span } => {
-            Some((path.clone(), *block, span.clone()))
+            let block = block.map(|block| GroupKey::Number(block.into()));
+            Some((path.clone(), block, span.clone(), ("file", "rows")))
         }
+        problem::PointSource::Mesh {
+            path, block, span, ..
+        } => Some((
+            path.clone(),
+            block.clone(),
+            span.clone(),
+            ("mesh", "elements"),
+        )),
         problem::PointSource::Lattice { .. } => None,
     };
     for (index, body) in bodies.iter().enumerate() {
-        let Some((path, block, span)) = rows(body) else {
+        let Some((path, block, span, (key, what))) = rows(body) else {
             continue;
         };
         let taker = bodies[..index].iter().find(|earlier| {
-            rows(earlier).is_some_and(|(other, taken, _)| {
+            rows(earlier).is_some_and(|(other, taken, ..)| {
                 other == path && (taken.is_none() || taken == block)
             })
         });
         if let Some(taker) = taker {
             let message = format!(
-                "[body.{}] points file: [body.{}] takes these rows already; give each body its own \
+                "[body.{}] points {key}: [body.{}] takes these {what} already; give each body its own \
                  `block`",
                 body.name, taker.name
             );
@@ -207,10 +218,7 @@ fn point_source(
 ) -> Result<problem::PointSource> {
     let given = [
         ("shape", body.shape.as_ref().map(Spanned::span)),
-        (
-            "points",
-            body.points.as_ref().map(|points| points.file.span()),
-        ),
+        ("points", body.points.as_ref().map(Spanned::span)),
     ];
     scope.exactly_one(span, key, &given)?;
     match (&body.shape, &body.points) {
@@ -248,16 +256,74 @@ fn point_source(
         }
         (None, points) => {
             let points = points.as_ref().expect("a body without a shape has points");
-            if let Some(spacing) = &body.spacing {
-                let message = format!("{key} spacing: points from a file have no spacing");
-                return Err(scope.error(spacing.span(), message));
-            }
-            let folder = scope.source.path.parent().unwrap_or("".as_ref());
-            Ok(problem::PointSource::File {
-                path: folder.join(points.file.get_ref()),
-                block: points.block.as_ref().map(|block| *block.get_ref()),
-                span: points.file.span(),
-            })
+            from_file(scope, key, body, points)
         }
     }
+}
+
+/// Points of a file or a mesh.
+fn from_file(
+    scope: &Scope,
+    key: &str,
+    body: &grammar::Body,
+    points: &Spanned<grammar::Points>,
+) -> Result<problem::PointSource> {
+    let place = points.span();
+    let points = points.get_ref();
+    let key_of_points = format!("{key} points");
+    let given = [
+        ("file", points.file.as_ref().map(Spanned::span)),
+        ("mesh", points.mesh.as_ref().map(Spanned::span)),
+    ];
+    scope.exactly_one(place, &key_of_points, &given)?;
+    if let Some(spacing) = &body.spacing {
+        let what = if points.file.is_some() {
+            "file"
+        } else {
+            "mesh"
+        };
+        let message = format!("{key} spacing: points from a {what} have no spacing");
+        return Err(scope.error(spacing.span(), message));
+    }
+    let folder = scope.source.path.parent().unwrap_or("".as_ref());
+    let block = points.block.as_ref();
+    if let Some(mesh) = &points.mesh {
+        let path = folder.join(mesh.get_ref());
+        if Format::of(&path).is_none() {
+            let message = format!(
+                "{key_of_points} mesh: the name must end with one of {}",
+                Format::endings()
+            );
+            return Err(scope.error(mesh.span(), message));
+        }
+        let scale = points.scale.as_ref();
+        let scale = scale.map(|scale| scope.length(scale, &format!("{key_of_points} scale")));
+        return Ok(problem::PointSource::Mesh {
+            path,
+            block: block.map(|block| block.get_ref().0.clone()),
+            scale: scale.transpose()?.unwrap_or(1.0),
+            span: mesh.span(),
+            block_span: block.map_or(mesh.span(), Spanned::span),
+        });
+    }
+    if let Some(scale) = &points.scale {
+        let message = format!("{key_of_points} scale: is for a mesh; a point file is in metres");
+        return Err(scope.error(scale.span(), message));
+    }
+    let file = points.file.as_ref().expect("there is a file or a mesh");
+    let number = |block: &Spanned<GroupName>| match &block.get_ref().0 {
+        GroupKey::Number(number) if u32::try_from(*number).is_ok() => Ok(*number as u32),
+        written => {
+            let message = format!(
+                "{key_of_points} block: must be a whole number from 0 to {}, is {written}",
+                u32::MAX
+            );
+            Err(scope.error(block.span(), message))
+        }
+    };
+    Ok(problem::PointSource::File {
+        path: folder.join(file.get_ref()),
+        block: block.map(number).transpose()?,
+        span: file.span(),
+    })
 }

@@ -7,6 +7,7 @@ mod damage;
 mod difference;
 mod explain;
 pub mod grammar;
+mod group_name;
 mod history;
 mod interface;
 mod lints;

@@ -41,19 +41,25 @@ pub fn sets(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Set>> {
         sets.push(problem::Set {
             name: name.clone(),
             span: table.span(),
-            selector: selector(scope, name, table)?,
+            selector: selector(scope, deck, name, table)?,
         });
     }
     Ok(sets)
 }
 
-fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<problem::Selector> {
+fn selector(
+    scope: &Scope,
+    deck: &Deck,
+    name: &str,
+    table: &Spanned<grammar::Set>,
+) -> Result<problem::Selector> {
     let key = format!("[set.{name}]");
     let set = table.get_ref();
     let given = [
         ("where", set.condition.as_ref().map(Spanned::span)),
         ("shape", set.shape.as_ref().map(Spanned::span)),
         ("ids", set.ids.as_ref().map(Spanned::span)),
+        ("mesh", set.mesh.as_ref().map(Spanned::span)),
     ];
     scope.exactly_one(table.span(), &key, &given)?;
     if let Some(condition) = &set.condition {
@@ -62,6 +68,17 @@ fn selector(scope: &Scope, name: &str, table: &Spanned<grammar::Set>) -> Result<
             .map(problem::Selector::Where)
     } else if let Some(shape) = &set.shape {
         shapes::shape(scope, &format!("{key} shape"), shape).map(problem::Selector::Within)
+    } else if let Some(group) = &set.mesh {
+        let is_mesh = |body: &Spanned<grammar::Body>| {
+            let points = body.get_ref().points.as_ref();
+            points.is_some_and(|points| points.get_ref().mesh.is_some())
+        };
+        if !deck.body.values().any(is_mesh) {
+            let message = format!("{key} mesh: no body has its points from a mesh");
+            return Err(scope.error(group.span(), message));
+        }
+        let set = problem::MeshSet::new(group.get_ref().0.clone(), group.span());
+        Ok(problem::Selector::Mesh(set))
     } else {
         let given = set.ids.as_ref().map_or(&[][..], |ids| ids.get_ref());
         if let Some(id) = given.iter().find(|id| *id.get_ref() > i64::MAX as u64) {

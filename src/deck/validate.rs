@@ -170,6 +170,7 @@ fn volume_correction(
     let gauss = grid.quadrature == Quadrature::Gauss;
     let without_cells = |body: &problem::Body| match &body.points {
         problem::PointSource::File { .. } => Some("has its points from a file"),
+        problem::PointSource::Mesh { .. } => Some("has its points from a mesh"),
         problem::PointSource::Lattice { .. } if gauss => Some("has Gauss points"),
         problem::PointSource::Lattice { spacing, .. } => {
             let edges = &spacing[..scope.dimension];

@@ -98,7 +98,7 @@ fn too_little_memory(problem: &Problem, blocks: [usize; 2], shortage: Shortage) 
         PointSource::Lattice { spacing, .. } => {
             format!(", {:.1} spacings,", body.horizon / spacing[0])
         }
-        PointSource::File { .. } => String::new(),
+        PointSource::File { .. } | PointSource::Mesh { .. } => String::new(),
     };
     let ends = if body.name == other.name {
         format!("within [body.{}]", body.name)
@@ -127,7 +127,7 @@ fn too_many_neighbours(
     // The longest bond may exceed the horizon by part of a cell, so compute the ratio from the deck's horizon.
     let spacings = match &other.points {
         PointSource::Lattice { spacing, .. } => Some(body.horizon / spacing[0]),
-        PointSource::File { .. } => spacings,
+        PointSource::File { .. } | PointSource::Mesh { .. } => spacings,
     };
     let is = match spacings {
         Some(spacings) => format!(" is {spacings:.0} spacings of [body.{}]", other.name),

@@ -51,7 +51,7 @@ impl<'a> LatticeBody<'a> {
                 spacing,
                 origin,
             } => Some((shape, *spacing, *origin)),
-            PointSource::File { .. } => None,
+            PointSource::File { .. } | PointSource::Mesh { .. } => None,
         };
         let Some((shape, spacing, origin)) = lattice(&problem.bodies[body]) else {
             return Ok(None);

@@ -6,6 +6,7 @@ pub mod bins;
 pub mod crack;
 pub(crate) mod file;
 pub mod lattice;
+pub(crate) mod mesh;
 mod polygon;
 mod region;
 pub mod set;
@@ -19,6 +20,7 @@ use nalgebra::Vector3;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
+use crate::mesh::{Runs, suggestion};
 use crate::problem::{PointSource, Problem, Selector};
 
 /// Maximum number of points per rank.
@@ -64,11 +66,12 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// The ids of a piece are contiguous per body. Collective.
 ///
 /// # Errors
-/// A body without points, an unreadable or invalid point file, a set with an unknown id, too many
+/// A body without points, an unreadable or invalid file, a set with an unknown id or group of a mesh, too many
 /// points on a rank; equal on all ranks.
 pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
+    let mut meshes = Vec::new();
     for (index, body) in problem.bodies.iter().enumerate() {
         let mut piece = match &body.points {
             PointSource::Lattice { .. } => lattice::piece(problem, index, comm)?,
@@ -77,6 +80,15 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
                     continue;
                 }
                 file::piece(problem, path, comm)?
+            }
+            PointSource::Mesh { path, .. } => {
+                if mesh::first_user(problem, path) != index {
+                    continue;
+                }
+                let mut found = mesh::piece(problem, path, comm)?;
+                let piece = std::mem::take(&mut found.points);
+                meshes.push((found, total));
+                piece
             }
         };
         let (before, all) = crate::comm::scan(comm, piece.len() as u64);
@@ -93,6 +105,8 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     }
     check_no_empty_body(problem, comm, &points)?;
     check_set_ids(problem, total)?;
+    let resolved = resolve_mesh_sets(problem, &meshes);
+    agree(comm, resolved)?;
     let fits = if (points.len() as f64) < MAX_PER_RANK {
         Ok(())
     } else {
@@ -102,6 +116,42 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     };
     agree(comm, fits)?;
     Ok((points, total))
+}
+
+/// Give the sets that name groups of meshes their points; `meshes` have the id of their first point.
+///
+/// # Errors
+/// If no mesh has a group of that name, on rank 0, or if the points are not those of an earlier call.
+fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result<()> {
+    for (index, set) in problem.sets.iter().enumerate() {
+        let Selector::Mesh(group) = &set.selector else {
+            continue;
+        };
+        let of_mesh = |(found, first): &'_ (mesh::Found, u64)| {
+            let ids = found.sets[index].clone()?;
+            Some((ids, *first))
+        };
+        let found: Vec<(Runs, u64)> = meshes.iter().filter_map(of_mesh).collect();
+        if found.is_empty() {
+            let names = meshes.iter().flat_map(|(found, _)| found.names.clone());
+            let message = format!(
+                "[set.{}] mesh: no mesh has a group {}{}",
+                set.name,
+                group.group,
+                suggestion(&group.group, &names.collect::<Vec<_>>())
+            );
+            return Err(Error::input(message).at(&group.span));
+        }
+        let ids = Runs::union(found.iter().map(|(ids, first)| (ids.ranges(), *first)));
+        if !group.resolve(ids) {
+            let message = format!(
+                "[set.{}] mesh: the mesh has changed since it was read",
+                set.name
+            );
+            return Err(Error::input(message).at(&group.span));
+        }
+    }
+    Ok(())
 }
 
 fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
@@ -135,6 +185,7 @@ fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Poi
                     "is its shape smaller than the spacing, or covered by a later body?"
                 }
                 PointSource::File { .. } => "no row of its file is its own",
+                PointSource::Mesh { .. } => "no element of its mesh is its own",
             };
             let message = format!("[body.{}]: has no points; {why}", body.name);
             Err(Error::input(message).at(&body.span))

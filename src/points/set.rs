@@ -15,5 +15,6 @@ pub fn contains(set: &Set, horizon: f64, id: u64, position: [f64; 3], body: usiz
         Selector::Where(condition) => condition.is_true(position, 0.0),
         Selector::Within(region) => shape::contains(region, position, TOLERANCE * horizon),
         Selector::Ids { ids, .. } => ids.binary_search(&id).is_ok(),
+        Selector::Mesh(set) => set.contains(id),
     }
 }

@@ -47,7 +47,7 @@ impl<'a> Block<'a> {
     pub fn spacing(&self) -> Option<[f64; 3]> {
         match self.body.points {
             PointSource::Lattice { spacing, .. } => Some(spacing.map(|edge| edge * self.scale())),
-            PointSource::File { .. } => None,
+            PointSource::File { .. } | PointSource::Mesh { .. } => None,
         }
     }
 

@@ -1,11 +1,14 @@
 //! Bodies: their points, materials, bonds and damage, and what is told of them by place.
 
+use std::fmt;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use super::{Calibration, Law, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
+use crate::mesh::{GroupKey, Runs};
 use crate::points::Polygon;
 
 /// A body, which is a block with its own material and damage.
@@ -180,6 +183,19 @@ pub enum PointSource {
         /// Where the file is named in the deck.
         span: Range<usize>,
     },
+    /// The elements of a mesh.
+    Mesh {
+        /// Path, already relative to the working directory.
+        path: PathBuf,
+        /// The group of its elements; all elements that no other body has if not given.
+        block: Option<GroupKey>,
+        /// Metres per unit of length of the mesh.
+        scale: f64,
+        /// Where the file is named in the deck.
+        span: Range<usize>,
+        /// Where the group is named in the deck.
+        block_span: Range<usize>,
+    },
 }
 
 /// A region of space, lengths in m.
@@ -252,6 +268,47 @@ pub enum Selector {
         /// Where the largest one stands in the deck.
         largest: Range<usize>,
     },
+    /// Those of a group of the meshes that bodies have their points from.
+    Mesh(MeshSet),
+}
+
+/// The points of a named group of the problem's meshes. They are known once the points have been generated.
+#[derive(Clone)]
+pub struct MeshSet {
+    /// The group's name or number.
+    pub group: GroupKey,
+    /// Where it stands in the deck.
+    pub span: Range<usize>,
+    ids: OnceLock<Runs>,
+}
+
+impl MeshSet {
+    /// The points of a group that is named at `span` in the deck.
+    pub fn new(group: GroupKey, span: Range<usize>) -> Self {
+        Self {
+            group,
+            span,
+            ids: OnceLock::new(),
+        }
+    }
+
+    /// Set the ids of the points; return whether they are those of an earlier call, if there was one.
+    pub fn resolve(&self, ids: Runs) -> bool {
+        let ids = &ids;
+        self.ids.get_or_init(|| ids.clone()) == ids
+    }
+
+    /// Test whether the point with an id is in the set; false before the points have been generated.
+    pub fn contains(&self, id: u64) -> bool {
+        self.ids.get().is_some_and(|ids| ids.contains(id))
+    }
+}
+
+/// Without the ids, which are no part of the description.
+impl fmt::Debug for MeshSet {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "MeshSet({:?})", self.group)
+    }
 }
 
 /// A crack that is there from the start.

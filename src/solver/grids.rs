@@ -47,7 +47,9 @@ pub fn grids(
             PointSource::Lattice {
                 spacing, origin, ..
             } => Some(described(origin, spacing, dimension)),
-            PointSource::File { .. } => detected(problem, comm, domain, index, longest),
+            PointSource::File { .. } | PointSource::Mesh { .. } => {
+                detected(problem, comm, domain, index, longest)
+            }
         };
         let Some(Cells { centre, edges }) = found else {
             let message = format!(

@@ -4,7 +4,7 @@ use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
 use crate::error::Warning;
 use crate::points::{LatticeBody, distance_squared};
-use crate::problem::{PointSource, Problem};
+use crate::problem::{Body, PointSource, Problem};
 use crate::solver::Simulation;
 
 /// Relative difference between the volumes of points and shape above which a warning is printed.
@@ -28,6 +28,8 @@ pub struct BodyFigures {
     pub shape_volume: Option<f64>,
     /// Mean distance to the nearest neighbour for points from a file, m; 0 without neighbours.
     pub spacing: f64,
+    /// Least, median and largest number of neighbours of a point from a file or a mesh, without pre-cracked bonds.
+    pub neighbours: Option<[u64; 3]>,
 }
 
 /// The figures of all bodies, with warnings of inconsistent volumes. Collective.
@@ -37,6 +39,7 @@ pub fn figures<const D: usize>(
 ) -> Vec<BodyFigures> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let nearest = nearest_neighbours(simulation);
+    let neighbours = neighbours(simulation);
     let mut counts = vec![0; 2 * problem.bodies.len()];
     // Volume, its first moments, and the distance to the nearest neighbour.
     let mut sums = vec![ExactSum::ZERO; 5 * problem.bodies.len()];
@@ -62,6 +65,7 @@ pub fn figures<const D: usize>(
         centre: std::array::from_fn(|k| sums[1 + k] / sums[0]),
         shape_volume: shape_volume(problem, index),
         spacing: sums[4] / (counts[2 * index + 1].max(1)) as f64,
+        neighbours: neighbours[index],
     });
     let figures: Vec<BodyFigures> = figures.collect();
     for (index, body) in figures.iter().enumerate() {
@@ -78,8 +82,7 @@ fn shape_volume(problem: &Problem, body: usize) -> Option<f64> {
 /// Distance (m) of each owned point to its nearest bonded neighbour; empty if no body comes from a file.
 fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64> {
     let (problem, model) = (simulation.problem, &simulation.model);
-    let from_file = |body: &crate::problem::Body| matches!(body.points, PointSource::File { .. });
-    if !problem.bodies.iter().any(from_file) {
+    if !problem.bodies.iter().any(is_from_file) {
         return Vec::new();
     }
     let mut squares = vec![f64::INFINITY; model.owned()];
@@ -88,6 +91,53 @@ fn nearest_neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<f64
         squares[i] = squares[i].min(square);
     });
     squares.into_iter().map(f64::sqrt).collect()
+}
+
+/// Test whether a body's points come from a file or a mesh.
+fn is_from_file(body: &Body) -> bool {
+    !matches!(body.points, PointSource::Lattice { .. })
+}
+
+/// Least, median and largest number of neighbours of the points of each body from a file or a mesh. Collective.
+fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64; 3]>> {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let bodies = problem.bodies.iter().enumerate();
+    let scattered = bodies
+        .filter(|(_, body)| is_from_file(body))
+        .map(|(index, _)| index);
+    let scattered: Vec<usize> = scattered.collect();
+    let mut found = vec![None; problem.bodies.len()];
+    if scattered.is_empty() {
+        return found;
+    }
+    let mut counts = vec![0_usize; model.owned()];
+    simulation.forces.for_each_intact(|i, _| counts[i] += 1);
+    let mut largest = [counts.iter().copied().max().unwrap_or(0) as f64];
+    simulation.comm.max(&mut largest);
+    let width = largest[0] as usize + 1;
+    // Numbers of points by body and number of neighbours.
+    let mut histogram = vec![0; scattered.len() * width];
+    for (point, count) in counts.iter().enumerate() {
+        let body = problem.body_of(usize::from(model.block[point]));
+        if let Ok(row) = scattered.binary_search(&body) {
+            histogram[row * width + count] += 1;
+        }
+    }
+    simulation.comm.sum(&mut histogram);
+    for (body, row) in scattered.iter().zip(histogram.chunks_exact(width)) {
+        let last = row.iter().sum::<u64>().saturating_sub(1);
+        // Number of neighbours of a point by its position among all points sorted by that number.
+        let sorted = |position: u64| {
+            let mut below = 0;
+            let count = row.iter().position(|points| {
+                below += points;
+                below > position
+            });
+            count.unwrap_or(0) as u64
+        };
+        found[*body] = Some([0, last / 2, last].map(sorted));
+    }
+    found
 }
 
 /// The warning of a body whose points have another volume than its shape or spacing.
@@ -121,7 +171,7 @@ fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Opt
     };
     let span = match &body.points {
         PointSource::Lattice { .. } => &body.span,
-        PointSource::File { span, .. } => span,
+        PointSource::File { span, .. } | PointSource::Mesh { span, .. } => span,
     };
     Some(Warning::new(message).at(span))
 }

@@ -189,7 +189,7 @@ fn layer<const D: usize>(
 fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     match &problem.bodies[body].points {
         PointSource::Lattice { spacing, .. } => *spacing,
-        PointSource::File { .. } => [default; 3],
+        PointSource::File { .. } | PointSource::Mesh { .. } => [default; 3],
     }
 }
 

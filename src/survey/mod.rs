@@ -117,7 +117,7 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
                 .iter()
                 .copied()
                 .fold(0.0, f64::max),
-            PointSource::File { .. } => figures.spacing,
+            PointSource::File { .. } | PointSource::Mesh { .. } => figures.spacing,
         };
         let horizon = body.horizon / spacing;
         if spacing > 0.0 && !USUAL_HORIZONS.contains(&horizon) {

@@ -2,7 +2,7 @@
 
 use crate::dimension::Dimension;
 use crate::error::Result;
-use crate::points::{LatticeBody, file, set};
+use crate::points::{LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
@@ -103,7 +103,7 @@ fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64])
     (found as f64 / centres.len() as f64 - 1.0).max(0.0)
 }
 
-/// Figures of a body's points from a file.
+/// Figures of a body's points from a file or a mesh.
 #[derive(Clone, Copy, Default)]
 struct Rows {
     points: f64,
@@ -117,14 +117,19 @@ struct Rows {
 fn from_files(problem: &Problem) -> Vec<Rows> {
     let mut rows = vec![Rows::default(); problem.bodies.len()];
     for (index, body) in problem.bodies.iter().enumerate() {
-        let PointSource::File { path, .. } = &body.points else {
-            continue;
+        // Each file is read once, for its first body.
+        let sample = match &body.points {
+            PointSource::File { path, .. } if file::users(problem, path)[0].0 == index => {
+                file::sample(problem, path)
+            }
+            PointSource::Mesh { path, .. } if mesh::first_user(problem, path) == index => {
+                mesh::read(problem, path)
+                    .ok()
+                    .map(|found| (found.points, 1.0))
+            }
+            _ => None,
         };
-        // Each file is sampled once, for its first body.
-        if file::users(problem, path)[0].0 != index {
-            continue;
-        }
-        let Some((points, weight)) = file::sample(problem, path) else {
+        let Some((points, weight)) = sample else {
             continue;
         };
         for point in points {
@@ -150,11 +155,13 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
     }
 }
 
-/// Test whether a point is in the output set, which is not a set of ids.
+/// Test whether a point is in the output set, which is not a set of ids. Points of a set of a mesh are not known yet;
+/// all of them count.
 fn is_in_result(problem: &Problem, body: usize, position: [f64; 3]) -> bool {
     let set = problem.output.set.as_ref();
-    set.is_none_or(|(set, _)| {
-        set::contains(&problem.sets[*set], problem.horizon, 0, position, body)
+    set.map(|(set, _)| &problem.sets[*set]).is_none_or(|set| {
+        matches!(set.selector, Selector::Mesh(_))
+            || set::contains(set, problem.horizon, 0, position, body)
     })
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
 use super::Text;
+use crate::deck::group_name::GroupName;
 use crate::deck::number::{Edges, Number, Vector};
 
 /// A body: a shape filled with lattice points, or a file of points.
@@ -18,9 +19,9 @@ pub struct Body {
     /// The shape that is filled with lattice points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<Spanned<Shape>>,
-    /// The file that holds the points.
+    /// The file or mesh that the points come from.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub points: Option<PointFile>,
+    pub points: Option<Spanned<Points>>,
     /// Lattice spacing of this body in m; that of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
@@ -29,15 +30,23 @@ pub struct Body {
     pub horizon: Option<Number>,
 }
 
-/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces.
+/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces, or from the elements of a
+/// mesh; exactly one of `file` and `mesh`.
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct PointFile {
-    /// Path, relative to the deck.
-    pub file: Text,
-    /// Take only the rows with this block number; all rows if not given.
+pub struct Points {
+    /// Path of the file, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub block: Option<Spanned<u32>>,
+    pub file: Option<Text>,
+    /// Path of the mesh, relative to the deck.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<Text>,
+    /// Take only the rows with this block number, or the elements of this group; all if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<Spanned<GroupName>>,
+    /// Metres per unit of length of the mesh; 1 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<Number>,
 }
 
 /// A region of space.
@@ -107,6 +116,9 @@ pub struct Set {
     /// The points' global ids, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ids: Option<Spanned<Vec<Spanned<u64>>>>,
+    /// A group of the meshes that bodies have their points from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<Spanned<GroupName>>,
 }
 
 /// A surface that cuts bonds.

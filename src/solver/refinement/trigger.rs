@@ -59,7 +59,10 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
         }
     }
     let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
-    let is_by_ids = |set: usize| matches!(problem.sets[set].selector, Selector::Ids { .. });
+    let is_by_ids = |set: usize| {
+        let selector = &problem.sets[set].selector;
+        matches!(selector, Selector::Ids { .. } | Selector::Mesh(_))
+    };
     let mut conditions = problem.conditions.iter();
     if let Some(condition) = conditions.find(|c| is_load(&c.action) && is_by_ids(c.set)) {
         let message = format!(

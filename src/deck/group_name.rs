@@ -1,0 +1,45 @@
+//! Names of groups of a mesh as written: a name, or a whole number.
+
+use std::fmt;
+
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::mesh::GroupKey;
+
+/// A name or number of a group.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupName(pub GroupKey);
+
+impl<'de> Deserialize<'de> for GroupName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NameVisitor;
+
+        impl Visitor<'_> for NameVisitor {
+            type Value = GroupName;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("a whole number or a name in quotes")
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<GroupName, E> {
+                Ok(GroupName(GroupKey::Number(value)))
+            }
+
+            fn visit_str<E: de::Error>(self, value: &str) -> Result<GroupName, E> {
+                Ok(GroupName(GroupKey::Name(value.to_owned())))
+            }
+        }
+
+        deserializer.deserialize_any(NameVisitor)
+    }
+}
+
+impl Serialize for GroupName {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match &self.0 {
+            GroupKey::Number(number) => serializer.serialize_i64(*number),
+            GroupKey::Name(name) => serializer.serialize_str(name),
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! Meshes of finite elements in the formats of other programs, and points from their elements.
+//!
+//! A reader holds the bytes of its file and checks every count of it against the bytes that are left, so a damaged
+//! file takes no more memory than a sound one of its size.
+
+mod abaqus;
+mod exodus;
+mod gmsh;
+pub mod kind;
+pub mod measure;
+mod netcdf;
+mod runs;
+mod vtu;
+
+use std::fmt;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+pub use kind::{Form, Kind};
+pub use measure::{Measure, measure};
+pub use runs::Runs;
+
+use crate::error::{Error, Result, excerpt};
+use crate::message::nearest;
+use kind::KINDS;
+
+/// Most names of groups that a message lists.
+const MOST_LISTED: usize = 8;
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Gmsh 2.2 and 4.1, text or binary.
+    Gmsh,
+    /// An input file of Abaqus.
+    Abaqus,
+    /// An unstructured grid of VTK in XML.
+    Vtu,
+    /// Exodus II in netCDF.
+    Exodus,
+}
+
+/// Endings of file names, and their formats.
+const ENDINGS: [(&str, Format); 7] = [
+    ("msh", Format::Gmsh),
+    ("inp", Format::Abaqus),
+    ("vtu", Format::Vtu),
+    ("exo", Format::Exodus),
+    ("ex2", Format::Exodus),
+    ("e", Format::Exodus),
+    ("g", Format::Exodus),
+];
+
+impl Format {
+    /// The format of a file, by the ending of its name.
+    pub fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension()?.to_str()?;
+        let same = |(known, _): &&(&str, Format)| known.eq_ignore_ascii_case(ending);
+        ENDINGS.iter().find(same).map(|(_, format)| *format)
+    }
+
+    /// The known endings, for a message.
+    pub fn endings() -> String {
+        ENDINGS.map(|(ending, _)| format!("`.{ending}`")).join(", ")
+    }
+}
+
+/// A mesh.
+#[derive(Debug, Default)]
+pub struct Mesh {
+    /// Positions of the nodes, in the units of the file.
+    pub nodes: Vec<[f64; 3]>,
+    /// The elements, in the order of the file.
+    pub elements: Elements,
+    /// Named or numbered groups of elements and of nodes.
+    pub groups: Vec<Group>,
+    /// Names of groups may differ in case.
+    pub ignores_case: bool,
+}
+
+/// Elements of all types, in the order of the file.
+#[derive(Debug, Clone, Default)]
+pub struct Elements {
+    kinds: Vec<u8>,
+    starts: Vec<usize>,
+    nodes: Vec<u32>,
+    numbers: Vec<u64>,
+    /// Lines of the file; 0 in binary files.
+    lines: Vec<u32>,
+    /// The file of the elements from an index on.
+    files: Vec<(usize, PathBuf)>,
+}
+
+impl Elements {
+    /// Append an element; `nodes` are indices in the order of [`kind`].
+    fn push(
+        &mut self,
+        kind: Kind,
+        (number, line): (u64, u64),
+        nodes: impl IntoIterator<Item = u32>,
+    ) {
+        self.kinds.push(kind.index() as u8);
+        self.starts.push(self.nodes.len());
+        self.nodes.extend(nodes);
+        self.numbers.push(number);
+        self.lines.push(u32::try_from(line).unwrap_or(0));
+    }
+
+    /// Name the file of the elements that follow.
+    fn continue_in(&mut self, file: &Path) {
+        if self.files.last().is_none_or(|(_, last)| last != file) {
+            self.files.push((self.len(), file.to_owned()));
+        }
+    }
+
+    /// Append all elements of another list, whose nodes begin at an index here.
+    fn append(&mut self, other: &Self, first_node: u32) {
+        let (elements, nodes) = (self.len(), self.nodes.len());
+        self.kinds.extend_from_slice(&other.kinds);
+        self.starts
+            .extend(other.starts.iter().map(|start| start + nodes));
+        self.nodes
+            .extend(other.nodes.iter().map(|node| node + first_node));
+        self.numbers.extend_from_slice(&other.numbers);
+        self.lines.extend_from_slice(&other.lines);
+        let files = other.files.iter();
+        self.files
+            .extend(files.map(|(first, file)| (first + elements, file.clone())));
+    }
+
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// There are no elements.
+    pub fn is_empty(&self) -> bool {
+        self.kinds.is_empty()
+    }
+
+    /// The type of an element.
+    pub fn kind(&self, element: usize) -> Kind {
+        KINDS[usize::from(self.kinds[element])]
+    }
+
+    /// The indices of an element's nodes.
+    pub fn nodes(&self, element: usize) -> &[u32] {
+        let start = self.starts[element];
+        &self.nodes[start..start + self.kind(element).nodes]
+    }
+
+    /// The number that the file gives to an element.
+    pub fn number(&self, element: usize) -> u64 {
+        self.numbers[element]
+    }
+
+    /// The error of an element: file, line if the file has lines, number and type.
+    pub fn fault(&self, element: usize, message: impl fmt::Display) -> Error {
+        let after = self.files.partition_point(|(first, _)| *first <= element);
+        let file = self.files[after - 1].1.display();
+        let line = match self.lines[element] {
+            0 => String::new(),
+            line => format!("{line}:"),
+        };
+        let (number, name) = (self.number(element), self.kind(element).name());
+        Error::input(format!(
+            "{file}:{line} element {number} ({name}): {message}"
+        ))
+    }
+}
+
+/// A group of elements or nodes.
+#[derive(Debug)]
+pub struct Group {
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// Its number, if it has one.
+    pub number: Option<i64>,
+    /// What it consists of.
+    pub members: Members,
+}
+
+/// The members of a group.
+#[derive(Debug)]
+pub enum Members {
+    /// Indices of elements.
+    Elements(Runs),
+    /// Indices of nodes.
+    Nodes(Runs),
+}
+
+/// A name or number by which a deck refers to a group.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum GroupKey {
+    /// Its name.
+    Name(String),
+    /// Its number.
+    Number(i64),
+}
+
+impl fmt::Display for GroupKey {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => formatter.write_str(&excerpt(name)),
+            Self::Number(number) => write!(formatter, "{number}"),
+        }
+    }
+}
+
+impl Mesh {
+    /// Largest dimension of a group's elements; 0 for nodes.
+    fn dimension(&self, group: &Group) -> usize {
+        match &group.members {
+            Members::Nodes(_) => 0,
+            Members::Elements(elements) => {
+                let each = elements
+                    .iter()
+                    .map(|k| self.elements.kind(k as usize).dimension());
+                each.max().unwrap_or(0)
+            }
+        }
+    }
+
+    /// The group that a key refers to: of several, the one with elements of the largest dimension of at most
+    /// `dimension`; `None` without any.
+    pub fn find(&self, key: &GroupKey, dimension: usize) -> Option<&Group> {
+        let refers = |group: &&Group, ignores_case: bool| match key {
+            GroupKey::Number(number) => group.number == Some(*number),
+            GroupKey::Name(name) => group
+                .name
+                .as_ref()
+                .is_some_and(|own| own == name || (ignores_case && own.eq_ignore_ascii_case(name))),
+        };
+        let best = |ignores_case: bool| {
+            let candidates = self
+                .groups
+                .iter()
+                .filter(|group| refers(group, ignores_case));
+            let ranked = candidates.map(|group| (self.dimension(group), group));
+            // The first one of several.
+            ranked
+                .filter(|(own, _)| *own <= dimension)
+                .reduce(|a, b| if b.0 > a.0 { b } else { a })
+                .map(|(_, group)| group)
+        };
+        best(false).or_else(|| best(true).filter(|_| self.ignores_case))
+    }
+
+    /// Names, or else numbers, of the groups that `wanted` selects by their dimension.
+    pub fn names(&self, wanted: impl Fn(usize) -> bool) -> Vec<String> {
+        let groups = self
+            .groups
+            .iter()
+            .filter(|group| wanted(self.dimension(group)));
+        let name = |group: &Group| match (&group.name, group.number) {
+            (Some(name), _) => Some(name.clone()),
+            (None, number) => number.map(|number| number.to_string()),
+        };
+        groups.filter_map(name).collect()
+    }
+}
+
+/// The end of a message on an unknown name: the nearest of the known ones, and some of them.
+pub fn suggestion(key: &GroupKey, known: &[String]) -> String {
+    if known.is_empty() {
+        return "; the mesh has none".to_owned();
+    }
+    let near = match key {
+        GroupKey::Name(name) => nearest(name, known.iter().map(String::as_str)),
+        GroupKey::Number(_) => None,
+    };
+    let near = near.map_or(String::new(), |near| {
+        format!("; did you mean {}?", excerpt(near))
+    });
+    let listed: Vec<&str> = known.iter().take(MOST_LISTED).map(String::as_str).collect();
+    let more = if known.len() > MOST_LISTED {
+        ", …"
+    } else {
+        ""
+    };
+    format!("{near} (known: {}{more})", listed.join(", "))
+}
+
+/// The bytes of a file, which must not be a pipe: opening one would block until its other end is opened. Of an HDF5
+/// file, which its library reads, only the first bytes.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn load(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    let mut file = File::open(path)?;
+    let mut bytes = Vec::new();
+    let head = netcdf::HDF5_SIGNATURE.len() as u64;
+    (&mut file).take(head).read_to_end(&mut bytes)?;
+    if bytes != netcdf::HDF5_SIGNATURE {
+        file.read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
+}
+
+/// Read a mesh from the bytes of a file.
+///
+/// # Errors
+/// If they do not follow the format; the message gives file, line and what is expected.
+pub fn parse(format: Format, path: &Path, bytes: &[u8]) -> Result<Mesh> {
+    let mesh = match format {
+        Format::Gmsh => gmsh::parse(path, bytes),
+        Format::Abaqus => abaqus::parse(path, bytes),
+        Format::Vtu => vtu::parse(path, bytes),
+        Format::Exodus => exodus::parse(path, bytes),
+    }?;
+    if mesh.elements.is_empty() {
+        return Err(fault(path, 0, "has no elements"));
+    }
+    Ok(mesh)
+}
+
+/// An error at a line of a file; without a line if that is 0.
+fn fault(path: &Path, line: u64, message: impl fmt::Display) -> Error {
+    let path = path.display();
+    Error::input(match line {
+        0 => format!("{path}: {message}"),
+        line => format!("{path}:{line}: {message}"),
+    })
+}
+
+/// The position of a node, unless it is too far to take squares and volumes.
+fn position(place: [f64; 3]) -> std::result::Result<[f64; 3], String> {
+    let near = |x: &f64| x.abs() <= FARTHEST;
+    if place.iter().all(near) {
+        return Ok(place);
+    }
+    let [x, y, z] = place;
+    Err(format!(
+        "a coordinate must be a number of at most {FARTHEST:e}, is one of {x:e}, {y:e}, {z:e}"
+    ))
+}
+
+/// Largest absolute coordinate; squared distances stay far from overflow.
+const FARTHEST: f64 = 1e30;

@@ -1,0 +1,387 @@
+//! Points from the elements of a mesh.
+//!
+//! Rank 0 reads the file, makes the points and sends each rank an equal share, so it holds the mesh only for that
+//! long. Points are in the order of the elements, on any number of ranks.
+
+use std::ops::Range;
+use std::path::Path;
+
+use crate::comm::{Communicator, agree};
+use crate::error::{Error, Result};
+use crate::mesh::{self, Format, GroupKey, Members, Mesh, Runs};
+use crate::problem::{PointSource, Problem, Selector};
+
+use super::Point;
+
+/// Mark of an element without a body.
+const NO_BODY: u16 = u16::MAX;
+
+/// Mark of an element without a point.
+const NO_POINT: u32 = u32::MAX;
+
+/// Largest share of its own size by which an element of a plane mesh may leave the plane.
+const PLANE_SLACK: f64 = 1e-6;
+
+/// A body whose points come from a mesh.
+struct User<'a> {
+    body: usize,
+    block: Option<&'a GroupKey>,
+    scale: f64,
+    block_span: &'a Range<usize>,
+}
+
+/// The points of a mesh, and those of them in each of the problem's sets.
+pub struct Found {
+    /// The points, with ids from 0.
+    pub points: Vec<Point>,
+    /// Ids of the points of a set; `None` for sets that name no group of the mesh.
+    pub sets: Vec<Option<Runs>>,
+    /// Names of the groups, on rank 0.
+    pub names: Vec<String>,
+}
+
+/// Index of the first body that has its points from a mesh.
+pub fn first_user(problem: &Problem, path: &Path) -> usize {
+    let users = users(problem, path);
+    users.first().expect("a body names the mesh").body
+}
+
+fn users<'a>(problem: &'a Problem, file: &Path) -> Vec<User<'a>> {
+    let bodies = problem.bodies.iter().enumerate();
+    let of_file = bodies.filter_map(|(body, description)| match &description.points {
+        PointSource::Mesh {
+            path,
+            block,
+            scale,
+            block_span,
+            ..
+        } if path == file => Some(User {
+            body,
+            block: block.as_ref(),
+            scale: *scale,
+            block_span,
+        }),
+        _ => None,
+    });
+    of_file.collect()
+}
+
+/// Read a mesh on rank 0; return this rank's share of its points, for all bodies that use it. Collective.
+///
+/// # Errors
+/// If the file cannot be read or an element is invalid; the same on all ranks.
+pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Found> {
+    let read = if comm.rank() == 0 {
+        read(problem, path).map(Some)
+    } else {
+        Ok(None)
+    };
+    let found = agree(comm, read)?;
+    let mut outgoing = vec![Vec::new(); comm.size()];
+    let mut packed = Vec::new();
+    let mut names = Vec::new();
+    if let Some(found) = found {
+        let border = |rank: usize| found.points.len() * rank / comm.size();
+        for (rank, bytes) in outgoing.iter_mut().enumerate() {
+            let share = &found.points[border(rank)..border(rank + 1)];
+            bytes.extend_from_slice(bytemuck::cast_slice(share));
+        }
+        packed = pack(&found.sets);
+        names = found.names;
+    }
+    let received = comm.all_to_all(outgoing);
+    comm.broadcast(0, &mut packed);
+    Ok(Found {
+        points: bytemuck::pod_collect_to_vec(&received[0]),
+        sets: unpack(&packed, problem.sets.len()),
+        names,
+    })
+}
+
+/// The number of ranges of each set, plus 1, or 0 for a set that is not there; then all ranges.
+fn pack(sets: &[Option<Runs>]) -> Vec<u8> {
+    let ranges = |set: &Option<Runs>| {
+        set.as_ref()
+            .map_or(0, |runs| runs.ranges().len() as u64 + 1)
+    };
+    let counts: Vec<u64> = sets.iter().map(ranges).collect();
+    let mut packed = bytemuck::cast_slice(&counts).to_vec();
+    for runs in sets.iter().flatten() {
+        packed.extend_from_slice(bytemuck::cast_slice(runs.ranges()));
+    }
+    packed
+}
+
+fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
+    let words: Vec<u64> = bytemuck::pod_collect_to_vec(packed);
+    let (counts, ranges) = words.split_at(sets);
+    let mut ranges = bytemuck::cast_slice::<u64, [u64; 2]>(ranges);
+    let set = |count: &u64| {
+        let own = ranges.split_off(..(*count as usize).checked_sub(1)?);
+        Some(Runs::union([(own.unwrap_or_default(), 0)].into_iter()))
+    };
+    counts.iter().map(set).collect()
+}
+
+/// Read a mesh and make its points, on one rank.
+///
+/// # Errors
+/// If the file cannot be read or an element is invalid.
+pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
+    let users = users(problem, path);
+    let Some(format) = Format::of(path) else {
+        let (name, endings) = (path.display(), Format::endings());
+        return Err(Error::input(format!(
+            "{name}: the name of a mesh must end with one of {endings}"
+        )));
+    };
+    let bytes = mesh::load(path).map_err(|error| {
+        let PointSource::Mesh { span, .. } = &problem.bodies[users[0].body].points else {
+            unreachable!("users are bodies with a mesh");
+        };
+        let message = format!("cannot read the mesh {}: {error}", path.display());
+        Error::input(message).at(span)
+    })?;
+    let mesh = mesh::parse(format, path, &bytes)?;
+    drop(bytes);
+    let bodies = bodies_of_elements(problem, &mesh, &users)?;
+    let (points, point_of) = points(problem, &mesh, &users, &bodies)?;
+    are_apart(&mesh, &points, &point_of)?;
+    let dimension = problem.dimension.count();
+    let mut marks = vec![false; mesh.nodes.len()];
+    let mut set = |selector: &Selector| {
+        let Selector::Mesh(set) = selector else {
+            return None;
+        };
+        let group = mesh.find(&set.group, dimension)?;
+        Some(members(
+            &mesh,
+            &group.members,
+            &point_of,
+            dimension,
+            &mut marks,
+        ))
+    };
+    Ok(Found {
+        sets: problem
+            .sets
+            .iter()
+            .map(|entry| set(&entry.selector))
+            .collect(),
+        names: mesh.names(|own| own <= dimension),
+        points,
+    })
+}
+
+/// The index of each element's body, or [`NO_BODY`].
+fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<Vec<u16>> {
+    let dimension = problem.dimension.count();
+    let is_solid = |element: usize| mesh.elements.kind(element).dimension() == dimension;
+    let mut bodies = vec![NO_BODY; mesh.elements.len()];
+    for user in users {
+        let Some(block) = user.block else { continue };
+        let has_solids = |members: &Members| match members {
+            Members::Elements(elements) => {
+                elements.iter().any(|element| is_solid(element as usize))
+            }
+            Members::Nodes(_) => false,
+        };
+        let group = mesh
+            .find(block, dimension)
+            .filter(|group| has_solids(&group.members));
+        let Some(group) = group else {
+            let known = mesh.names(|own| own == dimension);
+            let message = format!(
+                "[body.{}] points block: the mesh has no group {block} of {dimension}-D elements{}",
+                problem.bodies[user.body].name,
+                mesh::suggestion(block, &known)
+            );
+            return Err(Error::input(message).at(user.block_span));
+        };
+        let Members::Elements(elements) = &group.members else {
+            unreachable!("the group has elements");
+        };
+        for element in elements.iter().map(|element| element as usize) {
+            if !is_solid(element) {
+                continue;
+            }
+            if bodies[element] != NO_BODY {
+                let [a, b] = [usize::from(bodies[element]), user.body];
+                let message = format!(
+                    "belongs to [body.{}] and to [body.{}]; give them blocks without common elements",
+                    problem.bodies[a].name, problem.bodies[b].name
+                );
+                return Err(mesh.elements.fault(element, message));
+            }
+            bodies[element] = user.body as u16;
+        }
+    }
+    if let Some(rest) = users.iter().find(|user| user.block.is_none()) {
+        for (element, body) in bodies.iter_mut().enumerate() {
+            if *body == NO_BODY && is_solid(element) {
+                *body = rest.body as u16;
+            }
+        }
+    }
+    Ok(bodies)
+}
+
+/// The points of the elements that belong to bodies, and each element's point or [`NO_POINT`].
+fn points(
+    problem: &Problem,
+    mesh: &Mesh,
+    users: &[User],
+    bodies: &[u16],
+) -> Result<(Vec<Point>, Vec<u32>)> {
+    let dimension = problem.dimension.count();
+    let thickness = problem.dimension.out_of_plane_measure();
+    let mut scales = vec![1.0; problem.bodies.len()];
+    for user in users {
+        scales[user.body] = user.scale;
+    }
+    let count = bodies.iter().filter(|body| **body != NO_BODY).count();
+    let mut points = Vec::with_capacity(count);
+    let mut point_of = vec![NO_POINT; bodies.len()];
+    let mut nodes = Vec::new();
+    for (element, body) in bodies.iter().enumerate() {
+        if *body == NO_BODY {
+            continue;
+        }
+        let scale = scales[usize::from(*body)];
+        nodes.clear();
+        let indices = mesh.elements.nodes(element).iter();
+        nodes.extend(indices.map(|node| mesh.nodes[*node as usize].map(|x| scale * x)));
+        lies_in_plane(&nodes, dimension)
+            .map_err(|message| mesh.elements.fault(element, message))?;
+        let kind = mesh.elements.kind(element);
+        let measure = mesh::measure(kind, &nodes);
+        // A face or a line may be seen from either side.
+        let size = if dimension < 3 {
+            measure.size.abs()
+        } else {
+            measure.size
+        };
+        let volume = size * thickness;
+        if !(volume > 0.0 && volume.is_finite()) {
+            let message = if dimension == 3 && size < 0.0 {
+                format!(
+                    "has the volume {volume:e} m³; its nodes are in the order of a mirrored element"
+                )
+            } else {
+                format!("has the volume {volume:e} m³, must be above 0")
+            };
+            return Err(mesh.elements.fault(element, message));
+        }
+        let mut position = [0.0; 3];
+        position[..dimension].copy_from_slice(&measure.centroid[..dimension]);
+        point_of[element] = points.len() as u32;
+        points.push(Point::new(
+            points.len() as u64,
+            position,
+            volume,
+            usize::from(*body),
+        ));
+    }
+    Ok((points, point_of))
+}
+
+/// An error if the nodes of an element differ in coordinates that the problem does not have.
+fn lies_in_plane(nodes: &[[f64; 3]], dimension: usize) -> std::result::Result<(), String> {
+    let extent = |k: usize| {
+        let along = nodes.iter().map(|node| node[k]);
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        high - low
+    };
+    let size = (0..dimension).map(extent).fold(0.0, f64::max);
+    match (dimension..3).find(|k| extent(*k) > PLANE_SLACK * size) {
+        None => Ok(()),
+        Some(k) => Err(format!(
+            "its nodes differ in {}; a {dimension}-D problem has {} only",
+            ["x", "y", "z"][k],
+            ["x", "x and y"][dimension - 1]
+        )),
+    }
+}
+
+/// An error if two points lie at the same place.
+fn are_apart(mesh: &Mesh, points: &[Point], point_of: &[u32]) -> Result<()> {
+    let key = |point: &u32| points[*point as usize].position.map(f64::to_bits);
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    order.sort_unstable_by_key(|point| (key(point), *point));
+    let pairs = order
+        .windows(2)
+        .filter(|pair| key(&pair[0]) == key(&pair[1]));
+    let Some(pair) = pairs.min_by_key(|pair| pair[1]) else {
+        return Ok(());
+    };
+    let element = |point: u32| {
+        let found = point_of.iter().position(|own| *own == point);
+        found.expect("every point has an element")
+    };
+    let [first, second] = [element(pair[0]), element(pair[1])];
+    let message = format!(
+        "has its centroid where that of element {} is; does the file hold it twice?",
+        mesh.elements.number(first)
+    );
+    Err(mesh.elements.fault(second, message))
+}
+
+/// The ids of the points of a group: of its own elements; of elements that have all corners of one of its faces,
+/// edges or points; of elements that have one of its nodes. `marks` has an entry a node, all false, also afterwards.
+fn members(
+    mesh: &Mesh,
+    group: &Members,
+    point_of: &[u32],
+    dimension: usize,
+    marks: &mut [bool],
+) -> Runs {
+    let mut ids = Vec::new();
+    // Corners of faces, edges and points, the smallest first; it is marked.
+    let mut faces: Vec<Vec<u32>> = Vec::new();
+    match group {
+        Members::Nodes(nodes) => faces.extend(nodes.iter().map(|node| vec![node as u32])),
+        Members::Elements(elements) => {
+            for element in elements.iter().map(|element| element as usize) {
+                let kind = mesh.elements.kind(element);
+                if kind.dimension() < dimension {
+                    let mut corners = mesh.elements.nodes(element)[..kind.corners()].to_vec();
+                    corners.sort_unstable();
+                    faces.push(corners);
+                } else if point_of[element] != NO_POINT {
+                    ids.push(u64::from(point_of[element]));
+                }
+            }
+        }
+    }
+    faces.sort_unstable();
+    for face in &faces {
+        marks[face[0] as usize] = true;
+    }
+    if !faces.is_empty() {
+        for (element, point) in point_of
+            .iter()
+            .enumerate()
+            .filter(|(_, point)| **point != NO_POINT)
+        {
+            let nodes = mesh.elements.nodes(element);
+            let has_face = |node: &u32| {
+                let first = faces.partition_point(|face| face[0] < *node);
+                let own = faces[first..].iter().take_while(|face| face[0] == *node);
+                own.into_iter()
+                    .any(|face| face.iter().all(|corner| nodes.contains(corner)))
+            };
+            if nodes
+                .iter()
+                .any(|node| marks[*node as usize] && has_face(node))
+            {
+                ids.push(u64::from(*point));
+            }
+        }
+    }
+    for face in &faces {
+        marks[face[0] as usize] = false;
+    }
+    Runs::new(ids)
+}
