@@ -10,6 +10,7 @@ mod deck {
 
 mod command {
     mod commands;
+    mod compare;
     mod failures;
     mod library;
     mod readers;

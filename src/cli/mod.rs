@@ -4,6 +4,7 @@ mod bench;
 mod bench_report;
 mod check;
 mod check_report;
+mod compare;
 mod explain;
 mod format;
 mod init;
@@ -59,10 +60,11 @@ Examples:
   fissure run plate.toml                        run it; the result goes to out/plate/
   mpirun -n 4 fissure run plate.toml            the same on 4 ranks
   fissure plot out/plate/result.vtkhdf          a picture of the damage at the end
+  fissure compare out/plate out/before          the differences between two results
   fissure bench                                 how fast this machine is at it
 
-Exit codes: 0 done, 1 the run failed, 2 the deck or the arguments are wrong, 75 the run was
-stopped by a signal or the wall-clock limit and can be continued with --restart.")]
+Exit codes: 0 done, 1 the run failed or the compared results differ, 2 the deck or the arguments are
+wrong, 75 the run was stopped by a signal or the wall-clock limit and can be continued with --restart.")]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -81,6 +83,7 @@ enum Command {
     Run(RunArguments),
     Check(CheckArguments),
     Plot(PlotArguments),
+    Compare(compare::CompareArguments),
     Explain(DeckArguments),
     Init(InitArguments),
     Bench(BenchArguments),
@@ -339,6 +342,7 @@ pub fn main() -> ExitCode {
         _ if !speaks => Ok(()),
         Command::Check(arguments) => check::check(&arguments, verbosity),
         Command::Plot(arguments) => plot::plot(&arguments, verbosity),
+        Command::Compare(arguments) => compare::run(&arguments, verbosity),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Init(arguments) => init::init(&arguments, verbosity),
     };
@@ -391,6 +395,15 @@ fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
             }
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// The result file that a path names: the file itself, or `result.vtkhdf` in a folder.
+fn result_file(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("result.vtkhdf")
+    } else {
+        path.to_path_buf()
     }
 }
 
