@@ -13,6 +13,7 @@ mod command {
     mod compare;
     mod failures;
     mod library;
+    mod pictures;
     mod readers;
 }
 

@@ -10,8 +10,8 @@ mod format;
 mod init;
 mod launch;
 mod machine_limits;
+mod movie;
 mod plot;
-mod plot_paths;
 mod progress;
 mod report;
 mod run;
@@ -59,7 +59,9 @@ Examples:
   fissure check plate.toml                      validate it; show mass, bonds, step, memory, time
   fissure run plate.toml                        run it; the result goes to out/plate/
   mpirun -n 4 fissure run plate.toml            the same on 4 ranks
-  fissure plot out/plate/result.vtkhdf          a picture of the damage at the end
+  fissure plot out/plate                        a picture of the damage at the end
+  fissure plot out/plate --y kinetic_energy     a curve of the history
+  fissure movie out/plate                       the damage over time
   fissure compare out/plate out/before          the differences between two results
   fissure bench                                 how fast this machine is at it
 
@@ -82,7 +84,8 @@ struct CommandLine {
 enum Command {
     Run(RunArguments),
     Check(CheckArguments),
-    Plot(PlotArguments),
+    Plot(plot::PlotArguments),
+    Movie(movie::MovieArguments),
     Compare(compare::CompareArguments),
     Explain(DeckArguments),
     Init(InitArguments),
@@ -173,55 +176,6 @@ struct CheckArguments {
     /// Estimate the memory for this many ranks.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
-}
-
-/// Draw a field of a result as a PNG.
-///
-/// Plane problems are drawn as they are, solids in an oblique view or as a slice.
-#[derive(Args)]
-#[command(after_help = "\
-Examples:
-  fissure plot out/plate/result.vtkhdf
-  fissure plot out/plate/result.vtkhdf --field strain_energy_density --time 25e-6
-  fissure plot out/plate/result.vtkhdf --time all -o frames.png     frames_0000.png, …
-  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0
-  fissure plot out/plate/result.vtkhdf --path out/plate/crack_main.csv")]
-struct PlotArguments {
-    /// The result, a .vtkhdf file.
-    result: PathBuf,
-
-    /// The field; of a vector the length is drawn.
-    #[arg(short, long, value_name = "NAME", default_value = "damage")]
-    field: String,
-
-    /// Time in s (the nearest output is taken), `last` or `all`.
-    #[arg(short, long, value_name = "T", default_value = "last")]
-    time: String,
-
-    /// Where to draw to [default: the field's name beside the result].
-    #[arg(short, long, value_name = "FILE.png")]
-    output: Option<PathBuf>,
-
-    /// Factor of the drawn displacement, or `auto`.
-    #[arg(long, value_name = "FACTOR", default_value = "auto")]
-    deform: String,
-
-    /// Draw only the points nearest to this plane of a solid, such as z=0.005.
-    #[arg(long, value_name = "AXIS=POSITION")]
-    slice: Option<String>,
-
-    /// Draw lines over a plane picture: a CSV file with columns x and y (m), and branch where there are
-    /// several, such as crack_NAME.csv; may be repeated.
-    #[arg(long, value_name = "FILE.csv")]
-    path: Vec<PathBuf>,
-
-    /// Range of the colours, such as 0,1 [default: that of the values].
-    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
-    range: Option<String>,
-
-    /// Width of the picture in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
-    width: u32,
 }
 
 /// Print a deck with every default filled in.
@@ -342,6 +296,7 @@ pub fn main() -> ExitCode {
         _ if !speaks => Ok(()),
         Command::Check(arguments) => check::check(&arguments, verbosity),
         Command::Plot(arguments) => plot::plot(&arguments, verbosity),
+        Command::Movie(arguments) => movie::movie(&arguments, verbosity),
         Command::Compare(arguments) => compare::run(&arguments, verbosity),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Init(arguments) => init::init(&arguments, verbosity),

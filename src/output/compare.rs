@@ -64,7 +64,7 @@ impl Difference {
     fn new(name: &str, unit: &str, components: &'static [&'static str]) -> Self {
         Self {
             name: name.to_owned(),
-            unit: unit.to_owned(),
+            unit: if unit == "1" { "" } else { unit }.to_owned(),
             components,
             largest: 0.0,
             scale: 0.0,
@@ -195,11 +195,9 @@ fn common_fields(
             match other {
                 None => comparison.single_fields[side].push(field.name.clone()),
                 Some(other) if side == 0 => {
-                    let unit = if field.unit == "1" { "" } else { &field.unit };
                     let names = field.component_names();
-                    comparison
-                        .fields
-                        .push(Difference::new(&field.name, unit, names));
+                    let difference = Difference::new(&field.name, &field.unit, names);
+                    comparison.fields.push(difference);
                     dynamic.push(field.dynamic || other.dynamic);
                 }
                 Some(_) => {}

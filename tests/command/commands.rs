@@ -59,7 +59,7 @@ fn from_an_example_deck_to_pictures() {
     let last = folder.join(format!("frame_{:04}.png", outputs - 1));
     assert!(last.exists());
     for (wrong, message) in [
-        (["--field", "damge"], "has no field `damge`; it has"),
+        (["--field", "damge"], "has no field `damge`; did you mean `damage`?"),
         (["--time", "soon"], "--time must be"),
         (["--slice", "z=0"], "--slice is for solids"),
         (["--range", "1,0"], "LOW below HIGH"),
