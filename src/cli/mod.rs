@@ -88,7 +88,7 @@ enum Command {
     Movie(movie::MovieArguments),
     Compare(compare::CompareArguments),
     Explain(DeckArguments),
-    Init(InitArguments),
+    Init(init::InitArguments),
     Bench(BenchArguments),
 }
 
@@ -105,6 +105,7 @@ Examples:
   srun fissure run plate.toml                   in a Slurm job, see slurm/
   fissure run plate.toml --restart              go on from the last checkpoint
   fissure run plate.toml --set tension=20e6     another value of a parameter of the deck
+  fissure run plate.toml --set time.safety=0.4  another value of any key, or one that is missing
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
@@ -137,7 +138,7 @@ struct RunArguments {
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
-    /// Override a parameter of the deck; may be repeated.
+    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
@@ -149,7 +150,7 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
             Ok((name.trim().to_owned(), value.trim().to_owned()))
         }
         _ => Err(format!(
-            "`{text}` must be NAME=VALUE, with a name of [parameters]"
+            "`{text}` must be NAME=VALUE, with a name of [parameters] or a key such as time.safety"
         )),
     }
 }
@@ -169,7 +170,7 @@ struct CheckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Override a parameter of the deck; may be repeated.
+    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 
@@ -188,19 +189,9 @@ struct DeckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Override a parameter of the deck; may be repeated.
+    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
-}
-
-/// Write a commented example deck.
-#[derive(Args)]
-#[command(after_help = "\
-Example:
-  fissure init plate.toml && fissure run plate.toml")]
-struct InitArguments {
-    /// Name of the new deck.
-    name: PathBuf,
 }
 
 /// Measure the speed of the time loop on a fixed problem, alone or under mpirun.
