@@ -11,8 +11,10 @@ mod deck {
 
 mod command {
     mod commands;
+    mod compare;
     mod failures;
     mod library;
+    mod pictures;
     mod readers;
 }
 

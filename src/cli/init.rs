@@ -1,15 +1,65 @@
-//! `fissure init`: a commented example deck.
+//! `fissure init`: commented decks to start from.
 
-use crate::cli::outln;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
 
+use clap::{Args, ValueEnum};
 use fissure::deck;
 use fissure::error::{Error, Result};
 
-use super::{InitArguments, Verbosity, file_error};
+use super::{Verbosity, file_error, outln};
 
-/// Write the example deck to a new file.
+/// Write a commented deck to start from.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure init plate.toml && fissure run plate.toml
+  fissure init beam.toml --template three-point-bending")]
+pub struct InitArguments {
+    /// Name of the new deck.
+    name: PathBuf,
+
+    /// What it describes.
+    #[arg(long, value_enum, default_value_t = Template::CrackBranching)]
+    template: Template,
+}
+
+/// A deck to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Template {
+    /// Fast fracture: a crack branches in a glass plate under sudden tension.
+    CrackBranching,
+    /// The same on a grid that is refined where the crack runs.
+    RefinedGrid,
+    /// Slow loading with fracture: a notched beam is bent until it breaks.
+    ThreePointBending,
+    /// Slow loading without fracture: the strain beside a hole.
+    PlateWithHole,
+    /// Slow loading without fracture: a beam under a force at its end.
+    Cantilever,
+    /// A solid: a round crack grows in a glass cube.
+    PennyCrack,
+    /// A solid that is hit: edge-on impact on a ceramic tile.
+    Impact,
+}
+
+impl Template {
+    /// The text of the deck.
+    fn text(self) -> &'static str {
+        match self {
+            Self::CrackBranching => deck::EXAMPLE,
+            Self::RefinedGrid => include_str!("../../inputs/crack_branching_adaptive.toml"),
+            Self::ThreePointBending => include_str!("../../inputs/three_point_bending.toml"),
+            Self::PlateWithHole => include_str!("../../inputs/plate_with_hole.toml"),
+            Self::Cantilever => include_str!("../../inputs/cantilever.toml"),
+            Self::PennyCrack => include_str!("../../inputs/penny_crack.toml"),
+            Self::Impact => include_str!("../../inputs/eoi_alon.toml"),
+        }
+    }
+}
+
+/// Write a deck to a new file.
 ///
 /// # Errors
 /// If the file exists or cannot be written.
@@ -26,7 +76,7 @@ pub fn init(arguments: &InitArguments, verbosity: Verbosity) -> Result<()> {
         }
         Err(error) => return Err(file_error(&path, "create", &error)),
     };
-    file.write_all(deck::EXAMPLE.as_bytes())
+    file.write_all(arguments.template.text().as_bytes())
         .map_err(|error| file_error(&path, "write", &error))?;
     if verbosity > Verbosity::Quiet {
         let name = path.display();

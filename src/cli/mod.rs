@@ -4,13 +4,14 @@ mod bench;
 mod bench_report;
 mod check;
 mod check_report;
+mod compare;
 mod explain;
 mod format;
 mod init;
 mod launch;
 mod machine_limits;
+mod movie;
 mod plot;
-mod plot_paths;
 mod progress;
 mod report;
 mod run;
@@ -58,11 +59,14 @@ Examples:
   fissure check plate.toml                      validate it; show mass, bonds, step, memory, time
   fissure run plate.toml                        run it; the result goes to out/plate/
   mpirun -n 4 fissure run plate.toml            the same on 4 ranks
-  fissure plot out/plate/result.vtkhdf          a picture of the damage at the end
+  fissure plot out/plate                        a picture of the damage at the end
+  fissure plot out/plate --y kinetic_energy     a curve of the history
+  fissure movie out/plate                       the damage over time
+  fissure compare out/plate out/before          the differences between two results
   fissure bench                                 how fast this machine is at it
 
-Exit codes: 0 done, 1 the run failed, 2 the deck or the arguments are wrong, 75 the run was
-stopped by a signal or the wall-clock limit and can be continued with --restart.")]
+Exit codes: 0 done, 1 the run failed or the compared results differ, 2 the deck or the arguments are
+wrong, 75 the run was stopped by a signal or the wall-clock limit and can be continued with --restart.")]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -80,9 +84,11 @@ struct CommandLine {
 enum Command {
     Run(RunArguments),
     Check(CheckArguments),
-    Plot(PlotArguments),
+    Plot(plot::PlotArguments),
+    Movie(movie::MovieArguments),
+    Compare(compare::CompareArguments),
     Explain(DeckArguments),
-    Init(InitArguments),
+    Init(init::InitArguments),
     Bench(BenchArguments),
 }
 
@@ -99,6 +105,7 @@ Examples:
   srun fissure run plate.toml                   in a Slurm job, see slurm/
   fissure run plate.toml --restart              go on from the last checkpoint
   fissure run plate.toml --set tension=20e6     another value of a parameter of the deck
+  fissure run plate.toml --set time.safety=0.4  another value of any key, or one that is missing
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
@@ -131,7 +138,7 @@ struct RunArguments {
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
-    /// Override a parameter of the deck; may be repeated.
+    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
@@ -143,7 +150,7 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
             Ok((name.trim().to_owned(), value.trim().to_owned()))
         }
         _ => Err(format!(
-            "`{text}` must be NAME=VALUE, with a name of [parameters]"
+            "`{text}` must be NAME=VALUE, with a name of [parameters] or a key such as time.safety"
         )),
     }
 }
@@ -163,62 +170,13 @@ struct CheckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Override a parameter of the deck; may be repeated.
+    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 
     /// Estimate the memory for this many ranks.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
-}
-
-/// Draw a field of a result as a PNG.
-///
-/// Plane problems are drawn as they are, solids in an oblique view or as a slice.
-#[derive(Args)]
-#[command(after_help = "\
-Examples:
-  fissure plot out/plate/result.vtkhdf
-  fissure plot out/plate/result.vtkhdf --field strain_energy_density --time 25e-6
-  fissure plot out/plate/result.vtkhdf --time all -o frames.png     frames_0000.png, …
-  fissure plot out/block/result.vtkhdf --slice z=0.005 --deform 0
-  fissure plot out/plate/result.vtkhdf --path out/plate/crack_main.csv")]
-struct PlotArguments {
-    /// The result, a .vtkhdf file.
-    result: PathBuf,
-
-    /// The field; of a vector the length is drawn.
-    #[arg(short, long, value_name = "NAME", default_value = "damage")]
-    field: String,
-
-    /// Time in s (the nearest output is taken), `last` or `all`.
-    #[arg(short, long, value_name = "T", default_value = "last")]
-    time: String,
-
-    /// Where to draw to [default: the field's name beside the result].
-    #[arg(short, long, value_name = "FILE.png")]
-    output: Option<PathBuf>,
-
-    /// Factor of the drawn displacement, or `auto`.
-    #[arg(long, value_name = "FACTOR", default_value = "auto")]
-    deform: String,
-
-    /// Draw only the points nearest to this plane of a solid, such as z=0.005.
-    #[arg(long, value_name = "AXIS=POSITION")]
-    slice: Option<String>,
-
-    /// Draw lines over a plane picture: a CSV file with columns x and y (m), and branch where there are
-    /// several, such as crack_NAME.csv; may be repeated.
-    #[arg(long, value_name = "FILE.csv")]
-    path: Vec<PathBuf>,
-
-    /// Range of the colours, such as 0,1 [default: that of the values].
-    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
-    range: Option<String>,
-
-    /// Width of the picture in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
-    width: u32,
 }
 
 /// Print a deck with every default filled in.
@@ -231,19 +189,9 @@ struct DeckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Override a parameter of the deck; may be repeated.
+    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
-}
-
-/// Write a commented example deck.
-#[derive(Args)]
-#[command(after_help = "\
-Example:
-  fissure init plate.toml && fissure run plate.toml")]
-struct InitArguments {
-    /// Name of the new deck.
-    name: PathBuf,
 }
 
 /// Measure the speed of the time loop on a fixed problem, alone or under mpirun.
@@ -339,6 +287,8 @@ pub fn main() -> ExitCode {
         _ if !speaks => Ok(()),
         Command::Check(arguments) => check::check(&arguments, verbosity),
         Command::Plot(arguments) => plot::plot(&arguments, verbosity),
+        Command::Movie(arguments) => movie::movie(&arguments, verbosity),
+        Command::Compare(arguments) => compare::run(&arguments, verbosity),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Init(arguments) => init::init(&arguments, verbosity),
     };
@@ -391,6 +341,15 @@ fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
             }
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// The result file that a path names: the file itself, or `result.vtkhdf` in a folder.
+fn result_file(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("result.vtkhdf")
+    } else {
+        path.to_path_buf()
     }
 }
 

@@ -26,6 +26,8 @@ pub enum Progress {
     Bar(ProgressBar),
     /// Periodic lines.
     Lines {
+        /// What is counted, such as `step`.
+        noun: &'static str,
         /// Start of the display.
         start: Instant,
         /// Number of the step at the start.
@@ -38,13 +40,14 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// A display for a run from step `first` to step `last`.
-    pub fn new(shown: bool, first: u64, last: u64) -> Self {
+    /// A display for work from step `first` to step `last`, called `noun`.
+    pub fn new(shown: bool, noun: &'static str, first: u64, last: u64) -> Self {
         if !shown {
             return Self::Silent;
         }
         if !std::io::stderr().is_terminal() {
             return Self::Lines {
+                noun,
                 start: Instant::now(),
                 first,
                 last,
@@ -53,9 +56,11 @@ impl Progress {
         }
         let bar = ProgressBar::new(last).with_position(first);
         bar.reset_eta();
-        let template = "{bar:30} {percent:>3} %  step {pos}/{len}  {msg}  {per_sec}  eta {eta}";
-        let style =
-            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let template = format!(
+            "{{bar:30}} {{percent:>3}} %  {noun} {{pos}}/{{len}}  {{msg}}  {{per_sec}}  eta {{eta}}"
+        );
+        let style = ProgressStyle::with_template(&template)
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style.progress_chars("█▉▊▋▌▍▎▏ "));
         Self::Bar(bar)
     }
@@ -70,6 +75,7 @@ impl Progress {
                 bar.set_message(format!("t = {}", si(time, "s")));
             }
             Self::Lines {
+                noun,
                 start,
                 first,
                 last,
@@ -84,7 +90,7 @@ impl Progress {
                 let full = (step as usize * WIDTH) / *last as usize;
                 let left = elapsed * (*last - step) as f64 / (step - *first).max(1) as f64;
                 errln!(
-                    "[{}{}] {:>3} %  step {step}/{last}  t = {}  eta {left:.0} s",
+                    "[{}{}] {:>3} %  {noun} {step}/{last}  t = {}  eta {left:.0} s",
                     "█".repeat(full),
                     "·".repeat(WIDTH - full),
                     100 * step / *last,

@@ -201,7 +201,7 @@ impl Observer for Log {
             let set_up = si(self.started.elapsed().as_secs_f64(), "s");
             outln!("{} steps of {step} to go, after {set_up}", count(left));
         }
-        self.progress = Progress::new(self.prints, now.number(), now.last());
+        self.progress = Progress::new(self.prints, "step", now.number(), now.last());
     }
 
     fn step(&mut self, now: &mut dyn RunState) {

@@ -1,5 +1,6 @@
 //! Decks: the TOML file that describes a run, from its text to a validated [`Problem`].
 
+mod assign;
 mod bodies;
 mod conditions;
 mod contact;
@@ -44,13 +45,27 @@ pub struct Deck {
     grammar: grammar::Deck,
 }
 
-/// Reads a deck; `set` gives parameters, by name, other values or expressions.
+/// Reads a deck; `set` gives parameters, by name, other values or expressions, and keys, with the sections that they
+/// are in, other values.
 ///
 /// # Errors
 /// An input error that names file, line, column and key and says what would be right.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
-    let mut deck = Deck::new(Source::read(path)?)?;
-    for (name, value) in set {
+    let (keys, parameters): (Vec<_>, Vec<_>) = set
+        .iter()
+        .map(|(name, value)| (name.as_str(), value.as_str()))
+        .partition(|(name, _)| assign::is_key(name));
+    let mut source = Source::read(path)?;
+    if !keys.is_empty() {
+        source = assign::assign(&source, &keys)?;
+    }
+    let mut deck = Deck::new(source).map_err(|mut error| {
+        if !keys.is_empty() {
+            error.message += "\nnote: lines are those of the deck as changed by --set";
+        }
+        error
+    })?;
+    for (name, value) in parameters {
         parameters::set(&deck.source, &mut deck.grammar.parameters, name, value)?;
     }
     Ok(deck)

@@ -7,6 +7,7 @@ mod attribute;
 mod changing;
 pub mod checkpoint;
 mod collective;
+pub mod compare;
 mod dataset;
 mod failure;
 mod field;

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 use std::io::ErrorKind::{NotFound, WouldBlock};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// The number type of a field.
@@ -38,6 +39,19 @@ pub struct StoredField {
     pub number: Number,
     /// It changes with time.
     pub dynamic: bool,
+}
+
+impl StoredField {
+    /// Names of the components in their order; none for a scalar.
+    pub fn component_names(&self) -> &'static [&'static str] {
+        match self.components {
+            2 => &["x", "y"],
+            3 => &["x", "y", "z"],
+            6 => &["xx", "yy", "zz", "xy", "yz", "xz"],
+            9 => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
+            _ => &[],
+        }
+    }
 }
 
 /// A column of the history.
@@ -165,11 +179,11 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// The rows of point data of a step.
-    fn rows(&self, offsets: &str, time_index: usize) -> Result<std::ops::Range<usize>> {
+    /// The rows of some points at a step, in data whose steps start at `offsets`.
+    fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);
-        Ok(first..first + self.points(time_index))
+        Ok(first + points.start..first + points.end)
     }
 
     /// Reference positions at one of the [times](Self::times), m.
@@ -177,8 +191,16 @@ impl ResultReader {
     /// # Errors
     /// If the file is damaged.
     pub fn positions(&self, time_index: usize) -> Result<Vec<[f64; 3]>> {
+        self.positions_of(time_index, 0..self.points(time_index))
+    }
+
+    /// As [`positions`](Self::positions), of consecutive points.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn positions_of(&self, time_index: usize, points: Range<usize>) -> Result<Vec<[f64; 3]>> {
         let path = "/VTKHDF/Points";
-        let rows = self.rows(&format!("{STEPS}/PointOffsets"), time_index)?;
+        let rows = self.rows(&format!("{STEPS}/PointOffsets"), time_index, points)?;
         let read = self.file.dataset(path).and_then(|dataset| {
             let values = dataset.read_slice_2d::<f64, _>((rows, ..))?;
             Ok(values.into_iter().collect::<Vec<f64>>())
@@ -192,8 +214,16 @@ impl ResultReader {
     /// # Errors
     /// If the file is damaged or has no ids.
     pub fn ids(&self, time_index: usize) -> Result<Vec<u64>> {
+        self.ids_of(time_index, 0..self.points(time_index))
+    }
+
+    /// As [`ids`](Self::ids), of consecutive points.
+    ///
+    /// # Errors
+    /// If the file is damaged or has no ids.
+    pub fn ids_of(&self, time_index: usize, points: Range<usize>) -> Result<Vec<u64>> {
         let path = format!("{POINT_DATA}/id");
-        let rows = self.rows(&format!("{STEPS}/PointDataOffsets/id"), time_index)?;
+        let rows = self.rows(&format!("{STEPS}/PointDataOffsets/id"), time_index, points)?;
         let read = self.file.dataset(&path).and_then(|dataset| {
             let values = dataset.read_slice_1d::<u64, _>(rows)?;
             Ok(values.into_iter().collect())
@@ -223,6 +253,19 @@ impl ResultReader {
     /// # Errors
     /// If the field or time is missing, or the file is damaged.
     pub fn field(&self, name: &str, time_index: usize) -> Result<Vec<f64>> {
+        self.field_of(name, time_index, 0..self.points(time_index))
+    }
+
+    /// As [`field`](Self::field), of consecutive points.
+    ///
+    /// # Errors
+    /// If the field or time is missing, or the file is damaged.
+    pub fn field_of(
+        &self,
+        name: &str,
+        time_index: usize,
+        points: Range<usize>,
+    ) -> Result<Vec<f64>> {
         let path = format!("{POINT_DATA}/{name}");
         if !self.file.link_exists(&path) {
             let names: Vec<_> = self.fields()?.into_iter().map(|field| field.name).collect();
@@ -237,7 +280,8 @@ impl ResultReader {
                 "{file}: no time {time_index}; there are {steps}"
             )));
         }
-        let rows = self.rows(&format!("{STEPS}/PointDataOffsets/{name}"), time_index)?;
+        let offsets = format!("{STEPS}/PointDataOffsets/{name}");
+        let rows = self.rows(&offsets, time_index, points)?;
         let read = self.file.dataset(&path).and_then(|dataset| {
             Ok(if dataset.ndim() == 1 {
                 dataset.read_slice_1d::<f64, _>(rows)?.into_iter().collect()

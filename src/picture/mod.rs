@@ -15,6 +15,8 @@
 //!     view: View::Plane,
 //!     width: 600,
 //!     lines: &[],
+//!     note: "",
+//!     bounds: None,
 //! };
 //! let image = render(&scene);
 //! assert_eq!(image.width, 600);
@@ -22,7 +24,9 @@
 
 mod axes;
 mod canvas;
+pub mod chart;
 mod colours;
+pub mod film;
 mod layout;
 mod lettering;
 mod points;
@@ -31,6 +35,7 @@ mod scale;
 mod scene;
 
 pub use canvas::Image;
+pub use projection::Bounds;
 pub use scene::{Axis, Scene, View};
 
 use axes::{Pen, Ruler};
@@ -38,14 +43,14 @@ use canvas::{Colour, PALE_INK};
 use layout::Layout;
 use lettering::{Lettering, Running};
 use points::Colouring;
-use projection::{Bounds, Projection};
+use projection::Projection;
 use scale::Scale;
 
 /// Render a scene.
 pub fn render(scene: &Scene) -> Image {
     let marks = scene.marks();
     let projection = Projection::of(scene);
-    let bounds = Bounds::of(&marks);
+    let bounds = scene.bounds.unwrap_or_else(|| Bounds::of(&marks));
     let width = scene.width.clamp(200, 16_384);
     let layout = Layout::new(width, bounds.projected(projection), projection);
     let colouring = Colouring {
@@ -79,7 +84,9 @@ pub fn render(scene: &Scene) -> Image {
         }
     }
     pen.colour_bar(&layout.bar, colouring, scene.field, scene.unit);
-    title(&mut pen, &layout, scene.title);
+    let rise = if scene.note.is_empty() { 1.5 } else { 2.35 };
+    heading(&mut pen, &layout, scene.title, (1.15, rise));
+    heading(&mut pen, &layout, scene.note, (0.85, 1.0));
     image
 }
 
@@ -99,16 +106,16 @@ fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) 
     }
 }
 
-/// Writes the title above the frame, smaller if it is too long.
-fn title(pen: &mut Pen, layout: &Layout, title: &str) {
-    let size = 1.15 * layout.text;
+/// Writes a line above the frame, smaller if it is too long. Size and distance from the frame are in text sizes.
+fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)) {
+    let size = size * layout.text;
     let available = layout.width - 2.0 * layout.text;
     let length = pen.lettering.length(title, size);
     let size = size * (available / length).min(1.0);
     let half = (length / 2.0).min(available / 2.0);
     let middle = (layout.columns[0] + layout.columns[1]) / 2.0;
     let middle = middle.clamp(layout.text + half, layout.width - layout.text - half);
-    let centre = [middle, layout.rows[0] - 1.5 * layout.text];
+    let centre = [middle, layout.rows[0] - rise * layout.text];
     let previous = std::mem::replace(&mut pen.text, size);
     pen.write(title, centre, Running::Across);
     pen.text = previous;

@@ -87,6 +87,19 @@ impl Bounds {
         }
     }
 
+    /// The smallest box that holds this one and another.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            low: std::array::from_fn(|axis| self.low[axis].min(other.low[axis])),
+            high: std::array::from_fn(|axis| self.high[axis].max(other.high[axis])),
+        }
+    }
+
+    /// Whether a position is in the box.
+    pub fn holds(&self, position: [f64; 3]) -> bool {
+        (0..3).all(|axis| (self.low[axis]..=self.high[axis]).contains(&position[axis]))
+    }
+
     /// The largest absolute coordinate along some axes.
     pub fn magnitude(&self, axes: &[Axis]) -> f64 {
         axes.iter().fold(0.0, |largest, axis| {

@@ -1,6 +1,7 @@
 //! The input of a picture: points with values, and the view.
 
 use super::colours::ColourMap;
+use super::projection::Bounds;
 
 /// A direction of space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +82,11 @@ pub struct Scene<'a> {
     pub width: u32,
     /// Lines over the points of a flat view (m), each with the number of its colour.
     pub lines: &'a [(usize, Vec<[f64; 3]>)],
+    /// Small line below the title; may be empty.
+    pub note: &'a str,
+    /// The box that is drawn, as for all pictures of a series; points outside of it are omitted. `None` for the
+    /// box of the points.
+    pub bounds: Option<Bounds>,
 }
 
 /// One point that is drawn.
@@ -126,6 +132,7 @@ impl Scene<'_> {
             .filter(|mark| {
                 let usable = |coordinate: &f64| coordinate.abs() < LARGEST_COORDINATE;
                 mark.position.iter().all(usable)
+                    && self.bounds.is_none_or(|bounds| bounds.holds(mark.position))
             })
             .collect();
         match self.effective_view() {
@@ -147,6 +154,17 @@ impl Scene<'_> {
             }),
         }
         marks
+    }
+
+    /// The box of the points that are drawn, with a margin.
+    pub fn extent(&self) -> Bounds {
+        Bounds::of(&self.marks())
+    }
+
+    /// The finite values of the points that are drawn.
+    pub fn drawn_values(&self) -> Vec<f64> {
+        let values = self.marks().into_iter().map(|mark| mark.value);
+        values.filter(|value| value.is_finite()).collect()
     }
 
     /// The position with zero for coordinates the body does not have.
@@ -225,6 +243,8 @@ mod tests {
             view,
             width: 400,
             lines: &[],
+            note: "",
+            bounds: None,
         }
     }
 
@@ -246,6 +266,21 @@ mod tests {
         let marks = scene(&positions, &[1.0, 2.0, 3.0], View::Orthographic).marks();
         let values: Vec<f64> = marks.iter().map(|mark| mark.value).collect();
         assert_eq!(values, [2.0, 1.0, 3.0]);
+    }
+
+    #[test]
+    fn given_bounds_leave_out_what_is_beyond_them() {
+        let positions = [[0.0; 3], [9.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        let all = scene(&positions, &[1.0, 2.0, f64::NAN], View::Plane);
+        let bounds = scene(&positions[..1], &[1.0], View::Plane).extent();
+        assert_eq!(all.drawn_values(), [1.0, 2.0]);
+        let bounds = bounds.union(bounds);
+        let some = Scene {
+            bounds: Some(bounds),
+            ..all
+        };
+        assert_eq!(some.drawn_values(), [1.0]);
+        assert_eq!(bounds.union(all.extent()), all.extent());
     }
 
     #[test]

@@ -59,7 +59,10 @@ fn from_an_example_deck_to_pictures() {
     let last = folder.join(format!("frame_{:04}.png", outputs - 1));
     assert!(last.exists());
     for (wrong, message) in [
-        (["--field", "damge"], "has no field `damge`; it has"),
+        (
+            ["--field", "damge"],
+            "has no field `damge`; did you mean `damage`?",
+        ),
         (["--time", "soon"], "--time must be"),
         (["--slice", "z=0"], "--slice is for solids"),
         (["--range", "1,0"], "LOW below HIGH"),
@@ -68,6 +71,95 @@ fn from_an_example_deck_to_pictures() {
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));
         assert!(text(&output).contains(message), "{}", text(&output));
     }
+}
+
+#[test]
+fn any_key_is_set_from_the_command_line() {
+    let folder = Folder::new("keys");
+    let deck = folder.join("plate.toml");
+    succeed(fissure(1).arg("init").arg(&deck));
+    let explain = |set: &[&str]| {
+        let mut command = fissure(1);
+        command.arg("explain").arg(&deck);
+        for set in set {
+            command.args(["--set", set]);
+        }
+        finish(&mut command)
+    };
+    let output = explain(&[
+        "time.safety=0.4",
+        "parameters.dx=2e-3",
+        "damage.brittle.critical_stretch.alpha=0.25",
+        "history.every_steps=7",
+        "title=Coarse plate",
+    ]);
+    assert!(output.status.success(), "{}", text(&output));
+    for line in [
+        "safety = 0.4",
+        "dx = 0.002",
+        "alpha = 0.25",
+        "every_steps = 7",
+        "title = \"Coarse plate\"",
+    ] {
+        assert!(text(&output).contains(line), "{line}: {}", text(&output));
+    }
+    for (set, message) in [
+        (
+            "time.safty=0.4",
+            "unknown key `safty`; did you mean `safety`?",
+        ),
+        (
+            "time.safty=0.4",
+            "note: lines are those of the deck as changed by --set",
+        ),
+        ("time.safety=high", "safety"),
+        ("dimension.x=1", "`dimension` is a value and has no keys"),
+        ("body.plate=1", "`body.plate` is a section"),
+        ("safety=0.4", "[parameters] of "),
+    ] {
+        let output = explain(&[set]);
+        assert_eq!(output.status.code(), Some(2), "{set}: {}", text(&output));
+        assert!(
+            text(&output).contains(message),
+            "{message}: {}",
+            text(&output)
+        );
+    }
+}
+
+#[test]
+fn all_templates_are_decks() {
+    let folder = Folder::new("templates");
+    let help = succeed(fissure(1).args(["init", "--help"]));
+    let names = [
+        "crack-branching",
+        "refined-grid",
+        "three-point-bending",
+        "plate-with-hole",
+    ];
+    for name in names
+        .into_iter()
+        .chain(["cantilever", "penny-crack", "impact"])
+    {
+        assert!(help.contains(&format!("- {name}: ")), "{name}: {help}");
+        let deck = folder.join(format!("{name}.toml"));
+        succeed(fissure(1).arg("init").arg(&deck).args(["--template", name]));
+        succeed(fissure(1).arg("explain").arg(&deck));
+    }
+    let deck = folder.join("other.toml");
+    let output = finish(
+        fissure(1)
+            .arg("init")
+            .arg(&deck)
+            .args(["--template", "bend"]),
+    );
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(
+        text(&output).contains("three-point-bending"),
+        "{}",
+        text(&output)
+    );
+    assert!(!deck.exists());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fissure::error::{Error, Result};
 
-use super::file_error;
+use crate::cli::file_error;
 
 /// A line through positions in the plane, m.
 pub type Line = Vec<[f64; 2]>;

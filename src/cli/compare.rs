@@ -1,0 +1,282 @@
+//! `fissure compare`: the differences between two results.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use fissure::error::{Error, Result};
+use fissure::message::suggestion;
+use fissure::output::ResultReader;
+use fissure::output::compare::{Comparison, Difference, Place, compare};
+
+use super::format::{count, si};
+use super::progress::Progress;
+use super::{Verbosity, outln, print, result_file};
+
+/// Compare two results, such as that of a new version or machine with an earlier one.
+///
+/// Matches outputs and rows of the history by time and points by id. Prints for each field and each
+/// column of the history the largest difference, that difference relative to the largest value of the
+/// field in A, and where it is. Attributes, which describe the run, are not compared.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure compare out/today out/yesterday                  equal to the bit?
+  fissure compare out/new out/old --tolerance 1e-9         up to round-off?
+  fissure compare out/new out/old --tolerance 1e-9 --tolerance damage=0.02
+  fissure compare out/a out/b --tolerance rank=inf         do not compare the field `rank`
+  fissure compare -q out/new out/old || echo different     in scripts
+
+Exit codes: 0 equal within the tolerance, 1 different, 2 the arguments are wrong.")]
+pub struct CompareArguments {
+    /// The first result: a .vtkhdf file or its folder.
+    #[arg(value_name = "A")]
+    first: PathBuf,
+
+    /// The second result.
+    #[arg(value_name = "B")]
+    second: PathBuf,
+
+    /// Largest allowed difference relative to the largest value of a field in A, or of one field or
+    /// column with NAME=VALUE; may be repeated [default: 0, equal to the bit].
+    ///
+    /// The general one also applies to times, relative to the last one.
+    #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
+    tolerance: Vec<(Option<String>, f64)>,
+}
+
+/// Parse `VALUE` or `NAME=VALUE`.
+fn tolerance(text: &str) -> std::result::Result<(Option<String>, f64), String> {
+    let (name, value) = match text.split_once('=') {
+        Some((name, value)) => (Some(name.trim().to_owned()), value),
+        None => (None, text),
+    };
+    match value.trim().parse::<f64>() {
+        Ok(value) if value >= 0.0 => Ok((name, value)),
+        _ => Err("must be VALUE or NAME=VALUE with a number of at least 0, or inf".to_owned()),
+    }
+}
+
+/// Allowed differences.
+struct Tolerances<'a> {
+    general: f64,
+    named: Vec<(&'a str, f64)>,
+}
+
+impl<'a> Tolerances<'a> {
+    fn new(given: &'a [(Option<String>, f64)]) -> Self {
+        let general = given.iter().rfind(|(name, _)| name.is_none());
+        let named = given.iter().rev().filter_map(|(name, value)| {
+            let name = name.as_deref()?;
+            Some((name, *value))
+        });
+        Self {
+            general: general.map_or(0.0, |(_, value)| *value),
+            named: named.collect(),
+        }
+    }
+
+    fn of(&self, name: &str) -> f64 {
+        let found = self.named.iter().find(|(known, _)| *known == name);
+        found.map_or(self.general, |(_, value)| *value)
+    }
+
+    /// Reject a name that is neither a field nor a column.
+    fn check(&self, comparison: &Comparison) -> Result<()> {
+        let both = || comparison.fields.iter().chain(&comparison.columns);
+        for (name, _) in &self.named {
+            if !both().any(|difference| difference.name == *name) {
+                let known = both().map(|difference| difference.name.as_str());
+                return Err(Error::input(format!(
+                    "--tolerance {name}: the results have no common field or column `{name}`{}",
+                    suggestion(name, known)
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Compare two results.
+///
+/// # Errors
+/// If a file is not a result or a tolerance names no field; of kind `Run` if the results differ.
+pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
+    let paths = [&arguments.first, &arguments.second].map(|path| result_file(path));
+    let [first, second] = [
+        ResultReader::open(&paths[0])?,
+        ResultReader::open(&paths[1])?,
+    ];
+    for (reader, path) in [&first, &second].into_iter().zip(&paths) {
+        if reader.times()?.is_empty() {
+            let message = format!("{}: the result holds no output yet", path.display());
+            return Err(Error::input(message));
+        }
+    }
+    let tolerances = Tolerances::new(&arguments.tolerance);
+    let all = first.times()?.len() as u64;
+    let mut progress = Progress::new(verbosity > Verbosity::Quiet, "output", 0, all);
+    let comparison = compare(
+        &first,
+        &second,
+        tolerances.general,
+        &mut |done, all, time| {
+            progress.update(done as u64, all as u64, time);
+        },
+    )?;
+    progress.finish(true);
+    tolerances.check(&comparison)?;
+    if verbosity > Verbosity::Quiet {
+        let names = paths.map(|path| path.display().to_string());
+        print(&report(&comparison, &tolerances, &names, verbosity))?;
+    }
+    let different = |all: &[Difference]| {
+        let outside =
+            |difference: &&Difference| !difference.is_within(tolerances.of(&difference.name));
+        all.iter().filter(outside).count()
+    };
+    let (fields, columns) = (
+        different(&comparison.fields),
+        different(&comparison.columns),
+    );
+    let mut reasons = Vec::new();
+    if fields > 0 {
+        let all = comparison.fields.len();
+        reasons.push(format!("{fields} of {all} fields"));
+    }
+    if columns > 0 {
+        let all = comparison.columns.len();
+        reasons.push(format!("{columns} of {all} columns of the history"));
+    }
+    if !comparison.is_complete() {
+        reasons.push("what only one of them has".to_owned());
+    }
+    if reasons.is_empty() {
+        let all = comparison.fields.iter().chain(&comparison.columns);
+        let unequal = all.into_iter().any(|difference| difference.unequal > 0);
+        if verbosity > Verbosity::Quiet {
+            let within = if unequal { " within the tolerance" } else { "" };
+            outln!("the results are equal{within}");
+        }
+        Ok(())
+    } else {
+        let message = format!("the results differ in {}", reasons.join(" and "));
+        Err(Error::run(message))
+    }
+}
+
+/// The printed text.
+fn report(
+    comparison: &Comparison,
+    tolerances: &Tolerances,
+    names: &[String; 2],
+    verbosity: Verbosity,
+) -> String {
+    let mut text = format!("A {}\nB {}\n", names[0], names[1]);
+    let points = comparison.points / comparison.outputs.max(1) as u64;
+    let (outputs, rows) = (comparison.outputs, comparison.rows);
+    let _ = writeln!(
+        text,
+        "{outputs} outputs of {} points, {rows} rows of the history",
+        count(points)
+    );
+    for (side, name) in ["A", "B"].into_iter().enumerate() {
+        only(&mut text, name, "fields", &comparison.single_fields[side]);
+        only(&mut text, name, "columns", &comparison.single_columns[side]);
+        let times: Vec<String> = comparison.single_outputs[side]
+            .iter()
+            .map(|time| si(*time, "s"))
+            .collect();
+        only(&mut text, name, "outputs at", &times);
+        for (number, what) in [
+            (comparison.single_points[side], "points, over all outputs"),
+            (comparison.single_rows[side] as u64, "rows of the history"),
+        ] {
+            if number > 0 {
+                let _ = writeln!(text, "only in {name}: {} {what}", count(number));
+            }
+        }
+    }
+    table(&mut text, "field", &comparison.fields, tolerances, true);
+    let all = verbosity == Verbosity::Verbose;
+    table(&mut text, "column", &comparison.columns, tolerances, all);
+    text
+}
+
+/// Longest list of names that is printed in full.
+const LONGEST_LIST: usize = 8;
+
+/// A line with what only one of the results has.
+fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
+    if !list.is_empty() {
+        let shown = list[..list.len().min(LONGEST_LIST)].join(", ");
+        let rest = match list.len().saturating_sub(LONGEST_LIST) {
+            0 => String::new(),
+            rest => format!(" and {rest} more"),
+        };
+        let _ = writeln!(text, "only in {name}: {what} {shown}{rest}");
+    }
+}
+
+/// A table of differences; equal quantities are listed in it or counted below it.
+fn table(
+    text: &mut String,
+    heading: &str,
+    differences: &[Difference],
+    tolerances: &Tolerances,
+    lists_equal: bool,
+) {
+    let is_listed = |difference: &&Difference| lists_equal || difference.unequal > 0;
+    let listed: Vec<&Difference> = differences.iter().filter(is_listed).collect();
+    let width = listed.iter().map(|difference| difference.name.len()).max();
+    let width = width.unwrap_or(0).max(heading.len());
+    if !listed.is_empty() {
+        let _ = writeln!(
+            text,
+            "\n{heading:<width$}  {:<18}{:<10}  where",
+            "difference", "relative"
+        );
+    }
+    for difference in &listed {
+        let name = &difference.name;
+        let Some(place) = difference.place else {
+            let _ = writeln!(text, "{name:<width$}  equal");
+            continue;
+        };
+        let relative = difference.largest / difference.scale;
+        let mark = if difference.is_within(tolerances.of(name)) {
+            "within the tolerance"
+        } else {
+            "DIFFERENT"
+        };
+        let size = format!("{:.3e} {}", difference.largest, difference.unit);
+        let _ = writeln!(
+            text,
+            "{name:<width$}  {:<18}{:<10}  {}; {mark}",
+            size.trim_end(),
+            if relative.is_finite() {
+                format!("{relative:.1e}")
+            } else {
+                "-".to_owned()
+            },
+            location(difference, &place),
+        );
+    }
+    let equal = differences.len() - listed.len();
+    if equal > 0 {
+        let _ = writeln!(text, "{equal} {heading}s are equal");
+    }
+}
+
+/// Component, point and time of a difference.
+fn location(difference: &Difference, place: &Place) -> String {
+    let component = match difference.components.get(place.component) {
+        Some(name) => format!("{name}, "),
+        None => String::new(),
+    };
+    let point = place.point.map_or(String::new(), |point| {
+        let position = point.position.map(|coordinate| si(coordinate, "m"));
+        format!("point {} at ({}), ", point.id, position.join(", "))
+    });
+    format!("{component}{point}t = {}", si(place.time, "s"))
+}

@@ -1,0 +1,268 @@
+//! Curves of the history.
+
+use std::path::{Path, PathBuf};
+
+use fissure::error::{Error, Result};
+use fissure::message::suggestion;
+use fissure::output::{ResultReader, StoredColumn};
+use fissure::picture::chart::{Chart, Label, Series};
+
+use super::{PlotArguments, check_ending};
+use crate::cli::{Verbosity, file_error, outln};
+
+/// The default of `--x`.
+const TIME: &str = "time";
+
+/// The columns of a file.
+struct Table {
+    path: PathBuf,
+    columns: Vec<StoredColumn>,
+}
+
+/// Draw columns of one or more histories as curves.
+///
+/// # Errors
+/// If a file has no such column or cannot be read or written.
+pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
+    let first = &arguments.results[0];
+    let path = arguments.output.clone().unwrap_or_else(|| {
+        let name = Path::new("history.png");
+        let stem = arguments
+            .y
+            .first()
+            .map_or(String::new(), |name| format!("{name}.png"));
+        let name = if stem.is_empty() {
+            name
+        } else {
+            Path::new(&stem)
+        };
+        if first.is_dir() {
+            first.join(name)
+        } else {
+            first.with_file_name(name)
+        }
+    });
+    check_ending(&path, &["png", "svg"], "")?;
+    let tables: Vec<Table> = arguments
+        .results
+        .iter()
+        .map(|path| Table::read(path))
+        .collect::<Result<_>>()?;
+    let x = arguments.x.as_deref().unwrap_or(TIME);
+    if arguments.y.is_empty() {
+        let names: Vec<&str> = tables[0].names().collect();
+        return Err(Error::input(format!(
+            "name the columns to draw: --y COLUMN,COLUMN; {} has {}",
+            tables[0].path.display(),
+            names.join(", ")
+        )));
+    }
+    let horizontal = tables[0].column(x, "--x")?;
+    let mut units: Vec<&str> = Vec::new();
+    for table in &tables {
+        if table.column(x, "--x")?.unit != horizontal.unit {
+            return Err(Error::input(format!(
+                "--x {x} has different units in {} and {}",
+                tables[0].path.display(),
+                table.path.display()
+            )));
+        }
+        for name in &arguments.y {
+            units.push(&table.column(name, "--y")?.unit);
+        }
+    }
+    let one_unit = units.iter().all(|unit| *unit == units[0]);
+    let runs = run_names(&tables);
+    let mut series = Vec::new();
+    for (table, run) in tables.iter().zip(&runs) {
+        let across = table.column(x, "--x")?;
+        for name in &arguments.y {
+            let column = table.column(name, "--y")?;
+            let named = match column.unit.as_str() {
+                "" => name.clone(),
+                _ if one_unit => name.clone(),
+                unit => format!("{name} ({unit})"),
+            };
+            let points = across.values.iter().zip(&column.values);
+            series.push(Series {
+                name: match (tables.len(), arguments.y.len()) {
+                    (1, _) => named,
+                    (_, 1) if one_unit => run.clone(),
+                    _ => format!("{run}: {named}"),
+                },
+                points: points.map(|(x, y)| [*x, *y]).collect(),
+            });
+        }
+    }
+    let title = if tables.len() == 1 { &runs[0] } else { "" };
+    let chart = Chart {
+        title,
+        x: Label {
+            name: x,
+            unit: &horizontal.unit,
+        },
+        y: Label {
+            name: match &arguments.y[..] {
+                [name] => name,
+                _ => "",
+            },
+            unit: if one_unit { units[0] } else { "" },
+        },
+        series: &series,
+        width: arguments.picture.width,
+    };
+    let is_svg = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+    let written = if is_svg {
+        std::fs::write(&path, chart.svg())
+    } else {
+        chart.image().write_png(&path)
+    };
+    written.map_err(|error| file_error(&path, "write", &error))?;
+    if verbosity > Verbosity::Quiet {
+        outln!("wrote {}: {} curve(s)", path.display(), series.len());
+    }
+    Ok(())
+}
+
+impl Table {
+    /// Read a CSV file, or the history of a result or of the result in a folder.
+    fn read(path: &Path) -> Result<Self> {
+        let path = if path.is_dir() {
+            path.join("history.csv")
+        } else {
+            path.to_path_buf()
+        };
+        let is_csv = path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+        let columns = if is_csv {
+            read_csv(&path)?
+        } else {
+            ResultReader::open(&path)?.history()?
+        };
+        let columns = columns.into_iter().map(|column| StoredColumn {
+            unit: if column.unit == "1" {
+                String::new()
+            } else {
+                column.unit
+            },
+            ..column
+        });
+        let columns = columns.collect();
+        Ok(Self { path, columns })
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.columns.iter().map(|column| column.name.as_str())
+    }
+
+    fn column(&self, name: &str, option: &str) -> Result<&StoredColumn> {
+        let found = self.columns.iter().find(|column| column.name == name);
+        found.ok_or_else(|| {
+            let known = suggestion(name, self.names());
+            Error::input(format!(
+                "{option} {name}: {} has no column `{name}`{known}",
+                self.path.display()
+            ))
+        })
+    }
+}
+
+/// Read a CSV file whose first row has names like `time [s]`.
+fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Error::input(format!("cannot read {}: {error}", path.display())))?;
+    let mut rows = text.lines().enumerate();
+    let header = rows.next().map_or("", |(_, row)| row);
+    let mut columns: Vec<StoredColumn> = header
+        .split(',')
+        .map(|cell| {
+            let (name, unit) = cell.split_once('[').unwrap_or((cell, ""));
+            StoredColumn {
+                name: name.trim().to_owned(),
+                unit: unit.trim().trim_end_matches(']').to_owned(),
+                values: Vec::new(),
+            }
+        })
+        .collect();
+    for (number, row) in rows.filter(|(_, row)| !row.trim().is_empty()) {
+        let wrong =
+            |message: String| Error::input(format!("{}:{}: {message}", path.display(), number + 1));
+        let cells: Vec<&str> = row.split(',').map(str::trim).collect();
+        if cells.len() != columns.len() {
+            let (count, wanted) = (cells.len(), columns.len());
+            return Err(wrong(format!("has {count} values for {wanted} columns")));
+        }
+        for (column, cell) in columns.iter_mut().zip(cells) {
+            let value = cell
+                .parse()
+                .map_err(|_| wrong(format!("`{}` must be a number, is `{cell}`", column.name)))?;
+            column.values.push(value);
+        }
+    }
+    Ok(columns)
+}
+
+/// Short names of runs that tell them apart: those of the folders, with as many parents as needed.
+fn run_names(tables: &[Table]) -> Vec<String> {
+    let parts = |table: &Table| -> Vec<String> {
+        let absolute = std::path::absolute(&table.path).unwrap_or_else(|_| table.path.clone());
+        let folder = absolute.parent().unwrap_or(Path::new(""));
+        let names = folder.components().rev();
+        names
+            .map(|part| part.as_os_str().to_string_lossy().into_owned())
+            .collect()
+    };
+    let all: Vec<Vec<String>> = tables.iter().map(parts).collect();
+    let deepest = all.iter().map(Vec::len).max().unwrap_or(1);
+    let names = |depth: usize| -> Vec<String> {
+        let name = |parts: &Vec<String>| {
+            let mut used = parts[..depth.min(parts.len())].to_vec();
+            used.reverse();
+            used.join("/")
+        };
+        all.iter().map(name).collect()
+    };
+    let distinct = |names: &Vec<String>| {
+        let mut sorted = names.clone();
+        sorted.sort();
+        sorted.dedup();
+        sorted.len() == names.len()
+    };
+    let found = (1..=deepest).map(names).find(distinct);
+    // Several files in one folder differ in their own names.
+    found.unwrap_or_else(|| {
+        let name = |table: &Table| {
+            let stem = table.path.file_stem().unwrap_or_default();
+            stem.to_string_lossy().into_owned()
+        };
+        tables.iter().map(name).collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_told_apart_by_their_folders() {
+        let names = |paths: &[&str]| {
+            let table = |path: &&str| Table {
+                path: PathBuf::from(path),
+                columns: Vec::new(),
+            };
+            run_names(&paths.iter().map(table).collect::<Vec<_>>())
+        };
+        assert_eq!(
+            names(&["out/a/history.csv", "out/b/history.csv"]),
+            ["a", "b"]
+        );
+        assert_eq!(
+            names(&["/1/a/history.csv", "/2/a/history.csv"]),
+            ["1/a", "2/a"]
+        );
+        assert_eq!(names(&["a/one.csv", "a/two.csv"]), ["one", "two"]);
+    }
+}

@@ -1,0 +1,97 @@
+//! `fissure plot`: a picture of a field, or curves of the history.
+
+mod curves;
+mod paths;
+pub mod picture;
+mod quantity;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use fissure::error::{Error, Result};
+
+use super::Verbosity;
+use picture::PictureArguments;
+
+/// Draw a field of a result, or curves of a history.
+///
+/// Plane problems are drawn as they are, solids in an oblique view or as a slice. With `--y`, or of CSV
+/// files, columns are drawn as curves.
+#[derive(Args)]
+#[command(after_help = "\
+Examples, fields:
+  fissure plot out/plate                                        the damage at the end
+  fissure plot out/plate --field stress --component xx --time 25e-6
+  fissure plot out/plate --field stress --component principal_1 --range 0,50e6
+  fissure plot out/plate --time all -o frames.png               frames_0000.png, …
+  fissure plot out/block --slice z=0.005 --deform 0
+  fissure plot out/plate --path out/plate/crack_main.csv
+
+Examples, curves:
+  fissure plot out/plate/history.csv --y kinetic_energy,strain_energy -o energies.svg
+  fissure plot out/a out/b out/c --x probe_u_y --y reaction_top_y")]
+pub struct PlotArguments {
+    /// The result, a .vtkhdf file or its folder; for curves one or more of them or of CSV files.
+    #[arg(required = true, value_name = "RESULT")]
+    results: Vec<PathBuf>,
+
+    #[command(flatten)]
+    picture: PictureArguments,
+
+    /// Time in s (the nearest output is taken), `last` or `all`.
+    #[arg(short, long, value_name = "T", default_value = "last")]
+    time: String,
+
+    /// Columns of the history to draw as curves.
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    y: Vec<String>,
+
+    /// Column of the horizontal axis of curves [default: time].
+    #[arg(long, value_name = "COLUMN")]
+    x: Option<String>,
+
+    /// Where to draw to: .png, or .svg for curves [default: the name of what is drawn beside the result].
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Draw pictures of a field, or curves.
+///
+/// # Errors
+/// If a file is not a result, or what is to be drawn is not in it.
+pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
+    let is_table = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "csv");
+    let curves = !arguments.y.is_empty() || arguments.results.iter().any(is_table);
+    if curves {
+        return curves::plot(arguments, verbosity);
+    }
+    if arguments.x.is_some() {
+        let message = "--x is for curves; name the other columns with --y COLUMN,COLUMN";
+        return Err(Error::input(message));
+    }
+    match &arguments.results[..] {
+        [result] => picture::plot(arguments, result, verbosity),
+        results => Err(Error::input(format!(
+            "{} results are given, but a picture of a field is of one; for curves of several, \
+             name columns of the history with --y",
+            results.len()
+        ))),
+    }
+}
+
+/// Check the ending of an output file.
+///
+/// # Errors
+/// If it is none of the known ones.
+pub fn check_ending(path: &Path, known: &[&str], hint: &str) -> Result<()> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    if known.iter().any(|known| ending.eq_ignore_ascii_case(known)) {
+        return Ok(());
+    }
+    let known: Vec<String> = known.iter().map(|known| format!(".{known}")).collect();
+    Err(Error::input(format!(
+        "-o {}: the file must end in {}{hint}",
+        path.display(),
+        known.join(" or "),
+    )))
+}

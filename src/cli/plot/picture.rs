@@ -1,0 +1,645 @@
+//! Pictures of a field at points.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use fissure::error::{Error, Result};
+use fissure::message::suggestion;
+use fissure::output::{ResultReader, StoredField};
+use fissure::picture::{Axis, Bounds, Image, Scene, View, render};
+
+use super::paths::{self, Line};
+use super::quantity::Quantity;
+use super::{PlotArguments, check_ending};
+use crate::cli::format::si;
+use crate::cli::{Verbosity, file_error, outln, result_file};
+
+/// Largest drawn displacement for `--deform auto`, relative to the body's size.
+const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
+
+/// Percentiles between which the automatic range lies where outliers would hide the rest.
+const PERCENTILES: [f64; 2] = [0.5, 99.5];
+
+/// The range of all values over that of the percentiles from which the latter is used.
+const OUTLIERS: f64 = 4.0;
+
+/// Distance from the first and last output, as a share of the interval there, at which a time is still theirs.
+const TIME_REACH: f64 = 0.5;
+
+/// Fields that are drawn unless one is named, the most wanted first.
+const PREFERRED: [&str; 6] = [
+    "damage",
+    "von_mises_stress",
+    "cauchy_stress",
+    "stress",
+    "velocity",
+    "displacement",
+];
+
+/// What pictures look like.
+#[derive(Args)]
+pub struct PictureArguments {
+    /// The field [default: damage, or another one of a result without].
+    #[arg(short, long, value_name = "NAME")]
+    field: Option<String>,
+
+    /// Component or invariant of a vector or tensor: x, xx, magnitude, von_mises, principal_1, trace, …
+    #[arg(short, long, value_name = "NAME")]
+    component: Option<String>,
+
+    /// Factor of the drawn displacement, or `auto`.
+    #[arg(long, value_name = "FACTOR", default_value = "auto")]
+    deform: String,
+
+    /// Draw only the points nearest to this plane of a solid, such as z=0.005.
+    #[arg(long, value_name = "AXIS=POSITION")]
+    slice: Option<String>,
+
+    /// Draw lines over a plane picture: a CSV file with columns x and y (m), and branch where there are
+    /// several, such as crack_NAME.csv; may be repeated.
+    #[arg(long, value_name = "FILE.csv")]
+    path: Vec<PathBuf>,
+
+    /// Range of the colours: values such as 0,1, percentiles such as 5%,95%, or `all`
+    /// [default: all, or 0.5%,99.5% where outliers would hide the rest].
+    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
+    range: Option<String>,
+
+    /// Width of the picture in pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(200..=10_000))]
+    pub(super) width: u32,
+}
+
+/// Draw one picture, or one per output.
+///
+/// # Errors
+/// If the file is not a result, or what is to be drawn is not in it.
+pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> Result<()> {
+    let file = result_file(result);
+    let result = ResultReader::open(&file)?;
+    let times = result.times()?;
+    let chosen = choose_times(&arguments.time, &times)?;
+    let last = chosen.last().copied().unwrap_or(0);
+    let painter = Painter::new(&arguments.picture, &file, &result, last)?;
+    let path = match &arguments.output {
+        Some(path) => path.clone(),
+        None => file.with_file_name(format!("{}.png", painter.quantity.field)),
+    };
+    let hint = "; `--y` draws curves, and `fissure movie` films";
+    check_ending(&path, &["png"], hint)?;
+    for index in &chosen {
+        let path = match chosen.len() {
+            1 => path.clone(),
+            _ => numbered(&path, *index),
+        };
+        painter.check_slice(*index)?;
+        let image = painter.image(*index, &si(times[*index], "s"), None)?;
+        image
+            .write_png(&path)
+            .map_err(|error| file_error(&path, "write", &error))?;
+        if verbosity > Verbosity::Quiet {
+            let (time, what) = (si(times[*index], "s"), &painter.quantity.label);
+            outln!("wrote {}: {what} at t = {time}", path.display());
+        }
+    }
+    Ok(())
+}
+
+fn number(text: &str, wanted: &str) -> Result<f64> {
+    let value = text
+        .trim()
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite());
+    value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
+}
+
+/// The indices of the outputs to draw.
+fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
+    let Some(last) = times.len().checked_sub(1) else {
+        return Err(Error::input("the result holds no output yet"));
+    };
+    match text {
+        "last" => Ok(vec![last]),
+        "all" => Ok((0..=last).collect()),
+        text => {
+            let wanted = number(text, "--time must be `last`, `all` or a time in s")?;
+            let distance = |k: &usize| (times[*k] - wanted).abs();
+            let nearest = (0..=last)
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .unwrap_or(last);
+            let interval = match nearest {
+                0 => times.get(1).map_or(0.0, |next| next - times[0]),
+                later => times[later] - times[later - 1],
+            };
+            let inside = (times[0]..=times[last]).contains(&wanted);
+            if inside || distance(&nearest) <= TIME_REACH * interval {
+                return Ok(vec![nearest]);
+            }
+            Err(Error::input(format!(
+                "--time {text}: the outputs are between {:e} and {:e} s; the nearest one is at --time {:e}",
+                times[0], times[last], times[nearest]
+            )))
+        }
+    }
+}
+
+/// `name.png` → `name_0012.png`.
+fn numbered(path: &Path, index: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}_{index:04}.png"))
+}
+
+/// The range of the colours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Range {
+    Automatic,
+    All,
+    Percentiles([f64; 2]),
+    Values((f64, f64)),
+}
+
+/// Values at the ends of the colour bar, and what all values reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    shown: [f64; 2],
+    all: [f64; 2],
+    /// The percentiles that are shown; `None` for all values.
+    percentiles: Option<[f64; 2]>,
+}
+
+impl Limits {
+    /// The limits for values with a range; `None` without values.
+    fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
+        let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
+            let [low, high] = ends.unwrap_or([*value; 2]);
+            Some([low.min(*value), high.max(*value)])
+        })?;
+        let wanted = match range {
+            Range::Percentiles(wanted) => wanted,
+            _ => PERCENTILES,
+        };
+        let last = (values.len() - 1) as f64;
+        let between = wanted.map(|percent| {
+            let rank = (percent / 100.0 * last).round() as usize;
+            *values.select_nth_unstable_by(rank, f64::total_cmp).1
+        });
+        let spread = |ends: [f64; 2]| ends[1] - ends[0];
+        let uses = match range {
+            Range::Percentiles(_) => spread(between) > 0.0,
+            Range::Automatic => spread(between) > 0.0 && spread(all) > OUTLIERS * spread(between),
+            Range::All | Range::Values(_) => false,
+        };
+        Some(Self {
+            shown: if uses { between } else { all },
+            all,
+            percentiles: uses.then_some(wanted),
+        })
+    }
+
+    /// The limits of both.
+    pub fn union(self, other: Self) -> Self {
+        let union = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Self {
+            shown: union(self.shown, other.shown),
+            all: union(self.all, other.all),
+            percentiles: self.percentiles.or(other.percentiles),
+        }
+    }
+
+    /// The line that says what is beyond the colours.
+    fn note(&self, unit: &str) -> String {
+        let Some([low, high]) = self.percentiles else {
+            return String::new();
+        };
+        let ends = self.all.map(|value| si(value, unit));
+        format!(
+            "colours from percentile {low} to {high}; values from {} to {}",
+            ends[0].trim(),
+            ends[1].trim()
+        )
+        .replace('-', "−")
+    }
+}
+
+/// What all frames of a film have in common.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// The drawn box.
+    pub bounds: Bounds,
+    /// Limits of the values; `None` if there are none.
+    pub limits: Option<Limits>,
+}
+
+impl Frame {
+    /// The frame that holds both.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            limits: match (self.limits, other.limits) {
+                (Some(a), Some(b)) => Some(a.union(b)),
+                (a, b) => a.or(b),
+            },
+        }
+    }
+}
+
+/// Settings of all pictures of a result.
+pub struct Painter<'a> {
+    result: &'a ResultReader,
+    arguments: &'a PictureArguments,
+    dimension: usize,
+    title: String,
+    /// What is drawn.
+    pub quantity: Quantity,
+    has_displacement: bool,
+    section: f64,
+    range: Range,
+    view: View,
+    factor: f64,
+    /// Lines over the picture, by file.
+    paths: Vec<Vec<Line>>,
+}
+
+/// The points of an output as they are drawn.
+struct Points {
+    positions: Vec<[f64; 3]>,
+    sizes: Vec<f64>,
+    values: Vec<f64>,
+    lines: Vec<(usize, Vec<[f64; 3]>)>,
+}
+
+impl<'a> Painter<'a> {
+    /// A painter of a result; an automatic factor of the displacement suits the output `reference`.
+    ///
+    /// # Errors
+    /// If an argument is wrong for this result.
+    pub fn new(
+        arguments: &'a PictureArguments,
+        path: &Path,
+        result: &'a ResultReader,
+        reference: usize,
+    ) -> Result<Self> {
+        let attributes = result.attributes()?;
+        let attribute = |name: &str| {
+            let found = attributes.iter().find(|(known, _)| known == name);
+            found.map(|(_, value)| value.clone()).unwrap_or_default()
+        };
+        let wrong = |name: &str| {
+            let (path, value) = (path.display(), attribute(name));
+            Error::input(format!(
+                "{path}: attribute `{name}` must be a number, is `{value}`; was this written by \
+                 another version of Fissure?"
+            ))
+        };
+        let number_of = |name: &str| attribute(name).parse::<f64>().map_err(|_| wrong(name));
+        let dimension = number_of("dimension")? as usize;
+        let section = number_of("out_of_plane_measure")?;
+        let fields = result.fields()?;
+        let field = choose_field(arguments.field.as_deref(), path, &fields)?;
+        if dimension != 2 && !arguments.path.is_empty() {
+            return Err(Error::input("--path is for results of plane problems"));
+        }
+        let paths = arguments.path.iter().map(|path| paths::read(path));
+        let mut painter = Self {
+            title: attribute("title"),
+            quantity: Quantity::new(field, arguments.component.as_deref())?,
+            has_displacement: fields.iter().any(|field| field.name == "displacement"),
+            section,
+            range: arguments
+                .range
+                .as_deref()
+                .map_or(Ok(Range::Automatic), range)?,
+            view: view(arguments.slice.as_deref(), dimension)?,
+            factor: 0.0,
+            paths: paths.collect::<Result<_>>()?,
+            result,
+            arguments,
+            dimension,
+        };
+        painter.factor = match arguments.deform.as_str() {
+            "auto" => painter.automatic_factor(reference)?,
+            text => number(text, "--deform must be `auto` or a number")?,
+        };
+        Ok(painter)
+    }
+
+    fn displacements(&self, index: usize) -> Result<Vec<f64>> {
+        if self.has_displacement {
+            self.result.field("displacement", index)
+        } else {
+            Ok(vec![0.0; 3 * self.result.points(index)])
+        }
+    }
+
+    /// A factor of 1, 2 or 5 times a power of ten that makes displacements visible.
+    fn automatic_factor(&self, index: usize) -> Result<f64> {
+        let positions = self.result.positions(index)?;
+        let values = self.displacements(index)?;
+        let largest = values
+            .iter()
+            .filter(|u| u.is_finite())
+            .fold(0.0_f64, |a, u| a.max(u.abs()));
+        let extent = (0..3)
+            .map(|d| {
+                let along = || positions.iter().map(|position| position[d]);
+                along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+            })
+            .fold(0.0, f64::max);
+        let wanted = AUTOMATIC_DISPLACEMENT * extent / largest;
+        if !wanted.is_finite() || wanted <= 1.0 {
+            return Ok(1.0);
+        }
+        let power = 10_f64.powf(wanted.log10().floor());
+        let step = [5.0, 2.0, 1.0]
+            .into_iter()
+            .find(|step| step * power <= wanted);
+        Ok(step.unwrap_or(1.0) * power)
+    }
+
+    fn points(&self, index: usize) -> Result<Points> {
+        let values = self
+            .quantity
+            .of(self.result.field(&self.quantity.field, index)?);
+        let displacements = self.displacements(index)?;
+        let power = 1.0 / self.dimension as f64;
+        let volumes = self.result.field("volume", index)?;
+        let edge = |volume: &f64| (volume / self.section).powf(power);
+        let places = self.result.positions(index)?;
+        let moved =
+            |(x, u): (&[f64; 3], &[f64])| std::array::from_fn(|d| x[d] + self.factor * u[d]);
+        let both = places.iter().zip(displacements.chunks_exact(3));
+        Ok(Points {
+            positions: both.map(moved).collect(),
+            sizes: volumes.iter().map(edge).collect(),
+            values,
+            lines: self.moved_paths(&places, &displacements),
+        })
+    }
+
+    fn scene<'b>(&'b self, points: &'b Points) -> Scene<'b> {
+        Scene {
+            dimension: self.dimension,
+            positions: &points.positions,
+            sizes: &points.sizes,
+            values: &points.values,
+            field: &self.quantity.label,
+            unit: &self.quantity.unit,
+            title: "",
+            range: None,
+            view: self.view,
+            width: self.arguments.width,
+            lines: &points.lines,
+            note: "",
+            bounds: None,
+        }
+    }
+
+    /// The limits of a scene; damage has no outliers.
+    fn limits(&self, scene: &Scene) -> Option<Limits> {
+        let range = match self.range {
+            Range::Automatic if self.quantity.field.contains("damage") => Range::All,
+            range => range,
+        };
+        Limits::of(scene.drawn_values(), range)
+    }
+
+    /// What a picture of an output shows, to be united with that of other outputs.
+    ///
+    /// # Errors
+    /// If the result is damaged.
+    pub fn frame(&self, index: usize) -> Result<Frame> {
+        let points = self.points(index)?;
+        let scene = self.scene(&points);
+        Ok(Frame {
+            bounds: scene.extent(),
+            limits: self.limits(&scene),
+        })
+    }
+
+    /// Draw an output at a time, in a given frame or in one of its own.
+    ///
+    /// # Errors
+    /// If the result is damaged.
+    pub fn image(&self, index: usize, time: &str, frame: Option<&Frame>) -> Result<Image> {
+        let points = self.points(index)?;
+        let scene = self.scene(&points);
+        let limits = match frame {
+            Some(frame) => frame.limits,
+            None => self.limits(&scene),
+        };
+        let note = limits.map_or(String::new(), |limits| limits.note(&self.quantity.unit));
+        let mut title = format!("{}   t = {time}", self.title);
+        if self.has_displacement && self.factor != 0.0 {
+            title += &format!("   deformation × {}", self.factor);
+        }
+        Ok(render(&Scene {
+            title: title.trim_start(),
+            range: match (self.range, limits) {
+                (Range::Values(range), _) => Some(range),
+                // The low end of damage is 0, as the picture has it.
+                (_, Some(limits)) if frame.is_some() || limits.percentiles.is_some() => {
+                    let [low, high] = limits.shown;
+                    let damage = self.quantity.field.contains("damage");
+                    let low = if damage { low.min(0.0) } else { low };
+                    (low < high).then_some((low, high))
+                }
+                _ => None,
+            },
+            note: &note,
+            bounds: frame.map(|frame| frame.bounds),
+            ..scene
+        }))
+    }
+
+    /// Check that a slice cuts the body.
+    ///
+    /// # Errors
+    /// If no points are near it; the nearest ones are named.
+    pub fn check_slice(&self, index: usize) -> Result<()> {
+        let View::Slice { axis, position } = self.view else {
+            return Ok(());
+        };
+        let points = self.points(index)?;
+        if !self.scene(&points).marks().is_empty() {
+            return Ok(());
+        }
+        let name = axis.letter();
+        let along = points
+            .positions
+            .iter()
+            .map(|position| position[axis.index()]);
+        let along: Vec<f64> = along.filter(|coordinate| coordinate.is_finite()).collect();
+        let ends = along
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
+                [low.min(*at), high.max(*at)]
+            });
+        let distance = |at: &f64| (at - position).abs();
+        let nearest = along
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let nearest = nearest.map_or(String::new(), |at| {
+            format!("; the nearest ones are at --slice {name}={at:.4e}")
+        });
+        Err(Error::input(format!(
+            "--slice {name}={position}: no points are drawn there; they are between {name} = {:.4e} and {:.4e} m{nearest}",
+            ends[0], ends[1]
+        )))
+    }
+
+    /// The lines to draw, with the numbers of their files. Each vertex is displaced with its nearest point.
+    fn moved_paths(
+        &self,
+        positions: &[[f64; 3]],
+        displacements: &[f64],
+    ) -> Vec<(usize, Vec<[f64; 3]>)> {
+        let moved = |place: &[f64; 2]| {
+            let distance = |point: &[f64; 3]| (point[0] - place[0]).hypot(point[1] - place[1]);
+            let points = positions.iter().zip(displacements.chunks_exact(3));
+            let nearest = points.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+            let [x, y] = nearest.map_or([0.0; 2], |(_, u)| [u[0], u[1]]);
+            [place[0] + self.factor * x, place[1] + self.factor * y, 0.0]
+        };
+        let line = |number: usize, line: &Line| (number, line.iter().map(moved).collect());
+        let files = self.paths.iter().enumerate();
+        files
+            .flat_map(|(number, lines)| lines.iter().map(move |own| line(number, own)))
+            .collect()
+    }
+}
+
+/// The field to draw: the named one, or else the most wanted one that changes with time.
+fn choose_field<'a>(
+    name: Option<&str>,
+    path: &Path,
+    fields: &'a [StoredField],
+) -> Result<&'a StoredField> {
+    let find = |name: &str| fields.iter().find(|field| field.name == name);
+    let found = match name {
+        Some(name) => find(name),
+        None => {
+            let dynamic = fields
+                .iter()
+                .find(|field| field.dynamic && field.name != "id");
+            let preferred = PREFERRED.into_iter().find_map(find);
+            preferred.or(dynamic).or(fields.first())
+        }
+    };
+    found.ok_or_else(|| {
+        let name = name.unwrap_or("damage");
+        let known = fields.iter().map(|field| field.name.as_str());
+        let known = suggestion(name, known);
+        Error::input(format!("{} has no field `{name}`{known}", path.display()))
+    })
+}
+
+fn range(text: &str) -> Result<Range> {
+    let wanted = "--range must be LOW,HIGH, percentiles such as 5%,95%, or `all`";
+    if text == "all" {
+        return Ok(Range::All);
+    }
+    let wrong = || Error::input(format!("{wanted}, is `{text}`"));
+    let (low, high) = text.split_once(',').ok_or_else(wrong)?;
+    let (low, high) = (low.trim(), high.trim());
+    let percent = (low.strip_suffix('%'), high.strip_suffix('%'));
+    let percentiles = percent.0.is_some() || percent.1.is_some();
+    let (low, high) = match percent {
+        (Some(low), Some(high)) => (number(low, wanted)?, number(high, wanted)?),
+        _ => (number(low, wanted)?, number(high, wanted)?),
+    };
+    if low >= high {
+        return Err(Error::input(format!(
+            "{wanted} with LOW below HIGH, is `{text}`"
+        )));
+    }
+    if !percentiles {
+        return Ok(Range::Values((low, high)));
+    }
+    if low < 0.0 || high > 100.0 {
+        return Err(wrong());
+    }
+    Ok(Range::Percentiles([low, high]))
+}
+
+fn view(slice: Option<&str>, dimension: usize) -> Result<View> {
+    let wanted = "--slice must be AXIS=POSITION, such as z=0.005";
+    let Some(text) = slice else {
+        return Ok(if dimension == 3 {
+            View::Orthographic
+        } else {
+            View::Plane
+        });
+    };
+    if dimension != 3 {
+        return Err(Error::input(
+            "--slice is for solids; this result is not 3-D",
+        ));
+    }
+    let (axis, position) = text
+        .split_once('=')
+        .ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))?;
+    let axis = match axis.trim() {
+        "x" => Axis::X,
+        "y" => Axis::Y,
+        "z" => Axis::Z,
+        _ => return Err(Error::input(format!("{wanted}, is `{text}`"))),
+    };
+    Ok(View::Slice {
+        axis,
+        position: number(position, wanted)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_outside_of_the_result_are_rejected() {
+        let times = [0.0, 1e-5, 2e-5];
+        let chosen = |text| choose_times(text, &times).unwrap();
+        assert_eq!(chosen("last"), [2]);
+        assert_eq!(chosen("all"), [0, 1, 2]);
+        assert_eq!(chosen("1.2e-5"), [1]);
+        assert_eq!(chosen("2.4e-5"), [2]);
+        assert_eq!(chosen("-4e-6"), [0]);
+        for (text, nearest) in [("25", "--time 2e-5"), ("-1e-5", "--time 0e0")] {
+            let message = choose_times(text, &times).unwrap_err().message;
+            assert!(message.ends_with(nearest), "{message}");
+        }
+        assert!(choose_times("1", &[0.5]).is_err());
+        assert!(choose_times("last", &[]).is_err());
+    }
+
+    #[test]
+    fn outliers_do_not_set_the_range() {
+        let mut values: Vec<f64> = (0..1000).map(f64::from).collect();
+        let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
+        assert_eq!((limits.shown, limits.percentiles), ([0.0, 999.0], None));
+        values[3] = 1e9;
+        let limits = Limits::of(values.clone(), Range::Automatic).unwrap();
+        assert_eq!((limits.shown, limits.all), ([6.0, 995.0], [0.0, 1e9]));
+        let note = limits.note("Pa");
+        assert!(note.ends_with("values from 0 Pa to 1.000 GPa"), "{note}");
+        let limits = Limits::of(values.clone(), Range::All).unwrap();
+        assert_eq!((limits.shown, limits.note("Pa").as_str()), ([0.0, 1e9], ""));
+        let limits = Limits::of(values, Range::Percentiles([0.0, 50.0])).unwrap();
+        assert_eq!(limits.shown, [0.0, 501.0]);
+        // Where nearly all values are equal, the others are what is looked at.
+        let pulse: Vec<f64> = (0..1000).map(|k| f64::from(u8::from(k == 7))).collect();
+        let limits = Limits::of(pulse, Range::Automatic).unwrap();
+        assert_eq!(limits.percentiles, None);
+        assert_eq!(Limits::of(Vec::new(), Range::Automatic), None);
+    }
+
+    #[test]
+    fn ranges_are_values_or_percentiles() {
+        assert_eq!(range("-1,2").unwrap(), Range::Values((-1.0, 2.0)));
+        assert_eq!(range("5%, 95%").unwrap(), Range::Percentiles([5.0, 95.0]));
+        assert_eq!(range("all").unwrap(), Range::All);
+        for wrong in ["1", "2,1", "5%,9", "-1%,50%", "a,b"] {
+            assert!(range(wrong).is_err(), "{wrong}");
+        }
+    }
+}

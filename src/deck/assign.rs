@@ -1,0 +1,132 @@
+//! Assignments of the command line to keys of a deck, as `time.safety=0.4`.
+
+use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+
+use super::source::Source;
+use crate::error::{Error, Result, excerpt};
+
+/// Whether a name is that of a key: one with dots, or of a value outside of all sections.
+pub fn is_key(name: &str) -> bool {
+    name.contains('.') || ["dimension", "title"].contains(&name)
+}
+
+/// The deck with the values of these keys, added where they are missing.
+///
+/// A value is written as in a deck; what is no TOML, such as a bare word or an expression, is a text.
+///
+/// # Errors
+/// If the deck is not TOML, or a key is not one of a table.
+pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
+    let mut document: DocumentMut = match source.text.parse() {
+        Ok(document) => document,
+        // The reader of decks says what is wrong.
+        Err(_) => return Ok(source.clone()),
+    };
+    for (key, text) in assignments {
+        let wrong = |message: String| Error::input(format!("--set {key}={text}: {message}"));
+        let parts: Vec<&str> = key.split('.').map(str::trim).collect();
+        if parts.iter().any(|part| part.is_empty()) {
+            let message = format!("{} is not a key; a key is like time.safety", excerpt(key));
+            return Err(wrong(message));
+        }
+        let value: Value = text.parse().unwrap_or_else(|_| Value::from(*text));
+        let [sections @ .., name] = &parts[..] else {
+            continue;
+        };
+        let mut table: &mut dyn TableLike = document.as_table_mut();
+        for (depth, section) in sections.iter().enumerate() {
+            let item = table.entry(section).or_insert_with(|| {
+                let mut table = Table::new();
+                table.set_implicit(true);
+                Item::Table(table)
+            });
+            let path = parts[..=depth].join(".");
+            let kind = item.type_name();
+            table = item.as_table_like_mut().ok_or_else(|| {
+                let advice = if kind.starts_with("array") {
+                    "a list, whose entries can only be changed in the deck"
+                } else {
+                    "a value and has no keys"
+                };
+                wrong(format!("`{path}` is {advice}"))
+            })?;
+        }
+        match table.get_mut(name) {
+            // The comment beside the value stays.
+            Some(Item::Value(old)) => {
+                let decor = old.decor().clone();
+                *old = value;
+                *old.decor_mut() = decor;
+            }
+            Some(_) => {
+                let message = format!("`{key}` is a section; name one of its keys, as {key}.KEY");
+                return Err(wrong(message));
+            }
+            None => {
+                table.insert(name, Item::Value(value));
+            }
+        }
+    }
+    Ok(Source {
+        path: source.path.clone(),
+        text: document.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assigned(text: &str, key: &str, value: &str) -> Result<String> {
+        let source = Source {
+            path: "deck.toml".into(),
+            text: text.to_owned(),
+        };
+        Ok(assign(&source, &[(key, value)])?.text)
+    }
+
+    #[test]
+    fn values_are_replaced_or_added_where_they_belong() -> Result<()> {
+        let deck = "a = 1\nb = { c = 2, d = 3 } # b\n[e]\nf = 4   # f\n[e.g]\nh.i = 5\n";
+        for (key, value, old, new) in [
+            ("a", "2.5", "a = 1", "a = 2.5"),
+            ("b.d", "[1, 2]", "d = 3", "d = [1, 2]"),
+            ("e.f", "1e-3", "f = 4   # f", "f = 1e-3   # f"),
+            ("e.f", "2*dx", "f = 4", "f = \"2*dx\""),
+            ("e.f", "'true'", "f = 4", "f = 'true'"),
+            ("e.g.h.i", "word", "h.i = 5", "h.i = \"word\""),
+            ("b.e", "true", "d = 3 }", "d = 3 , e = true}"),
+            ("e.k", "1", "f = 4   # f\n", "f = 4   # f\nk = 1\n"),
+            ("e.g.h.k", "1", "h.i = 5\n", "h.i = 5\nh.k = 1\n"),
+        ] {
+            let text = assigned(deck, key, value)?;
+            let wanted = deck.replace(old, new);
+            let parsed = |text: &str| text.parse::<toml::Table>().unwrap();
+            assert_eq!(parsed(&text), parsed(&wanted), "{key}: {text}");
+            if key != "b.e" {
+                assert_eq!(text, wanted, "{key}");
+            }
+        }
+        let text = assigned(deck, "new.part.k", "7")?;
+        let table: toml::Table = text.parse().unwrap();
+        assert_eq!(table["new"]["part"]["k"].as_integer(), Some(7), "{text}");
+        assert_eq!(text.lines().nth(3), Some("f = 4   # f"));
+        Ok(())
+    }
+
+    #[test]
+    fn keys_that_are_none_are_rejected() {
+        let deck = "a = 1\n[[stage]]\nend = 1\n[e]\nf = 4\n";
+        for (key, message) in [
+            ("a.b", "--set a.b=1: `a` is a value and has no keys"),
+            ("stage.end", "`stage` is a list, whose entries"),
+            ("e", "`e` is a section; name one of its keys, as e.KEY"),
+            ("e..f", "is not a key"),
+        ] {
+            let error = assigned(deck, key, "1").unwrap_err();
+            assert!(error.message.contains(message), "{}", error.message);
+        }
+        // What is no TOML is left to the reader of decks.
+        assert_eq!(assigned("a = = 1", "e.f", "1").unwrap(), "a = = 1");
+    }
+}

@@ -1,0 +1,99 @@
+//! Animated PNG files, which browsers and slides play.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use super::canvas::Image;
+
+/// An animated PNG file that is written a frame after the other and repeats without end.
+pub struct Film {
+    writer: png::Writer<BufWriter<File>>,
+}
+
+impl Film {
+    /// Begin a film of `frames` frames like `first`, each shown for 1/`rate` s.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn create(path: &Path, first: &Image, frames: u32, rate: u16) -> std::io::Result<Self> {
+        let file = BufWriter::new(File::create(path)?);
+        let mut encoder = png::Encoder::new(file, first.width, first.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_animated(frames, 0)?;
+        encoder.set_frame_delay(1, rate)?;
+        let writer = encoder.write_header()?;
+        Ok(Self { writer })
+    }
+
+    /// Append a frame.
+    ///
+    /// # Errors
+    /// If the file cannot be written, or the frame has another size than the first one.
+    pub fn append(&mut self, frame: &Image) -> std::io::Result<()> {
+        Ok(self.writer.write_image_data(&frame.rgb)?)
+    }
+
+    /// End the film after its last frame.
+    ///
+    /// # Errors
+    /// If the file cannot be written or frames are missing.
+    pub fn finish(self) -> std::io::Result<()> {
+        Ok(self.writer.finish()?)
+    }
+}
+
+impl Image {
+    /// The picture with a white row or column more where its size is odd: encoders of films need even sizes.
+    pub fn even(self) -> Self {
+        let mut even = Self::new(
+            self.width.next_multiple_of(2),
+            self.height.next_multiple_of(2),
+        );
+        let rows = self.rgb.chunks_exact(3 * self.width as usize);
+        for (row, whole) in rows.zip(even.rgb.chunks_exact_mut(3 * even.width as usize)) {
+            whole[..row.len()].copy_from_slice(row);
+        }
+        even
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_read_back_in_their_order() {
+        let frame = |colour| {
+            let mut image = Image::new(3, 5);
+            image.fill_rectangle([0, 3], [0, 5], [colour; 3]);
+            image.even()
+        };
+        let path = std::env::temp_dir().join(format!("picture_film_{}.png", std::process::id()));
+        let mut film = Film::create(&path, &frame(0), 3, 20).unwrap();
+        for colour in [10, 20, 30] {
+            film.append(&frame(colour)).unwrap();
+        }
+        film.finish().unwrap();
+        let file = std::io::BufReader::new(File::open(&path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let control = *reader.info().animation_control().unwrap();
+        assert_eq!((control.num_frames, control.num_plays), (3, 0));
+        for colour in [10, 20, 30] {
+            let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+            let frame = reader.next_frame(&mut bytes).unwrap();
+            assert_eq!((frame.width, frame.height), (4, 6));
+            assert_eq!(
+                bytes[..12],
+                [
+                    colour, colour, colour, colour, colour, colour, colour, colour, colour, 255,
+                    255, 255
+                ]
+            );
+            let control = reader.info().frame_control().unwrap();
+            assert_eq!((control.delay_num, control.delay_den), (1, 20));
+        }
+        std::fs::remove_file(&path).unwrap();
+    }
+}
