@@ -233,7 +233,7 @@ impl BondLattice {
     /// Call `visit(group, lane, [i, j])` for each intact bond.
     fn for_each(&self, mut visit: impl FnMut(usize, usize, [usize; 2])) {
         for k in 0..self.vectors.len() {
-            self.for_each_of(self.intact(k), k, &mut visit);
+            self.for_each_of(self.intact(k).iter().copied(), k, &mut visit);
         }
     }
 
@@ -246,7 +246,7 @@ impl BondLattice {
     /// Call `visit(group, lane, [i, j])` for each set bit of one vector.
     fn for_each_of(
         &self,
-        bits: &[u8],
+        bits: impl Iterator<Item = u8>,
         vector: usize,
         visit: &mut impl FnMut(usize, usize, [usize; 2]),
     ) {
@@ -254,8 +254,7 @@ impl BondLattice {
         let vector = &self.vectors[vector];
         let shifts = &self.shifts[vector.line as usize * self.line_offsets.len()..];
         let mut lookup = self.grid.lookup();
-        for (o, (offset, bits)) in self.offsets.iter().zip(bits).enumerate() {
-            let mut bits = *bits;
+        for (o, (offset, mut bits)) in self.offsets.iter().zip(bits).enumerate() {
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
@@ -289,11 +288,9 @@ impl BondLattice {
     /// See [`super::BlockBonds::for_each_neighbour`].
     pub fn for_each_neighbour(&self, point: usize, visit: &mut impl FnMut(usize)) {
         if let Some(vector) = self.vector_of(point) {
-            self.for_each_of(self.intact(vector), vector, &mut |_, _, [i, j]| {
-                if i == point {
-                    visit(j);
-                }
-            });
+            let lane = 1 << (point - self.vectors[vector].point as usize);
+            let own = self.intact(vector).iter().map(|bits| bits & lane);
+            self.for_each_of(own, vector, &mut |_, _, [_, j]| visit(j));
         }
     }
 
@@ -313,7 +310,7 @@ impl BondLattice {
         let mut broken = Vec::new();
         for k in 0..self.vectors.len() {
             if self.points_of(k).any(&selected) {
-                self.for_each_of(self.intact(k), k, &mut |byte, lane, [i, j]| {
+                self.for_each_of(self.intact(k).iter().copied(), k, &mut |byte, lane, [i, j]| {
                     if selected(i) && cut(i, j) {
                         broken.push((byte, lane));
                     }
@@ -342,7 +339,7 @@ impl BondLattice {
             for (bits, intact) in broken.iter_mut().zip(intact) {
                 *bits &= !intact;
             }
-            self.for_each_of(&broken, k, &mut |_, _, [i, j]| visit(i, j));
+            self.for_each_of(broken.iter().copied(), k, &mut |_, _, [i, j]| visit(i, j));
         }
     }
 
