@@ -32,7 +32,7 @@ pub fn contact(
     bodies: &[problem::Body],
 ) -> Result<Option<problem::Contact>> {
     if deck.contact.is_some() || !deck.rigid.is_empty() {
-        is_explicit(scope, deck)?;
+        require_contact_is_possible(scope, deck)?;
     }
     let Some(table) = &deck.contact else {
         return Ok(None);
@@ -53,6 +53,19 @@ pub fn contact(
     for (name, table) in &table.pair {
         let key = format!("[contact.pair.{name}]");
         let table = table.get_ref();
+        let other_model = table
+            .model
+            .as_ref()
+            .filter(|model| *model.get_ref() != all.model);
+        let inherits = table.stiffness.is_none() && all.stiffness.is_some();
+        if let Some(model) =
+            other_model.filter(|model| inherits && *model.get_ref() != ContactName::None)
+        {
+            let message = format!(
+                "{key} model: differs from that of [contact], whose `stiffness` means something else; give the pair its own"
+            );
+            return Err(scope.error(model.span(), message));
+        }
         let own = Keys {
             model: table
                 .model
@@ -86,8 +99,14 @@ pub fn contact(
     Ok(Some(contact))
 }
 
-/// An error if a stage of a run with contact is a relaxation.
-fn is_explicit(scope: &Scope, deck: &Deck) -> Result<()> {
+/// An error if a run with contact is a relaxation or refines its grid.
+fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
+    let refinement = deck.refinement.as_ref();
+    if let Some(trigger) = refinement.and_then(|table| table.get_ref().trigger.as_ref()) {
+        let message = "[refinement.trigger]: contact is not available on grids that change during the run; refine \
+                       regions from the start, or remove [contact] and [rigid]";
+        return Err(scope.error(trigger.span(), message));
+    }
     let of_time = ("[time]", &deck.time.get_ref().method);
     let of_stages = deck.stage.iter();
     let of_stages =
@@ -95,7 +114,7 @@ fn is_explicit(scope: &Scope, deck: &Deck) -> Result<()> {
     for (section, method) in std::iter::once(of_time).chain(of_stages) {
         if *method.get_ref() == grammar::Method::Relaxation {
             let message = format!(
-                "{section} method: a relaxation knows no contact; take \"explicit\" steps, or leave [contact] and [rigid] out"
+                "{section} method: contact is not available in a relaxation; use \"explicit\", or remove [contact] and [rigid]"
             );
             return Err(scope.error(method.span(), message));
         }

@@ -310,11 +310,15 @@ impl BondLattice {
         let mut broken = Vec::new();
         for k in 0..self.vectors.len() {
             if self.points_of(k).any(&selected) {
-                self.for_each_of(self.intact(k).iter().copied(), k, &mut |byte, lane, [i, j]| {
-                    if selected(i) && cut(i, j) {
-                        broken.push((byte, lane));
-                    }
-                });
+                self.for_each_of(
+                    self.intact(k).iter().copied(),
+                    k,
+                    &mut |byte, lane, [i, j]| {
+                        if selected(i) && cut(i, j) {
+                            broken.push((byte, lane));
+                        }
+                    },
+                );
             }
         }
         for (byte, lane) in broken {

@@ -262,7 +262,7 @@ impl<'a> Job<'a> {
         let simulation = stepper.at_full_step();
         let without_contact = self.problem.contact.is_none();
         let mut contact = without_contact.then(|| ContactWatch::new(simulation));
-        let mut follows_contact = false;
+        let mut warned_of_contact = false;
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
@@ -280,9 +280,12 @@ impl<'a> Job<'a> {
                     points: simulation.model.total,
                 });
             }
-            if !follows_contact && let Some(step) = stepper.step_for_contact() {
+            if !warned_of_contact
+                && let Some(step) = stepper.step_for_contact()
+                && step < stepper.clock().step()
+            {
                 self.warn_of_stiff_contact(stepper.clock(), step);
-                follows_contact = true;
+                warned_of_contact = true;
             }
             stepper.advance();
             let clock = *stepper.clock();

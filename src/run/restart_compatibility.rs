@@ -39,6 +39,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     let history = problem.history.clone();
     problem.history.reactions.clear();
     problem.history.support_forces.clear();
+    problem.history.fragments = false;
     problem.history.damage_threshold = 0.0;
     problem.history.probes.clear();
     problem.history.fronts.clear();

@@ -33,12 +33,11 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Tell that steps become shorter because of contact: from here on they have this size (s), later ones may be shorter
-    /// still.
+    /// Tell that steps become shorter because of contact. The next ones have this size (s).
     pub(super) fn warn_of_stiff_contact(&mut self, clock: &Clock, step: f64) {
         let text = format!(
-            "after step {} (t = {:.4e} s) contact is too stiff for a time step of {:.4e} s: steps of {step:.4e} s or \
-             shorter follow",
+            "after step {} (t = {:.4e} s) contact is too stiff for a time step of {:.4e} s: the next steps have {step:.4e} \
+             s, and follow the contact",
             clock.number(),
             clock.time(),
             clock.step(),

@@ -5,8 +5,7 @@ use crate::comm::total;
 use super::Simulation;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Gives all points that intact bonds connect the least value of any of them, in each column over the local points.
-    /// Collective.
+    /// Sets each column over the local points to its minimum over the points that intact bonds connect. Collective.
     pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
         let mut roots: Vec<usize> = (0..local).collect();

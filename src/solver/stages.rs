@@ -64,6 +64,9 @@ impl<const D: usize> Simulation<'_, D> {
         self.apply_loads(clock.time(), true);
         let mut finite = self.apply_velocities();
         let factor = self.time_rule().density_scale / scale;
+        if let Some(contact) = &mut self.contact {
+            contact.scale_density(factor);
+        }
         if factor != 1.0 && !relaxed && !self.relaxes() {
             finite &= self.keep_momentum(factor);
         }

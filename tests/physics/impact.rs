@@ -206,10 +206,13 @@ fn a_block_on_an_incline_slides_or_sticks() {
         &names,
     );
     let last = rows.last().unwrap();
-    assert!((last[1] / mass).abs() < 1e-3 * 0.01 * 100.0, "{last:?}");
+    // It creeps by what the eight points with √(k m) each let it, with k = 2 E ℓ/δ.
+    let creep = last[2] / (8.0 * (2.0 * 5.0 / 3.0 * 2.0_f64).sqrt());
+    assert!((last[1] / mass / creep - 1.0).abs() < 0.02, "{last:?}");
     let weight = mass * 0.01 * 0.2_f64.sin();
+    let drag = 0.1 * last[1];
     assert!(
-        (last[2] / weight - 1.0).abs() < 0.02,
+        ((last[2] + drag) / weight - 1.0).abs() < 0.02,
         "{last:?} for {weight}"
     );
     let rows = history::<2>(
@@ -217,7 +220,12 @@ fn a_block_on_an_incline_slides_or_sticks() {
         10,
         &names,
     );
-    assert!(rows.last().unwrap()[2] < 0.8 * weight, "it slides");
+    let last = rows.last().unwrap();
+    let slides = 0.1 * mass * 0.01 * 0.2_f64.cos();
+    assert!(
+        (last[2] / slides - 1.0).abs() < 0.02,
+        "{last:?} for {slides}"
+    );
 }
 
 #[test]
@@ -368,16 +376,54 @@ fn bodies_at_rest_feel_no_contact() {
 }
 
 #[test]
-fn steps_become_shorter_where_contact_is_stiff() {
-    let deck = bars("stiffness = 8e12");
-    simulate::<1, _>(&deck, |mut simulation| {
-        let before = simulation.clock.step();
+fn steps_become_shorter_before_stiff_contact_and_longer_again() {
+    // The right bar begins a little away, so that the contact is seen coming.
+    let deck = bars("stiffness = 8e12").replace("lower = [0.1]", "lower = [0.1005]");
+    let deck = deck
+        .replace("upper = [0.2]", "upper = [0.2005]")
+        .replace("60e-6", "150e-6");
+    let names = ["time", "kinetic_energy", "energy_error", "touching_pairs"];
+    let rows = history::<1>(&deck, 1, &names);
+    let touched = rows.iter().position(|row| row[3] > 0.0).unwrap();
+    let steps: Vec<f64> = rows
+        .windows(2)
+        .map(|pair| pair[1][0] - pair[0][0])
+        .collect();
+    assert!(
+        steps[touched] < 0.5 * steps[0],
+        "{} {}",
+        steps[touched],
+        steps[0]
+    );
+    assert!(
+        steps[steps.len() - 2] > 0.7 * steps[0],
+        "{:?}",
+        steps.last()
+    );
+    let last = rows.last().unwrap();
+    assert!((last[0] - 150e-6).abs() < 1e-17, "{last:?}");
+    assert!((last[2] / rows[0][1]).abs() < 0.02, "{last:?}");
+}
+
+#[test]
+fn a_rigid_body_whose_motion_is_lost_is_named() {
+    let deck = "
+        dimension = 'plane-strain'
+        grid = { spacing = 1, horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.block = { material = 'rubber', shape.box = { lower = [0, 0], upper = [8, 4] } }
+        rigid.ball = { shape.disc = { centre = [3, 9], radius = 1.6 }, motion = [0, 'sqrt(1 - t)'] }
+        time.end = 4
+        ";
+    simulate::<2, _>(deck, |mut simulation| {
         while !simulation.is_over() {
             simulation.advance();
         }
-        assert!(simulation.clock.step() < 0.5 * before);
-        assert!((simulation.clock.time() - 60e-6).abs() < 1e-18);
-        simulation.check().unwrap();
+        let message = simulation.check().unwrap_err().message;
+        assert!(
+            message.starts_with("[rigid.ball]: its motion is not finite"),
+            "{message}"
+        );
     });
 }
 

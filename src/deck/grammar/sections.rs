@@ -62,7 +62,7 @@ pub const SECTIONS: [Section; 35] = [
     Section::new("interface.pair", Named, Fixed),
     Section::new("contact", Table, Fixed),
     Section::new("contact.pair", Named, Fixed),
-    Section::new("rigid", Named, Fixed),
+    Section::new("rigid", Named, FixedOrder),
     Section::new("refinement", Table, Fixed),
     Section::new("refinement.region", Named, Fixed),
     Section::new("refinement.trigger", Table, Fixed),

@@ -27,7 +27,7 @@ pub struct ContactNow {
 pub struct Touching {
     /// Number of them.
     pub count: u64,
-    /// How much nearer the nearest ones are than where they begin to touch, m.
+    /// The largest overlap, m.
     pub overlap: f64,
     /// Force on the first of two bodies by component, N; friction and damping follow from the velocities at the full step.
     pub force: Vec<f64>,

@@ -9,7 +9,7 @@ pub(super) fn cell_of(place: [f64; 3], edge: f64) -> Cell {
     place.map(|x| (x / edge).floor() as i64)
 }
 
-/// A number of a cell, as evenly spread as can be.
+/// The hash of a cell.
 pub(super) fn hash(cell: Cell) -> u64 {
     cell.into_iter().fold(0_u64, |hash, k| {
         let mixed = (hash ^ k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);

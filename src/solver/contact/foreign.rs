@@ -1,7 +1,7 @@
 //! Points of other ranks that may touch own ones: which they are, and how their motion arrives.
 //!
-//! Any two ranks can meet, however the points were dealt out. A cell of present space has a home rank, which hears who
-//! has points in it and who has points beside it, and brings both together.
+//! Any two ranks can meet. Each cell of present space has a home rank, found by its hash. It tells every rank with points
+//! in the cell which other ranks have points in the cell or next to it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,11 +1,11 @@
 //! Contact: repulsion, friction and damping between points that no intact bond joins.
 //!
-//! Every owned point has a row of the points that may touch it before the next search, sorted by id, so that its forces
-//! are summed in the same order on any ranks. Points are searched anew when one has moved half a skin since the last
-//! search. A pair touches where it is nearer than its distance of contact, which is never more than its reference
+//! Every owned point has a list of the points that may touch it before the next search, in ascending order of ids, so
+//! that its forces are summed in the same order on any ranks. Points are searched anew when one has moved half a skin
+//! since the last search. A pair touches where it is nearer than its distance of contact, which is never more than its reference
 //! distance: a body at rest has no contact forces. The faces of cracks are points whose bond has broken.
 //!
-//! Rigid bodies repel all points. Their motion is the same on all ranks, for what points exert on them is summed exactly.
+//! Rigid bodies repel all points. Every rank integrates all of them, from exact sums, so their states are identical.
 //!
 //! Forces are those at the new positions; friction and damping are those of the velocities half a step before. Their work
 //! in a step is the trapezoid of both ends.
@@ -18,6 +18,7 @@ mod rigid;
 mod rows;
 mod shape;
 
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
@@ -31,7 +32,7 @@ use super::model::Model;
 use super::motion::Fields;
 use cells::Cells;
 use foreign::Foreign;
-use pair::{ContactPoint, PairRule, Touch};
+use pair::{ContactPoint, Demand, PairRule, Touch};
 use rigid::{RigidBody, WrenchSums};
 use rows::{FoundPair, Rows};
 
@@ -45,6 +46,12 @@ const SKIN: f64 = 0.4;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
+/// Steps in which what approaches counts as touching already: it is seen one step before a step too long is made.
+const LOOK_AHEAD: f64 = 2.0;
+
+/// Steps that could have been longer before they become so.
+const CALM: u64 = 100;
+
 /// Contact on one rank.
 pub struct Contact<const D: usize> {
     dimension: Dimension,
@@ -53,7 +60,6 @@ pub struct Contact<const D: usize> {
     blocks: usize,
     /// The largest distance at which any points touch, m.
     largest: f64,
-    has_dissipation: bool,
     /// Edge of a cell of each owned point's volume, m.
     edges: Vec<f64>,
     foreign: ForeignPoints<D>,
@@ -61,19 +67,39 @@ pub struct Contact<const D: usize> {
     /// Owned points that touch a rigid body, now and at the last evaluation.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
-    /// Owned points with pairs that no bond joins.
+    /// Owned points with a candidate that no bond joins to them.
     open: Vec<u32>,
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
-    /// Rows and bonds must be found anew, on all ranks.
+    /// The candidates and their bonds must be searched anew; equal on all ranks.
     is_stale: bool,
-    /// The largest 2 Σ k/m of an owned point over all ranks, 1/s²: a bound of what contact adds to the squares of the
-    /// frequencies.
-    stiffness: f64,
-    /// Points with forces, and what these are; kept for their memory.
+    /// What contact demands of the step.
+    demand: StepDemand,
+    /// Buffers of [`Self::add_forces`]: the points with forces, and these.
     active: Vec<u32>,
     sums: Vec<PointSum<D>>,
+}
+
+/// What contact demands of the step, over all ranks and over what will touch within two steps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct StepDemand {
+    /// The largest 2 Σ k/m of a point or body, 1/s²: a bound of what contact adds to the squares of the frequencies.
+    stiffness: f64,
+    /// The largest 2 Σ c/m, 1/s.
+    damping: f64,
+    /// Steps in a row that could have been longer.
+    calm: u64,
+}
+
+/// What of contact changes besides the fields of the points; the same on all ranks.
+#[derive(Debug, Clone, Default)]
+pub struct ContactState {
+    rigid: Vec<RigidState>,
+    demand: StepDemand,
+    /// Owned points that touch a rigid body.
+    at_rigid: Vec<u32>,
 }
 
 /// Points of other ranks that may touch own ones.
@@ -91,11 +117,13 @@ struct ForeignPoints<const D: usize> {
 pub struct StepEnd {
     /// Its time, s.
     pub time: f64,
-    /// Length of the step, s.
+    /// Length of the step, s; 0 at the start.
     pub step: f64,
+    /// Length of the next one, s.
+    pub next: f64,
 }
 
-/// What contact does to a point.
+/// The contact forces on a point.
 #[derive(Clone, Copy)]
 struct PointSum<const D: usize> {
     /// N.
@@ -106,10 +134,28 @@ struct PointSum<const D: usize> {
     friction: [f64; D],
     /// Its share of the potential energies, J.
     energy: f64,
-    /// Σ k, N/m.
-    stiffness: f64,
+    /// Summed over what touches or will within two steps.
+    demand: Demand,
     /// Whether it touches any point.
     touches: bool,
+}
+
+impl ContactState {
+    /// As a checkpoint holds it; points that touch rigid bodies are found anew.
+    pub fn words(&self) -> Vec<u64> {
+        let demand = bytemuck::cast_slice(std::slice::from_ref(&self.demand));
+        [demand, bytemuck::cast_slice(&self.rigid)].concat()
+    }
+
+    /// What [`Self::words`] gave.
+    pub fn of_words(words: &[u64]) -> Self {
+        let (demand, rigid) = words.split_at(size_of::<StepDemand>() / size_of::<u64>());
+        Self {
+            rigid: bytemuck::cast_slice(rigid).to_vec(),
+            demand: bytemuck::cast_slice(demand)[0],
+            at_rigid: Vec::new(),
+        }
+    }
 }
 
 impl<const D: usize> Contact<D> {
@@ -132,10 +178,9 @@ impl<const D: usize> Contact<D> {
             .flat_map(|here| blocks.iter().map(move |there| [here, there]));
         let rules: Vec<Option<PairRule>> = pairs
             .map(|[here, there]| {
-                let bodies = [here.body, there.body];
                 let contact = problem.contact.as_ref()?;
                 let rule = contact.between(here.body, there.body)?;
-                Some(PairRule::new(dimension, &rule, bodies))
+                Some(PairRule::new(dimension, &rule, [here, there]))
             })
             .collect();
         let edges: Vec<f64> = model
@@ -159,18 +204,15 @@ impl<const D: usize> Contact<D> {
         let largest = all
             .map(|(here, there)| largest(here, there))
             .fold(0.0, f64::max);
-        let bodies: Vec<_> = blocks.iter().map(|block| block.body).collect();
         let rigid = problem.rigid.iter();
-        let rigid: Vec<_> = rigid
-            .map(|rigid| RigidBody::new(rigid, dimension, &bodies))
-            .collect();
+        let rigid = rigid.map(|rigid| RigidBody::new(rigid, dimension, &blocks));
+        let rigid: Vec<_> = rigid.collect();
         are_outside(problem, comm, model, &rigid)?;
         Ok(Some(Self {
             dimension,
             rigid,
             at_rigid: [Vec::new(), Vec::new()],
             active: Vec::new(),
-            has_dissipation: rules.iter().flatten().any(PairRule::has_dissipation),
             blocks: blocks.len(),
             rules,
             largest,
@@ -181,21 +223,33 @@ impl<const D: usize> Contact<D> {
             is_open: vec![false; model.owned()],
             searched: std::array::from_fn(|_| Vec::new()),
             is_stale: true,
-            stiffness: 0.0,
+            demand: StepDemand::default(),
             sums: Vec::new(),
         }))
     }
 
-    /// What of the rigid bodies changes; the same on all ranks.
-    pub fn rigid_states(&self) -> impl Iterator<Item = RigidState> {
-        self.rigid.iter().map(|rigid| rigid.state)
+    /// What of it changes besides the fields.
+    pub fn state(&self) -> ContactState {
+        ContactState {
+            rigid: self.rigid.iter().map(|rigid| rigid.state).collect(),
+            demand: self.demand,
+            at_rigid: self.at_rigid[0].clone(),
+        }
     }
 
-    /// Puts the rigid bodies back.
-    pub fn set_rigid_states(&mut self, states: impl Iterator<Item = RigidState>) {
-        for (rigid, state) in self.rigid.iter_mut().zip(states) {
-            rigid.state = state;
+    /// Goes back to a state; bonds and fields were put back, too.
+    pub fn set_state(&mut self, state: &ContactState) {
+        for (rigid, state) in self.rigid.iter_mut().zip(&state.rigid) {
+            rigid.state = *state;
         }
+        self.demand = state.demand;
+        self.at_rigid[0].clone_from(&state.at_rigid);
+        self.is_stale = true;
+    }
+
+    /// The rigid body, by index, whose motion is not finite, if there is one.
+    pub fn lost_rigid(&self) -> Option<usize> {
+        self.rigid.iter().position(|rigid| !rigid.is_finite())
     }
 
     /// Moves the rigid bodies on to a time (s) by a step (s).
@@ -205,14 +259,38 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Bonds or positions were changed other than by a step.
-    pub fn set_stale(&mut self) {
-        self.is_stale = true;
+    /// Whether anything touches or will soon.
+    pub fn is_felt(&self) -> bool {
+        self.demand.stiffness > 0.0
+    }
+
+    /// Whether steps have been shorter than they must be for so long that they may become longer.
+    pub fn is_calm(&self) -> bool {
+        self.demand.calm >= CALM
     }
 
     /// The stable step (s) with contact as it is now, where it is `step` (s) without.
+    ///
+    /// With damping at the velocities half a step before, Δt² ω² + 2 Δt C/m < 4 is stable.
     pub fn stable_step(&self, step: f64) -> f64 {
-        1.0 / (1.0 / (step * step) + 0.25 * self.stiffness).sqrt()
+        let square = 4.0 / (step * step) + self.demand.stiffness;
+        let damping = self.demand.damping;
+        ((damping * damping + 4.0 * square).sqrt() - damping) / square
+    }
+
+    /// Takes note of whether the present step could have been longer.
+    pub fn count_calm(&mut self, could_be_longer: bool) {
+        self.demand.calm = if could_be_longer {
+            self.demand.calm + 1
+        } else {
+            0
+        };
+    }
+
+    /// Densities of the points were multiplied by a factor.
+    pub fn scale_density(&mut self, factor: f64) {
+        self.demand.stiffness /= factor.min(1.0);
+        self.demand.damping /= factor.min(1.0);
     }
 
     /// Memory, bytes.
@@ -246,20 +324,23 @@ impl<const D: usize> Contact<D> {
             self.note_broken(model, forces);
             self.update_foreign(comm, fields);
         }
+        let look_ahead = end.map_or(0.0, |end| LOOK_AHEAD * end.next);
         let mut active = std::mem::take(&mut self.active);
-        self.find_active(model, fields, &mut active);
+        self.find_active(model, fields, look_ahead, &mut active);
         let mut sums = std::mem::take(&mut self.sums);
         active
             .par_iter()
             .with_min_len(CHUNK / 16)
-            .map(|point| self.point_sum(model, fields, *point as usize))
+            .map(|point| self.point_sum(model, fields, *point as usize, look_ahead))
             .collect_into_vec(&mut sums);
-        let mut stiffest = 0.0_f64;
+        let mut largest = [0.0_f64; 2];
         for (point, sum) in active.iter().zip(&sums) {
             let point = *point as usize;
             let volume = model.volume[point];
             let mass = model.density_of(point) * volume;
-            stiffest = stiffest.max(2.0 * sum.stiffness / mass);
+            let Demand { stiffness, damping } = sum.demand;
+            largest[0] = largest[0].max(2.0 * stiffness / mass);
+            largest[1] = largest[1].max(2.0 * damping / mass);
             let [repulsion, damping, friction] = [sum.repulsion, sum.damping, sum.friction]
                 .map(|force| force.map(|component| component / volume));
             if let Some(StepEnd { step, .. }) = end {
@@ -273,11 +354,19 @@ impl<const D: usize> Contact<D> {
             }
         }
         (self.active, self.sums) = (active, sums);
-        self.stiffness = self.close_step(comm, model, fields, stiffest, end);
+        if let Some(end) = end {
+            self.close_step(comm, model, fields, largest, end);
+        }
     }
 
     /// Finds the owned points that have forces, or had some at the last evaluation.
-    fn find_active(&mut self, model: &Model<D>, fields: &Fields<D>, active: &mut Vec<u32>) {
+    fn find_active(
+        &mut self,
+        model: &Model<D>,
+        fields: &Fields<D>,
+        look_ahead: f64,
+        active: &mut Vec<u32>,
+    ) {
         active.clear();
         if !self.rigid.is_empty() {
             self.at_rigid.swap(0, 1);
@@ -285,8 +374,9 @@ impl<const D: usize> Contact<D> {
             now.clear();
             let all = (0..model.owned()).into_par_iter().with_min_len(CHUNK);
             let touching = all.filter(|index| {
-                let (_, point) = self.point(model, fields, *index);
-                self.rigid.iter().any(|rigid| rigid.touches(&point))
+                let (block, point) = self.point(model, fields, *index);
+                let mut rigid = self.rigid.iter();
+                rigid.any(|rigid| rigid.demand(block, &point, look_ahead).is_some())
             });
             now.par_extend(touching.map(|point| point as u32));
             self.at_rigid[0] = now;
@@ -298,45 +388,52 @@ impl<const D: usize> Contact<D> {
         active.extend(&self.open);
     }
 
-    /// Sums what points exert on rigid bodies and ends their step. Returns the largest 2 Σ k/m over all ranks, of which
-    /// `stiffest` is that of the own points. Collective.
+    /// Sums what points exert on rigid bodies, ends their step, and finds what contact demands of the next one, of which
+    /// `largest` are the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the own points. Collective.
     fn close_step(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
         fields: &Fields<D>,
-        stiffest: f64,
-        end: Option<StepEnd>,
-    ) -> f64 {
+        [stiffness, damping]: [f64; 2],
+        end: StepEnd,
+    ) {
         // Then the distance of the farthest point that touches each rigid body.
-        let mut largest = vec![0.0; 1 + self.rigid.len()];
-        largest[0] = stiffest;
+        let mut largest = vec![0.0; 2 + self.rigid.len()];
+        (largest[0], largest[1]) = (stiffness, damping);
         let mut sums = Vec::new();
-        for (rigid, reach) in self.rigid.iter().zip(&mut largest[1..]) {
-            let (mut wrench, mut stiffness) = (WrenchSums::new(), ExactSum::ZERO);
+        for (rigid, reach) in self.rigid.iter().zip(&mut largest[2..]) {
+            let mut wrench = WrenchSums::new();
+            let mut demands = [const { ExactSum::ZERO }; 2];
             for index in &self.at_rigid[0] {
                 let (block, point) = self.point(model, fields, *index as usize);
                 if let Some(touch) = rigid.touch(block, &point) {
-                    *reach = reach.max(rigid.add_opposite(&mut wrench, point.place(), &touch));
-                    stiffness.add(touch.stiffness);
+                    rigid.add_opposite(&mut wrench, point.place(), &touch);
+                }
+                if let Some(demand) = rigid.demand(block, &point, LOOK_AHEAD * end.next) {
+                    *reach = reach.max(rigid.arm(point.place()));
+                    demands[0].add(demand.stiffness);
+                    demands[1].add(demand.damping);
                 }
             }
             sums.extend(wrench.flat());
-            sums.push(stiffness);
+            sums.extend(demands);
         }
         comm.max(&mut largest);
-        let mut stiffest = largest[0];
-        if !self.rigid.is_empty() {
-            let sums = reduce(comm, &mut sums);
-            let each = sums.chunks_exact(WrenchSums::COUNT + 1).zip(&largest[1..]);
-            for (rigid, (sums, reach)) in self.rigid.iter_mut().zip(each) {
-                stiffest = stiffest.max(rigid.stiffness(sums[WrenchSums::COUNT], *reach));
-                if let Some(StepEnd { time, step }) = end {
-                    rigid.close_step(sums, time, step);
-                }
-            }
+        let (points, reaches) = largest.split_at(2);
+        (self.demand.stiffness, self.demand.damping) = (points[0], points[1]);
+        if self.rigid.is_empty() {
+            return;
         }
-        stiffest
+        let sums = reduce(comm, &mut sums);
+        let each = sums.chunks_exact(WrenchSums::COUNT + 2).zip(reaches);
+        for (rigid, (sums, reach)) in self.rigid.iter_mut().zip(each) {
+            let mobility = 2.0 * rigid.mobility(*reach);
+            let [stiffness, damping] = [0, 1].map(|k| mobility * sums[WrenchSums::COUNT + k]);
+            self.demand.stiffness = self.demand.stiffness.max(stiffness);
+            self.demand.damping = self.demand.damping.max(damping);
+            rigid.close_step(sums, end.time, end.step);
+        }
     }
 
     /// Searches anew where points have moved too far. Returns whether all positions are finite on all ranks. Collective.
@@ -405,8 +502,7 @@ impl<const D: usize> Contact<D> {
                 }
             })
             .collect();
-        let width = if self.has_dissipation { 2 * D } else { D };
-        let (points, halo) = foreign::find(comm, &own, reach, D, width);
+        let (points, halo) = foreign::find(comm, &own, reach, D, 2 * D);
         let edges = points
             .iter()
             .map(|point| edge_of(self.dimension, point.volume));
@@ -497,7 +593,7 @@ impl<const D: usize> Contact<D> {
             halo,
             ..
         } = &mut self.foreign;
-        let count = if self.has_dissipation { 2 * D } else { D };
+        let count = 2 * D;
         let column = |k: usize| -> &[f64] {
             match k.checked_sub(D) {
                 None => &fields.displacement[k],
@@ -506,7 +602,7 @@ impl<const D: usize> Contact<D> {
         };
         halo.pack((0..count).map(column));
         halo.exchange(comm, &mut |_| {});
-        let received = displacement.iter_mut().chain(velocity).take(count);
+        let received = displacement.iter_mut().chain(velocity);
         halo.unpack(received.map(Vec::as_mut_slice));
     }
 
@@ -552,6 +648,27 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Calls `visit` with an owned point, each point that may touch it, its block, and their rule, in ascending order of
+    /// ids.
+    fn for_each_candidate(
+        &self,
+        model: &Model<D>,
+        fields: &Fields<D>,
+        point: usize,
+        mut visit: impl FnMut(&ContactPoint<D>, &ContactPoint<D>, usize, &PairRule),
+    ) {
+        if !self.is_open[point] {
+            return;
+        }
+        let (block, here) = self.point(model, fields, point);
+        for other in self.rows.touching(point) {
+            let (other_block, there) = self.point(model, fields, other);
+            if let Some(rule) = &self.rules[block * self.blocks + other_block] {
+                visit(&here, &there, other_block, rule);
+            }
+        }
+    }
+
     /// Calls `visit` with the block of each point that touches an owned one, and with what the owned one feels of it, in
     /// ascending order of ids.
     fn for_each_touch(
@@ -561,54 +678,66 @@ impl<const D: usize> Contact<D> {
         point: usize,
         mut visit: impl FnMut(usize, Touch<D>),
     ) {
-        if !self.is_open[point] {
-            return;
-        }
-        let (block, here) = self.point(model, fields, point);
-        for other in self.rows.touching(point) {
-            let (other_block, there) = self.point(model, fields, other);
-            let rule = &self.rules[block * self.blocks + other_block];
-            if let Some(touch) = rule.as_ref().and_then(|rule| rule.touch(&here, &there)) {
-                visit(other_block, touch);
+        self.for_each_candidate(model, fields, point, |here, there, block, rule| {
+            if let Some(touch) = rule.touch(here, there) {
+                visit(block, touch);
             }
-        }
+        });
     }
 
-    fn point_sum(&self, model: &Model<D>, fields: &Fields<D>, point: usize) -> PointSum<D> {
+    /// The contact forces on a point, and what they demand of a step if all that touches within a time (s) touches now.
+    fn point_sum(
+        &self,
+        model: &Model<D>,
+        fields: &Fields<D>,
+        point: usize,
+        look_ahead: f64,
+    ) -> PointSum<D> {
         let mut sum = PointSum {
             repulsion: [0.0; D],
             damping: [0.0; D],
             friction: [0.0; D],
             energy: 0.0,
-            stiffness: 0.0,
+            demand: Demand::default(),
             touches: false,
         };
-        let mut add = |touch: Touch<D>| {
-            for d in 0..D {
-                sum.repulsion[d] += touch.repulsion[d];
-                sum.damping[d] += touch.damping[d];
-                sum.friction[d] += touch.friction[d];
+        self.for_each_candidate(model, fields, point, |here, there, _, rule| {
+            sum.add_demand(rule.demand(here, there, look_ahead));
+            if let Some(touch) = rule.touch(here, there) {
+                // The other half of its energy is the other point's.
+                sum.add(&touch, 0.5);
             }
-            sum.energy += touch.energy;
-            sum.stiffness += touch.stiffness;
-            sum.touches = true;
-        };
-        self.for_each_touch(model, fields, point, |_, touch| {
-            // The other half of its energy is the other point's.
-            add(Touch {
-                energy: 0.5 * touch.energy,
-                ..touch
-            });
         });
         if !self.rigid.is_empty() {
             let (block, here) = self.point(model, fields, point);
-            let touches = self
-                .rigid
-                .iter()
-                .filter_map(|rigid| rigid.touch(block, &here));
-            touches.for_each(add);
+            for rigid in &self.rigid {
+                sum.add_demand(rigid.demand(block, &here, look_ahead));
+                if let Some(touch) = rigid.touch(block, &here) {
+                    sum.add(&touch, 1.0);
+                }
+            }
         }
         sum
+    }
+}
+
+impl<const D: usize> PointSum<D> {
+    /// Adds what a pair does, of whose energy the point has a share.
+    fn add(&mut self, touch: &Touch<D>, share: f64) {
+        for d in 0..D {
+            self.repulsion[d] += touch.repulsion[d];
+            self.damping[d] += touch.damping[d];
+            self.friction[d] += touch.friction[d];
+        }
+        self.energy += share * touch.energy;
+        self.touches = true;
+    }
+
+    fn add_demand(&mut self, demand: Option<Demand>) {
+        if let Some(Demand { stiffness, damping }) = demand {
+            self.demand.stiffness += stiffness;
+            self.demand.damping += damping;
+        }
     }
 }
 

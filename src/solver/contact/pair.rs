@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::dimension::Dimension;
 use crate::material::Pmb;
-use crate::problem::{Body, ContactModel, ContactRule};
+use crate::problem::{Block, ContactModel, ContactRule};
 
 /// Points touch with short-range forces at this share of the sum of their half edges (Silling & Askari 2005, §5).
 const SHORT_RANGE: f64 = 1.35;
@@ -80,7 +80,16 @@ pub(super) fn whole<const D: usize>(vector: [f64; D]) -> [f64; 3] {
     whole
 }
 
-/// What a point that touches another one feels of it.
+/// What contact demands of the step: of a pair, or summed over those of a point.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Demand {
+    /// N/m.
+    pub stiffness: f64,
+    /// The larger coefficient of damping and of sticking, N s/m.
+    pub damping: f64,
+}
+
+/// The force on a point that touches another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch<const D: usize> {
     /// Repulsive force on the first point, N; it has the potential `energy`.
@@ -91,17 +100,15 @@ pub(super) struct Touch<const D: usize> {
     pub friction: [f64; D],
     /// Potential energy of the pair, J.
     pub energy: f64,
-    /// Stiffness that an explicit step has to resolve, damping included, N/m.
-    pub stiffness: f64,
     /// How much nearer the points are than where they begin to touch, m.
     pub overlap: f64,
 }
 
 impl PairRule {
-    /// Contact between points of two bodies.
-    pub fn new(dimension: Dimension, rule: &ContactRule, bodies: [&Body; 2]) -> Self {
-        let elastic = bodies.map(|body| body.material.elastic);
-        let horizon = bodies[0].horizon.min(bodies[1].horizon);
+    /// Contact between points of two blocks.
+    pub fn new(dimension: Dimension, rule: &ContactRule, blocks: [&Block<'_>; 2]) -> Self {
+        let elastic = blocks.map(|block| block.body.material.elastic);
+        let horizon = blocks[0].horizon.min(blocks[1].horizon);
         let (edge_share, reference_share, stiffness) = match rule.model {
             ContactModel::Penalty => {
                 // Half a horizon of each material, one after the other.
@@ -134,41 +141,68 @@ impl PairRule {
         self.radius.unwrap_or(self.edge_share * edge)
     }
 
-    /// Whether forces depend on velocities.
-    pub fn has_dissipation(&self) -> bool {
-        self.response.is_rough() || self.response.damping_ratio > 0.0
-    }
-
     /// The distance (m) at which points with these edges (m) begin to touch, `reference` (m) apart at the start.
     pub fn distance(&self, edges: [f64; 2], reference: f64) -> f64 {
         let distance = self.largest_distance(0.5 * (edges[0] + edges[1]));
         distance.min(self.reference_share * reference)
     }
 
-    /// What the first of two points feels of the second, if they touch. With the points exchanged, all forces have the
-    /// opposite sign to the bit.
-    pub fn touch<const D: usize>(
+    /// How much nearer (m) two points are than where they begin to touch, how far apart (m), and the way from the first to
+    /// the second (m).
+    fn overlap<const D: usize>(
         &self,
         first: &ContactPoint<D>,
         second: &ContactPoint<D>,
-    ) -> Option<Touch<D>> {
+    ) -> (f64, f64, [f64; D]) {
         let reference: [f64; D] = std::array::from_fn(|d| second.reference[d] - first.reference[d]);
         let place: [f64; D] = std::array::from_fn(|d| {
             reference[d] + (second.displacement[d] - first.displacement[d])
         });
         let apart = norm(place);
-        let overlap = self.distance([first.edge, second.edge], norm(reference)) - apart;
-        if overlap <= 0.0 || apart == 0.0 {
-            return None;
-        }
-        let normal = place.map(|component| component / apart);
-        let stiffness = match self.stiffness {
+        let distance = self.distance([first.edge, second.edge], norm(reference));
+        (distance - apart, apart, place)
+    }
+
+    /// The stiffness of a pair, N/m.
+    fn stiffness<const D: usize>(&self, first: &ContactPoint<D>, second: &ContactPoint<D>) -> f64 {
+        match self.stiffness {
             Stiffness::OfLayer(layer) => {
                 let edge = 0.5 * (first.edge + second.edge);
                 layer * edge.powi(D as i32 - 1)
             }
             Stiffness::OfVolumes(constant) => constant * (first.volume * second.volume),
-        };
+        }
+    }
+
+    /// What a pair demands of the step if it touches or will within a time (s), at the speed at which it approaches now.
+    pub fn demand<const D: usize>(
+        &self,
+        first: &ContactPoint<D>,
+        second: &ContactPoint<D>,
+        time: f64,
+    ) -> Option<Demand> {
+        let (overlap, apart, place) = self.overlap(first, second);
+        let velocity: [f64; D] = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);
+        let approach = dot(velocity, place) / apart;
+        let touches = overlap + time * approach.max(0.0) >= 0.0;
+        touches.then(|| {
+            let mass = first.mass * second.mass / (first.mass + second.mass);
+            self.response.demand(self.stiffness(first, second), mass)
+        })
+    }
+
+    /// The contact force of the second point on the first, if they touch. Exchanging the points flips every sign exactly.
+    pub fn touch<const D: usize>(
+        &self,
+        first: &ContactPoint<D>,
+        second: &ContactPoint<D>,
+    ) -> Option<Touch<D>> {
+        let (overlap, apart, place) = self.overlap(first, second);
+        if overlap <= 0.0 || apart == 0.0 {
+            return None;
+        }
+        let normal = place.map(|component| component / apart);
+        let stiffness = self.stiffness(first, second);
         let mass = first.mass * second.mass / (first.mass + second.mass);
         let velocity = std::array::from_fn(|d| first.velocity[d] - second.velocity[d]);
         Some(
@@ -192,8 +226,18 @@ impl Response {
         self.static_friction > 0.0 || self.kinetic_friction > 0.0
     }
 
-    /// What a point feels of something that it overlaps by so much (m), with a stiffness in N/m. `normal` points from it to
-    /// the other, `velocity` (m/s) is its own as the other sees it, and `mass` the reduced one of both, kg.
+    /// What a pair with this stiffness (N/m) and reduced mass (kg) demands of the step.
+    pub fn demand(&self, stiffness: f64, mass: f64) -> Demand {
+        let sticking = if self.is_rough() { STICKING } else { 0.0 };
+        let ratio = sticking.max(self.damping_ratio);
+        Demand {
+            stiffness,
+            damping: ratio * 2.0 * (stiffness * mass).sqrt(),
+        }
+    }
+
+    /// The contact force for an overlap (m) and a stiffness (N/m). `normal` points from the point to what it touches,
+    /// `velocity` (m/s) is that of the point relative to it, `mass` the reduced mass of both, kg.
     pub fn touch<const D: usize>(
         &self,
         stiffness: f64,
@@ -219,11 +263,6 @@ impl Response {
         } else {
             0.0
         };
-        let ratio = if self.is_rough() {
-            STICKING.max(self.damping_ratio)
-        } else {
-            self.damping_ratio
-        };
         Touch {
             repulsion: normal.map(|component| -repulsion * component),
             damping: normal.map(|component| -(pressure - repulsion) * component),
@@ -235,7 +274,6 @@ impl Response {
                 }
             }),
             energy: 0.5 * repulsion * overlap,
-            stiffness: stiffness * (libm::hypot(1.0, ratio) + ratio).powi(2),
             overlap,
         }
     }

@@ -6,9 +6,9 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use crate::comm::sum::ExactSum;
 use crate::dimension::Dimension;
 use crate::expression::Expression;
-use crate::problem::{self, Body, RigidMotion};
+use crate::problem::{self, Block, RigidMotion};
 
-use super::pair::{ContactPoint, Response, Touch, whole};
+use super::pair::{ContactPoint, Demand, Response, Touch, whole};
 use super::shape::{distance, inertia};
 
 /// Numbers of a [`Wrench`].
@@ -17,7 +17,7 @@ const WRENCH: usize = 6;
 /// A force (N) and its torque about the centre (N m).
 type Wrench = [f64; WRENCH];
 
-/// What of a rigid body changes; the same on all ranks.
+/// The state of a rigid body; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RigidState {
@@ -48,6 +48,8 @@ pub struct RigidState {
 #[derive(Debug)]
 pub(super) struct RigidBody {
     problem: problem::Rigid,
+    /// Its centre at the start, m.
+    start: [f64; 3],
     dimension: Dimension,
     pub state: RigidState,
     /// 0 for a driven one, kg.
@@ -87,9 +89,14 @@ impl RigidBody {
     }
 
     /// At the start of a run.
-    pub fn new(problem: &problem::Rigid, dimension: Dimension, bodies: &[&Body]) -> Self {
+    pub fn new(problem: &problem::Rigid, dimension: Dimension, blocks: &[Block<'_>]) -> Self {
+        let mut start = problem.centre;
         let (mass, velocity, spin) = match &problem.motion {
-            RigidMotion::Driven(_) => (0.0, [0.0; 3], [0.0; 3]),
+            RigidMotion::Driven(displacement) => {
+                let moved = Self::values(displacement, 0.0);
+                start = std::array::from_fn(|d| start[d] + moved[d]);
+                (0.0, [0.0; 3], [0.0; 3])
+            }
             RigidMotion::Free {
                 mass,
                 velocity,
@@ -99,19 +106,20 @@ impl RigidBody {
         };
         let moments = mass.max(f64::MIN_POSITIVE) * inertia(&problem.shape, dimension.count());
         let inverse = moments.try_inverse().unwrap_or_else(Matrix3::identity);
-        let layer = |body: &&Body| {
+        let layer = |block: &Block<'_>| {
             // Half a horizon of the points' material.
             let modulus = problem
                 .rule
                 .stiffness
-                .unwrap_or(body.material.elastic.youngs_modulus);
-            2.0 * modulus * dimension.out_of_plane_measure() / body.horizon
+                .unwrap_or(block.body.material.elastic.youngs_modulus);
+            2.0 * modulus * dimension.out_of_plane_measure() / block.horizon
         };
         Self {
             problem: problem.clone(),
+            start,
             dimension,
             state: RigidState {
-                position: problem.centre,
+                position: start,
                 velocity,
                 rotation: [0.0, 0.0, 0.0, 1.0],
                 angular_momentum: (moments * Vector3::from(spin)).into(),
@@ -120,7 +128,7 @@ impl RigidBody {
             mass,
             inertia: [moments, inverse],
             response: Response::new(&problem.rule),
-            layers: bodies.iter().map(layer).collect(),
+            layers: blocks.iter().map(layer).collect(),
         }
     }
 
@@ -130,7 +138,7 @@ impl RigidBody {
         )))
     }
 
-    /// ω for an angular momentum, with the axes turned so.
+    /// The angular velocity (1/s) at the present angular momentum with this rotation.
     fn angular_velocity(&self, rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
         if self.mass == 0.0 {
             return Vector3::zeros();
@@ -175,8 +183,8 @@ impl RigidBody {
                 }
                 // The midpoint rule: angular momentum stays, and so does energy to second order.
                 let rotation = self.rotation();
-                let middle = turned(&rotation, self.angular_velocity(&rotation), 0.5 * step);
-                let new = turned(&rotation, self.angular_velocity(&middle), step);
+                let middle = rotated(&rotation, self.angular_velocity(&rotation), 0.5 * step);
+                let new = rotated(&rotation, self.angular_velocity(&middle), step);
                 self.state.rotation = new.coords.into();
             }
         }
@@ -192,7 +200,8 @@ impl RigidBody {
         }
     }
 
-    /// Takes note of what points exert after a step (s) that has come to a time (s), and makes the second half kick.
+    /// Ends a step (s) that has come to a time (s): stores what points exert, books its work, and makes the second half
+    /// kick.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
@@ -227,11 +236,6 @@ impl RigidBody {
         (apart, rotation.transform_vector(&normal))
     }
 
-    /// Whether a point touches the body.
-    pub fn touches<const D: usize>(&self, point: &ContactPoint<D>) -> bool {
-        self.overlap(point).0 > 0.0
-    }
-
     /// How much nearer (m) a point is to the surface than where it begins to touch, and the normal there. It touches at half
     /// the edge of its cell, or as near as it began.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
@@ -248,7 +252,7 @@ impl RigidBody {
 
     /// How far (m) a place is from the surface at the start, negative inside.
     pub fn start_distance(&self, place: [f64; 3]) -> f64 {
-        let seen = Vector3::from(place) - Vector3::from(self.problem.centre);
+        let seen = Vector3::from(place) - Vector3::from(self.start);
         distance(&self.problem.shape, seen, self.dimension.count()).0
     }
 
@@ -258,16 +262,11 @@ impl RigidBody {
         if overlap <= 0.0 {
             return None;
         }
-        let stiffness = self.layers[block] * point.edge.powi(D as i32 - 1);
-        let mass = if self.mass > 0.0 {
-            point.mass * self.mass / (point.mass + self.mass)
-        } else {
-            point.mass
-        };
+        let stiffness = self.point_stiffness(block, point);
+        let mass = self.reduced(point.mass);
         let (place, velocity) = (point.place(), point.velocity);
-        let spin = self.angular_velocity(&self.rotation());
         let arm = Vector3::from(place) - Vector3::from(self.state.position);
-        let surface = Vector3::from(self.state.velocity) + spin.cross(&arm);
+        let surface = self.surface_velocity(arm);
         let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
         // Out of the point, as between points.
         let normal = std::array::from_fn(|d| -normal[d]);
@@ -277,13 +276,18 @@ impl RigidBody {
         )
     }
 
-    /// Adds the opposite of what a point at a place (m) feels. Returns how far it is from the centre, m.
+    /// How far a place (m) is from the centre, m.
+    pub fn arm(&self, place: [f64; 3]) -> f64 {
+        (Vector3::from(place) - Vector3::from(self.state.position)).norm()
+    }
+
+    /// Adds the opposite of what a point at a place (m) feels.
     pub fn add_opposite<const D: usize>(
         &self,
         sums: &mut WrenchSums,
         place: [f64; 3],
         touch: &Touch<D>,
-    ) -> f64 {
+    ) {
         let arm = Vector3::from(place) - Vector3::from(self.state.position);
         let all: [f64; D] =
             std::array::from_fn(|d| touch.repulsion[d] + touch.damping[d] + touch.friction[d]);
@@ -296,22 +300,78 @@ impl RigidBody {
                 sums[3 + d].add(torque[d]);
             }
         }
-        arm.norm()
     }
 
-    /// What its acceleration adds to the bound of the frequencies, for a sum of stiffnesses (N/m): 2 Σ k (1/m + r²/I) at
-    /// most, with the distance r of the touching points (m).
-    pub fn stiffness(&self, sum: f64, reach: f64) -> f64 {
+    /// What a point demands of the step if it touches the body or will within a time (s), at the speed at which it
+    /// approaches now.
+    pub fn demand<const D: usize>(
+        &self,
+        block: usize,
+        point: &ContactPoint<D>,
+        time: f64,
+    ) -> Option<Demand> {
+        let (apart, normal) = self.surface(point.place());
+        let arm = Vector3::from(point.place()) - Vector3::from(self.state.position);
+        let velocity = Vector3::from(whole(point.velocity)) - self.surface_velocity(arm);
+        let approach = -velocity.dot(&normal);
+        let touches = apart - time * approach.max(0.0) <= 0.5 * point.edge;
+        touches.then(|| {
+            self.response
+                .demand(self.point_stiffness(block, point), self.reduced(point.mass))
+        })
+    }
+
+    fn point_stiffness<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> f64 {
+        self.layers[block] * point.edge.powi(D as i32 - 1)
+    }
+
+    /// The reduced mass of the body and a point, kg.
+    fn reduced(&self, mass: f64) -> f64 {
+        if self.mass > 0.0 {
+            mass * self.mass / (mass + self.mass)
+        } else {
+            mass
+        }
+    }
+
+    /// The velocity (m/s) of the surface at a place seen from the centre (m).
+    fn surface_velocity(&self, arm: Vector3<f64>) -> Vector3<f64> {
+        let spin = self.angular_velocity(&self.rotation());
+        Vector3::from(self.state.velocity) + spin.cross(&arm)
+    }
+
+    /// 1/m + r²/I at most, for points that touch it within a distance r (m) of its centre, 1/kg; 0 for a driven body.
+    pub fn mobility(&self, reach: f64) -> f64 {
         if self.mass == 0.0 {
             return 0.0;
         }
-        let inverse = self.inertia[1].diagonal().max();
-        2.0 * sum * (1.0 / self.mass + reach * reach * inverse)
+        let inverse = &self.inertia[1];
+        let largest = if self.dimension.count() == 2 {
+            inverse[(2, 2)]
+        } else {
+            // No eigenvalue is larger than the largest sum of a row.
+            let rows = inverse
+                .row_iter()
+                .map(|row| row.iter().map(|entry| entry.abs()).sum::<f64>());
+            rows.fold(0.0, f64::max)
+        };
+        1.0 / self.mass + reach * reach * largest
+    }
+
+    /// Whether all that is known of its motion is finite.
+    pub fn is_finite(&self) -> bool {
+        let RigidState {
+            position, velocity, ..
+        } = &self.state;
+        position
+            .iter()
+            .chain(velocity)
+            .all(|value| value.is_finite())
     }
 }
 
-/// Turned on with an angular velocity (1/s) for a time (s).
-fn turned(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
+/// A rotation followed by that of an angular velocity (1/s) in a time (s).
+fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
     // (1 + ½ Δt ω) q: the angle is right to third order, and needs no sine.
     let turn = Quaternion::from_parts(1.0, half);

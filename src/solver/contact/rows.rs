@@ -26,7 +26,7 @@ pub(super) struct FoundPair {
 }
 
 impl Rows {
-    /// Rows of so many points, those of each found by `find`. Which pairs are bonded is still to be said.
+    /// The candidates of so many points, each found by `find`. All pairs start unbonded.
     pub fn new(points: usize, find: impl Fn(usize, &mut Vec<FoundPair>) + Sync) -> Self {
         let chunks = points.div_ceil(CHUNK);
         let chunks: Vec<(Vec<usize>, Vec<FoundPair>)> = (0..chunks)
@@ -71,7 +71,7 @@ impl Rows {
         self.is_bonded[row].contains(&false)
     }
 
-    /// Whether a bond may join an owned point to one of its row.
+    /// Whether an owned point has no candidates.
     pub fn is_empty(&self, point: usize) -> bool {
         self.starts[point] == self.starts[point + 1]
     }

@@ -43,7 +43,7 @@ pub(super) fn distance(
     }
 }
 
-/// Distance and normal of a place that lies so far (m) beyond faces, which are at right angles to one another.
+/// Distance and normal from the signed distances (m) to faces at right angles to one another.
 fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     let faces = beyond.iter().zip(normals);
     let outer: Vector3<f64> = faces

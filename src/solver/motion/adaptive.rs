@@ -91,7 +91,9 @@ impl<const D: usize> Simulation<'_, D> {
         loop {
             // The stage ends where it must.
             let left = self.clock.end() - self.clock.time();
-            let limit = self.contact_limit().unwrap_or(f64::INFINITY);
+            let felt = self.contact.as_ref().filter(|contact| contact.is_felt());
+            let limit = felt.and_then(|_| self.contact_limit());
+            let limit = limit.unwrap_or(f64::INFINITY);
             let wanted = self.step_control.step.min(limit);
             let is_last = left > 0.0 && left < (1.0 + UP_TO_ROUNDING) * wanted;
             let size = if is_last { left } else { wanted };

@@ -145,7 +145,7 @@ fields! {
         output: Some(Field::Velocity),
         ..STATE
     };
-    /// What bonds exert, N/m³.
+    /// Internal force density of bonds and contact, N/m³.
     internal_force: [Vec<f64>; D] = Description {
         name: "internal_force",
         output: Some(Field::ForceDensity),

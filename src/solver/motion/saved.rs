@@ -5,7 +5,7 @@
 use crate::comm::{IdOrder, agree};
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
-use crate::solver::contact::{Contact, RigidState};
+use crate::solver::contact::ContactState;
 use crate::solver::refinement::Refined;
 
 use super::Clock;
@@ -55,14 +55,10 @@ impl<const D: usize> Simulation<'_, D> {
         let changes = self.problem.changes_density_scale();
         let scaled = changes.then(|| self.density_scale_energy.to_bits());
         let refined = refined.chain(scaled);
-        let rigid: Vec<RigidState> = self
-            .contact
-            .iter()
-            .flat_map(Contact::rigid_states)
-            .collect();
-        let rigid = bytemuck::cast_slice::<_, u64>(&rigid).to_vec();
+        let contact = self.contact.iter();
+        let contact = contact.flat_map(|contact| contact.state().words());
         let progress = times.chain(refined).chain(self.load_step.words());
-        progress.chain(rigid).collect()
+        progress.chain(contact).collect()
     }
 
     /// Goes back to what [`Self::progress`] gave.
@@ -72,7 +68,7 @@ impl<const D: usize> Simulation<'_, D> {
         let (steps, rest) = rest.split_at(STEP_CONTROL);
         let (refined, rest) = rest.split_at(REFINED);
         let (scaled, rest) = rest.split_at(usize::from(self.problem.changes_density_scale()));
-        let (load_step, rigid) = rest.split_at(LOAD_STEP);
+        let (load_step, contact_words) = rest.split_at(LOAD_STEP);
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
@@ -81,7 +77,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.density_scale_energy = scaled.first().copied().map_or(0.0, f64::from_bits);
         self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
         if let Some(contact) = &mut self.contact {
-            contact.set_rigid_states(bytemuck::cast_slice(rigid).iter().copied());
+            contact.set_state(&ContactState::of_words(contact_words));
         }
     }
 
@@ -149,7 +145,6 @@ impl<const D: usize> Simulation<'_, D> {
             let values = order.spread(self.comm, saved, 1);
             column[..values.len()].copy_from_slice(&values);
         }
-        self.contact.iter_mut().for_each(Contact::set_stale);
         self.continue_from(&saved.progress);
         self.recompute_derived();
         Ok(())

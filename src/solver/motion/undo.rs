@@ -2,7 +2,7 @@
 
 use crate::solver::Simulation;
 use crate::solver::bonds::KeptBonds;
-use crate::solver::contact::{Contact, RigidState};
+use crate::solver::contact::{Contact, ContactState};
 
 use super::Clock;
 
@@ -12,7 +12,7 @@ pub struct Kept {
     clock: Option<Clock>,
     fields: Vec<Vec<f64>>,
     bonds: KeptBonds,
-    rigid: Vec<RigidState>,
+    contact: Option<ContactState>,
 }
 
 impl<const D: usize> Simulation<'_, D> {
@@ -30,9 +30,7 @@ impl<const D: usize> Simulation<'_, D> {
             })
             .collect();
         self.forces.keep(&mut kept.bonds);
-        kept.rigid.clear();
-        kept.rigid
-            .extend(self.contact.iter().flat_map(Contact::rigid_states));
+        kept.contact = self.contact.as_ref().map(Contact::state);
     }
 
     /// Goes back to the state that was noted last; to make the same steps again gives the same bits.
@@ -45,9 +43,8 @@ impl<const D: usize> Simulation<'_, D> {
             column.copy_from_slice(kept);
         }
         self.forces.undo(&kept.bonds);
-        if let Some(contact) = &mut self.contact {
-            contact.set_stale();
-            contact.set_rigid_states(kept.rigid.iter().copied());
+        if let (Some(contact), Some(state)) = (&mut self.contact, &kept.contact) {
+            contact.set_state(state);
         }
         // Loads know their values at the present time.
         self.apply_loads(clock.time(), true);

@@ -1,5 +1,5 @@
-//! Contact is not computed: bodies that no bond joins go through one another. This finds whether points
-//! of such bodies have come nearer than their spacing, so that the user is told.
+//! Runs without `[contact]`: bodies that no bond joins go through one another. This finds whether points of such bodies
+//! have come nearer than their spacing, so that the user is told.
 //!
 //! Where the boxes around two bodies meet, their points are dealt out to the ranks by cells of space, the
 //! points of one body to all cells that they may meet others in; so each rank compares a part.
