@@ -34,7 +34,7 @@ fn history<const D: usize>(deck: &str, every: u64, names: &[&str]) -> Vec<Vec<f6
 fn bars(contact: &str) -> String {
     format!(
         "dimension = '1d'
-        grid = {{ spacing = 1e-3, horizon = 3.015e-3 }}
+        grid = {{ spacing = 5e-4, horizon = 1.5075e-3 }}
         material.steel.pmb = {{ density = 8000, youngs_modulus = 200e9 }}
         contact = {{ pair.hit.bodies = ['left', 'right'], {contact} }}
         body.left = {{ material = 'steel', shape.box = {{ lower = [0], upper = [0.1] }} }}
