@@ -402,7 +402,9 @@ fn steps_become_shorter_before_stiff_contact_and_longer_again() {
     );
     let last = rows.last().unwrap();
     assert!((last[0] - 150e-6).abs() < 1e-17, "{last:?}");
-    assert!((last[2] / rows[0][1]).abs() < 0.02, "{last:?}");
+    // Points that hit each other within a step too long gained twelve times the energy. At the limit of stability, contact
+    // that opens and closes costs some per cent.
+    assert!((last[2] / rows[0][1]).abs() < 0.05, "{last:?}");
 }
 
 #[test]
