@@ -645,7 +645,7 @@ impl Reader {
         if is_instance {
             let all = [placed.first_element, placed.first_element + count];
             let all = Runs::union([(&[all][..], 0)].into_iter());
-            self.add_group(&placed.name, Of::Elements, all);
+            self.add_group(&placed.name, "instance", Members::Elements(all));
         }
         self.placed.push(placed);
         let own = self.placed.len() - 1;
@@ -667,19 +667,24 @@ impl Reader {
             } else {
                 name
             };
-            self.add_group(&name, key.0, members);
+            self.add_set(&name, key.0, members);
         }
         Ok(())
     }
 
-    fn add_group(&mut self, name: &str, of: Of, members: Runs) {
+    fn add_set(&mut self, name: &str, of: Of, members: Runs) {
+        match of {
+            Of::Nodes => self.add_group(name, "node set", Members::Nodes(members)),
+            Of::Elements => self.add_group(name, "element set", Members::Elements(members)),
+        }
+    }
+
+    fn add_group(&mut self, name: &str, kind: &'static str, members: Members) {
         self.mesh.groups.push(Group {
             name: Some(name.to_owned()),
             number: None,
-            members: match of {
-                Of::Nodes => Members::Nodes(members),
-                Of::Elements => Members::Elements(members),
-            },
+            kind,
+            members,
         });
     }
 
@@ -857,7 +862,7 @@ impl Reader {
         for (of, name, all) in unions {
             if !taken.contains(&(of, name.to_ascii_uppercase())) {
                 let members = Runs::union(all.iter().map(|runs| (runs.ranges(), 0)));
-                self.add_group(&name, of, members);
+                self.add_set(&name, of, members);
             }
         }
     }

@@ -446,6 +446,12 @@ impl File<'_> {
             self.mesh.groups.push(Group {
                 name: self.names.get(&key).cloned(),
                 number: Some(key.1),
+                kind: match key.0 {
+                    0 => "point",
+                    1 => "curve",
+                    2 => "surface",
+                    _ => "volume",
+                },
                 members: Members::Elements(elements),
             });
         }

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
-use crate::mesh::{self, Format, GroupKey, Members, Mesh, Runs};
+use crate::mesh::{self, Format, Group, GroupKey, Members, Mesh, Runs};
 use crate::problem::{PointSource, Problem, Selector};
 
 use super::Point;
@@ -152,25 +152,26 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     are_apart(&mesh, &points, &point_of)?;
     let dimension = problem.dimension.count();
     let mut marks = vec![false; mesh.nodes.len()];
-    let mut set = |selector: &Selector| {
-        let Selector::Mesh(set) = selector else {
-            return None;
+    let mut sets = Vec::with_capacity(problem.sets.len());
+    for entry in &problem.sets {
+        let Selector::Mesh(set) = &entry.selector else {
+            sets.push(None);
+            continue;
         };
-        let group = mesh.find(&set.group, dimension)?;
-        Some(members(
-            &mesh,
-            &group.members,
-            &point_of,
-            dimension,
-            &mut marks,
-        ))
-    };
+        let group = mesh
+            .find(&set.group, |group| mesh.dimension(group) <= dimension)
+            .map_err(|message| {
+                let message = format!("[set.{}] mesh: {message}", entry.name);
+                Error::input(message).at(&set.span)
+            })?;
+        let ids = |group: &Group| {
+            let group = &group.members;
+            members(&mesh, group, &point_of, dimension, &mut marks)
+        };
+        sets.push(group.map(ids));
+    }
     Ok(Found {
-        sets: problem
-            .sets
-            .iter()
-            .map(|entry| set(&entry.selector))
-            .collect(),
+        sets,
         names: mesh.names(|own| own <= dimension),
         points,
     })
@@ -183,15 +184,22 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
     let mut bodies = vec![NO_BODY; mesh.elements.len()];
     for user in users {
         let Some(block) = user.block else { continue };
-        let has_solids = |members: &Members| match members {
+        let has_solids = |group: &Group| match &group.members {
             Members::Elements(elements) => {
                 elements.iter().any(|element| is_solid(element as usize))
             }
             Members::Nodes(_) => false,
         };
-        let group = mesh
-            .find(block, dimension)
-            .filter(|group| has_solids(&group.members));
+        let ambiguous = |message: String| {
+            let body = &problem.bodies[user.body].name;
+            let message = format!("[body.{body}] points block: {message}");
+            Error::input(message).at(user.block_span)
+        };
+        let is_block = |group: &Group| group.kind != mesh::SIDE_SET && has_solids(group);
+        let group = match mesh.find(block, is_block).map_err(ambiguous)? {
+            Some(group) => Some(group),
+            None => mesh.find(block, has_solids).map_err(ambiguous)?,
+        };
         let Some(group) = group else {
             let known = mesh.names(|own| own == dimension);
             let message = format!(

@@ -660,6 +660,27 @@ fn groups_of_any_dimension_become_sets() {
 }
 
 #[test]
+fn the_kind_tells_groups_of_the_same_number_apart() {
+    let folder = Folder::new("kinds");
+    let mut written = two_cubes();
+    // The face between the cubes has the number of the second cube.
+    written.elements[1].1 = 2;
+    written.names.clear();
+    for (encoding, bytes) in written.all() {
+        let path = folder.write("two.msh", bytes);
+        let problem = solid(&path, &["surface 2", "volume 2"]);
+        points(&problem);
+        assert_eq!(ids(&problem, "surface 2"), [0, 1], "{encoding}");
+        assert_eq!(ids(&problem, "volume 2"), [1], "{encoding}");
+    }
+    let mesh = parse("two.msh", written.version_2(None)).unwrap();
+    let message = mesh.find(&GroupKey::Number(2), |_| true).unwrap_err();
+    assert!(message.contains("\"surface 2\", \"volume 2\""), "{message}");
+    let solids = mesh.find(&GroupKey::Number(2), |group| mesh.dimension(group) == 3);
+    assert_eq!(solids.unwrap().unwrap().kind, "volume");
+}
+
+#[test]
 fn a_block_may_be_a_number_and_a_body_without_one_gets_the_rest() {
     let folder = Folder::new("blocks");
     let path = folder.write("two.msh", two_cubes().version_2(None));
@@ -688,7 +709,7 @@ fn version_2_repeats_an_element_for_each_of_its_groups() {
     assert_eq!(points(&problem).len(), 2);
     assert_eq!(ids(&problem, "first"), [0]);
     let mesh = parse("two.msh", written.version_2(None)).unwrap();
-    let second = mesh.find(&GroupKey::Number(2), 3).unwrap();
+    let second = mesh.find(&GroupKey::Number(2), |_| true).unwrap().unwrap();
     let Members::Elements(elements) = &second.members else {
         panic!("a group of elements");
     };
@@ -1188,7 +1209,7 @@ fn an_unstructured_grid_is_read_in_any_encoding() {
         assert_eq!(ids(&problem, "material=5"), [1], "{way:?}");
         assert_eq!(ids(&problem, "left=1"), [0], "{way:?}");
         let mesh = parse("two.vtu", unstructured(way)).unwrap();
-        assert!(mesh.find(&GroupKey::Number(4), 3).is_some());
+        assert!(mesh.find(&GroupKey::Number(4), |_| true).unwrap().is_some());
     }
 }
 
