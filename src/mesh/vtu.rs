@@ -6,7 +6,7 @@ use std::path::Path;
 use flate2::read::ZlibDecoder;
 use indexmap::IndexMap;
 use roxmltree::{Document, Node};
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::kind::{Form, Kind};
 use super::{Group, Members, Mesh, Runs, fault, measure, position};
@@ -98,11 +98,16 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     };
     let mut mesh = Mesh::default();
     mesh.elements.continue_in(path);
-    let mut groups = IndexMap::new();
+    let mut groups = Groups::new();
     let pieces = root.descendants().filter(|node| node.has_tag_name("Piece"));
     for piece in pieces {
         file.read_piece(piece, &mut mesh, &mut groups)?;
     }
+    let mut counts: FxHashMap<(bool, String), usize> = FxHashMap::default();
+    for (of_nodes, array, _) in groups.keys() {
+        *counts.entry((*of_nodes, array.clone())).or_default() += 1;
+    }
+    groups.retain(|(of_nodes, array, _), _| counts[&(*of_nodes, array.clone())] <= MOST_GROUPS);
     let arrays: FxHashSet<&String> = groups
         .keys()
         .filter(|(of_nodes, ..)| !of_nodes)
@@ -282,6 +287,12 @@ impl File<'_> {
         for value in &values {
             different.insert(*value);
             if different.len() > MOST_GROUPS {
+                // One empty group more than the limit: all groups of the array are removed in the end.
+                for value in different {
+                    groups
+                        .entry((of_nodes, name.to_owned(), value))
+                        .or_default();
+                }
                 return Ok(());
             }
         }

@@ -1214,6 +1214,45 @@ fn an_unstructured_grid_is_read_in_any_encoding() {
 }
 
 #[test]
+fn an_array_of_many_values_in_all_pieces_has_no_groups() {
+    // A piece of vertices with the values of a range.
+    let piece = |values: std::ops::Range<usize>| {
+        let count = values.len();
+        let join = |numbers: Vec<usize>| {
+            let words: Vec<String> = numbers.iter().map(usize::to_string).collect();
+            words.join(" ")
+        };
+        let array = |name: &str, numbers: Vec<usize>| {
+            let numbers = join(numbers);
+            format!(
+                "<DataArray type=\"Int64\" Name=\"{name}\" format=\"ascii\">{numbers}</DataArray>"
+            )
+        };
+        format!(
+            "<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\
+             <Points><DataArray type=\"Int64\" NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points>\
+             <Cells>{}{}{}</Cells><CellData>{}</CellData></Piece>",
+            join(vec![0; 3 * count]),
+            array("connectivity", (0..count).collect()),
+            array("offsets", (1..=count).collect()),
+            array("types", vec![1; count]),
+            array("id", values.collect()),
+        )
+    };
+    let groups = |pieces: &[std::ops::Range<usize>]| {
+        let pieces: String = pieces.iter().cloned().map(piece).collect();
+        let text = format!(
+            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{pieces}</UnstructuredGrid></VTKFile>"
+        );
+        parse("a.vtu", text).unwrap().groups.len()
+    };
+    assert_eq!(groups(&[0..600, 400..1000]), 1000);
+    assert_eq!(groups(&[0..600, 401..1001]), 0);
+    assert_eq!(groups(&[0..2, 0..1001]), 0);
+    assert_eq!(groups(&[0..1001, 0..2]), 0);
+}
+
+#[test]
 fn cells_of_vtk_have_their_types() {
     for (kind, points, expected) in [
         (8, "0 1 3 2", 1.0),
