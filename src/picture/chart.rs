@@ -42,6 +42,9 @@ const MARGIN: f64 = 0.04;
 /// Height of the picture as a share of its width.
 const HEIGHT: f64 = 0.62;
 
+/// Edge of the marker of an isolated point, in thicknesses.
+const MARKER: f64 = 5.0;
+
 /// Distance in pixels within which points of a curve are drawn as one.
 const RESOLUTION: f64 = 0.3;
 
@@ -59,7 +62,7 @@ pub struct Label<'a> {
 pub struct Series {
     /// Name for the legend.
     pub name: String,
-    /// The points; one that is not finite breaks the curve.
+    /// The points; one that is not finite breaks the curve, and an isolated one is drawn as a marker.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -108,6 +111,12 @@ enum Shape {
 }
 
 impl Chart<'_> {
+    /// Whether there is a point to draw.
+    pub fn has_points(&self) -> bool {
+        let mut all = self.series.iter().flat_map(|series| &series.points);
+        all.any(|point| point.iter().all(|number| number.is_finite()))
+    }
+
     /// Draw the chart as pixels.
     pub fn image(&self) -> Image {
         let lettering = Lettering::new();
@@ -331,15 +340,17 @@ impl Chart<'_> {
             .iter()
             .map(|series| reduced(series.points.iter().map(|point| pixel(*point))))
             .collect();
-        // Curves run over the legend, so that it hides none.
+        for (number, parts) in curves.iter().enumerate() {
+            for points in parts {
+                match points[..] {
+                    [point] => mark(&mut shapes, point, number, MARKER * thickness),
+                    _ => stroke(&mut shapes, points, number, 1.8 * thickness),
+                }
+            }
+        }
         if self.series.len() > 1 {
             let drawn: Vec<[f64; 2]> = curves.iter().flatten().flatten().copied().collect();
             self.legend(&mut shapes, lettering, (columns, rows, text), &drawn);
-        }
-        for (number, parts) in curves.iter().enumerate() {
-            for points in parts {
-                stroke(&mut shapes, points, number, 1.8 * thickness);
-            }
         }
         shapes
     }
@@ -433,6 +444,7 @@ fn reduced(pixels: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
             curve.push(pixel);
         }
     }
+    curves.retain(|curve| !curve.is_empty());
     curves
 }
 
@@ -448,6 +460,16 @@ fn stroke(shapes: &mut Vec<Shape>, points: &[[f64; 2]], number: usize, thickness
         thickness,
         colour,
     }));
+}
+
+/// Draw a square at an isolated point, in the colour of its curve.
+fn mark(shapes: &mut Vec<Shape>, point: [f64; 2], number: usize, size: f64) {
+    let [columns, rows] = point.map(|centre| [centre - size / 2.0, centre + size / 2.0]);
+    shapes.push(Shape::Rectangle {
+        columns,
+        rows,
+        colour: COLOURS[number % COLOURS.len()],
+    });
 }
 
 /// The dashes of a curve, of alternating lengths of dash and gap.
@@ -569,6 +591,20 @@ mod tests {
             assert!(svg.contains(words), "{words}: {svg}");
         }
         assert!(!chart(&series[..1]).svg().contains(">one<"));
+    }
+
+    #[test]
+    fn isolated_points_have_markers_and_the_legend_covers_curves() {
+        let single = [series("one", &[[1.0, 2.0]])];
+        assert!(chart(&single).has_points());
+        assert!(pixels(&chart(&single).image(), COLOURS[0]).len() >= 9);
+        let none = [series("none", &[[1.0, f64::NAN], [f64::INFINITY, 0.0]])];
+        assert!(!chart(&none).has_points());
+        // A curve crosses all corners of the frame: its part below the legend is hidden.
+        let corners = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
+        let svg = chart(&[series("a", &corners), series("b", &[])]).svg();
+        let curve = svg.find(&hexadecimal(COLOURS[0])).unwrap();
+        assert!(svg.rfind("fill=\"#ffffff\"").unwrap() > curve, "{svg}");
     }
 
     #[test]
