@@ -300,14 +300,14 @@ impl Reader {
         let name = &keyword.name[..];
         if GENERATORS.contains(&name) {
             let message =
-                format!("*{name} is not known here; write the mesh with all nodes and elements");
+                format!("*{name} is not supported; write the mesh with all nodes and elements");
             return Err(self.fault(message));
         }
         match name {
             "NODE" => {
                 let system = keyword.get("SYSTEM").unwrap_or("R");
                 if !system.eq_ignore_ascii_case("R") {
-                    return Err(self.fault("*NODE: only Cartesian coordinates are known"));
+                    return Err(self.fault("*NODE: coordinates must be Cartesian"));
                 }
                 let set = keyword.get("NSET");
                 let set = set.map(|set| self.begin_set(Of::Nodes, set, keyword));
@@ -317,8 +317,8 @@ impl Reader {
                 let written = keyword.get("TYPE").unwrap_or_default().to_ascii_uppercase();
                 let Some(kind) = kind(&written) else {
                     let message = format!(
-                        "element type {} is not known; solids, planes, shells and lines of first and second \
-                         order are",
+                        "element type {} is not supported; use solids, planes, shells or lines of first or \
+                         second order",
                         excerpt(&written)
                     );
                     return Err(self.fault(message));

@@ -127,7 +127,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         };
         let Some(kind) = kind(&written, each) else {
             let message = format!(
-                "block {name}: elements {} with {each} nodes are not known",
+                "block {name}: elements {} with {each} nodes are not supported",
                 excerpt(&written)
             );
             return Err(message);

@@ -315,7 +315,7 @@ impl Mesh {
 /// The end of a message on an unknown name: the nearest of the known ones, and some of them.
 pub fn suggestion(key: &GroupKey, known: &[String]) -> String {
     if known.is_empty() {
-        return "; the mesh has none".to_owned();
+        return "; the mesh has no such groups".to_owned();
     }
     let near = match key {
         GroupKey::Name(name) => nearest(name, known.iter().map(String::as_str)),

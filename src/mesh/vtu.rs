@@ -84,7 +84,10 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     }
     let compressor = root.attribute("compressor").filter(|name| !name.is_empty());
     if let Some(name) = compressor.filter(|name| *name != "vtkZLibDataCompressor") {
-        return Err(format!("is compressed by {}; zlib is known", excerpt(name)));
+        return Err(format!(
+            "is compressed by {}; use zlib or no compression",
+            excerpt(name)
+        ));
     }
     let file = File {
         is_big: root.attribute("byte_order") == Some("BigEndian"),
@@ -205,7 +208,7 @@ impl File<'_> {
         for (cell, (end, number)) in offsets.iter().zip(&types).enumerate() {
             let Some((kind, order)) = kind(*number) else {
                 let message = format!(
-                    "cell {cell}: type {number} of VTK is not known here; first- and second-order cells are"
+                    "cell {cell}: VTK cell type {number} is not supported; use first- or second-order cells"
                 );
                 return Err(message);
             };
@@ -215,7 +218,7 @@ impl File<'_> {
             let nodes = end.and_then(|end| connectivity.get(start..end));
             let Some(nodes) = nodes.filter(|nodes| nodes.len() == kind.nodes) else {
                 let message = format!(
-                    "cell {cell}: must have {} points, offsets from {start} on say otherwise",
+                    "cell {cell}: its entries of `offsets` and `connectivity`, from {start} on, must give {} points",
                     kind.nodes
                 );
                 return Err(message);

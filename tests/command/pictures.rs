@@ -123,7 +123,7 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
         (["-o", "movie"], "the file must end in .png"),
         (["--field", "damage"], "has no field `damage` (known: "),
         (["--component", "von_misses"], "did you mean `von_mises`?"),
-        (["--range", "5%,4%"], "LOW below HIGH"),
+        (["--range", "5%,4%"], "LOW must be below HIGH"),
         (["--x", "time"], "--x is for curves"),
     ] {
         expect(&plot(&options), 2, &[words]);

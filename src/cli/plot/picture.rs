@@ -567,7 +567,7 @@ fn range(text: &str) -> Result<Range> {
     };
     if low >= high {
         return Err(Error::input(format!(
-            "{wanted} with LOW below HIGH, is `{text}`"
+            "--range {text}: LOW must be below HIGH"
         )));
     }
     if !percentiles {
