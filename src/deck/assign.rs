@@ -76,7 +76,7 @@ pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
                 *old.decor_mut() = decor;
             }
             Some(_) => {
-                let message = format!("`{key}` is a section; name one of its keys, as {key}.KEY");
+                let message = format!("`{key}` is a section; set one of its keys: {key}.KEY=VALUE");
                 return Err(wrong(message));
             }
             None => {
@@ -151,7 +151,7 @@ mod tests {
         for (key, message) in [
             ("a.b", "--set a.b=1: `a` is a value, not a section"),
             ("stage.end", "`stage` is a list; change its entries"),
-            ("e", "`e` is a section; name one of its keys, as e.KEY"),
+            ("e", "`e` is a section; set one of its keys: e.KEY=VALUE"),
             ("e..f", "is not a key"),
         ] {
             let error = assigned(deck, key, "1").unwrap_err();

@@ -532,7 +532,10 @@ impl<'a> Cursor<'a> {
                 Ok(Some(name))
             }
             None => {
-                let message = format!("must be a section such as `$Nodes`, is {}", excerpt(word));
+                let message = format!(
+                    "a section such as `$Nodes` must begin here, found {}",
+                    excerpt(word)
+                );
                 Err(self.fault(message))
             }
         }
