@@ -45,6 +45,9 @@ const HEIGHT: f64 = 0.62;
 /// Edge of the marker of an isolated point, in thicknesses.
 const MARKER: f64 = 5.0;
 
+/// Places on a line at which the legend looks for it.
+const LINE_SAMPLES: usize = 32;
+
 /// Distance in pixels within which points of a curve are drawn as one.
 const RESOLUTION: f64 = 0.3;
 
@@ -349,7 +352,18 @@ impl Chart<'_> {
             }
         }
         if self.series.len() > 1 {
-            let drawn: Vec<[f64; 2]> = curves.iter().flatten().flatten().copied().collect();
+            // Lines between distant points count as well.
+            let step = |ends: &[[f64; 2]], k: usize| {
+                let share = k as f64 / LINE_SAMPLES as f64;
+                [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))
+            };
+            let mut drawn = Vec::new();
+            for points in curves.iter().flatten() {
+                for ends in points.windows(2) {
+                    drawn.extend((0..LINE_SAMPLES).map(|k| step(ends, k)));
+                }
+                drawn.extend(points.last());
+            }
             self.legend(&mut shapes, lettering, (columns, rows, text), &drawn);
         }
         shapes
@@ -603,6 +617,14 @@ mod tests {
         // A curve crosses all corners of the frame: its part below the legend is hidden.
         let corners = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
         let svg = chart(&[series("a", &corners), series("b", &[])]).svg();
+        // The legend leaves the corner at the top right, which only the line between two points crosses.
+        let line = chart(&[series("a", &[[0.0, 0.0], [1.0, 1.0]]), series("b", &[])]).svg();
+        let box_left = |svg: &str| -> f64 {
+            let end = svg.rfind("fill=\"#ffffff\"").unwrap();
+            let start = svg[..end].rfind("x=\"").unwrap() + 3;
+            svg[start..].split('"').next().unwrap().parse().unwrap()
+        };
+        assert!(box_left(&line) < 300.0, "{line}");
         let curve = svg.find(&hexadecimal(COLOURS[0])).unwrap();
         assert!(svg.rfind("fill=\"#ffffff\"").unwrap() > curve, "{svg}");
     }
