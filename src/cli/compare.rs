@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use fissure::error::{Error, Result};
+use fissure::error::{Error, ErrorKind, Result};
 use fissure::message::suggestion;
 use fissure::output::ResultReader;
 use fissure::output::compare::{Comparison, Difference, Place, compare};
@@ -27,7 +27,7 @@ Examples:
   fissure compare out/a out/b --tolerance rank=inf         do not compare the field `rank`
   fissure compare -q out/new out/old || echo different     in scripts
 
-Exit codes: 0 equal within the tolerance, 1 different, 2 the arguments are wrong.")]
+Exit codes: 0 equal within the tolerance, 1 different, 2 the arguments are wrong or a file cannot be read.")]
 pub struct CompareArguments {
     /// The first result: a .vtkhdf file or its folder.
     #[arg(value_name = "A")]
@@ -39,8 +39,6 @@ pub struct CompareArguments {
 
     /// Largest allowed difference relative to the largest value of a field in A, or of one field or
     /// column with NAME=VALUE; may be repeated [default: 0, equal to the bit].
-    ///
-    /// The general one also applies to times, relative to the last one.
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }
@@ -100,8 +98,22 @@ impl<'a> Tolerances<'a> {
 /// Compare two results.
 ///
 /// # Errors
-/// If a file is not a result or a tolerance names no field; of kind `Run` if the results differ.
+/// Of kind `Run` if the results differ; of kind `Input` if a file cannot be read or a tolerance names no field.
 pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
+    let as_input = |error: Error| Error {
+        kind: ErrorKind::Input,
+        ..error
+    };
+    let differences = differences(arguments, verbosity).map_err(as_input)?;
+    if differences.is_empty() {
+        return Ok(());
+    }
+    let message = format!("the results differ in {}", differences.join(" and "));
+    Err(Error::run(message))
+}
+
+/// Compare two results and print the comparison; return the kinds of differences, for a message.
+fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec<String>> {
     let paths = [&arguments.first, &arguments.second].map(|path| result_file(path));
     let [first, second] = [
         ResultReader::open(&paths[0])?,
@@ -116,14 +128,9 @@ pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
     let tolerances = Tolerances::new(&arguments.tolerance);
     let all = first.times()?.len() as u64;
     let mut progress = Progress::new(verbosity > Verbosity::Quiet, "output", 0, all);
-    let comparison = compare(
-        &first,
-        &second,
-        tolerances.general,
-        &mut |done, all, time| {
-            progress.update(done as u64, all as u64, time);
-        },
-    )?;
+    let comparison = compare(&first, &second, &mut |done, all, time| {
+        progress.update(done as u64, all as u64, time);
+    })?;
     progress.finish(true);
     tolerances.check(&comparison)?;
     if verbosity > Verbosity::Quiet {
@@ -149,20 +156,15 @@ pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
         reasons.push(format!("{columns} of {all} columns of the history"));
     }
     if !comparison.is_complete() {
-        reasons.push("what only one of them has".to_owned());
+        reasons.push("outputs, points, fields, rows or columns that one of them lacks".to_owned());
     }
-    if reasons.is_empty() {
+    if reasons.is_empty() && verbosity > Verbosity::Quiet {
         let all = comparison.fields.iter().chain(&comparison.columns);
         let unequal = all.into_iter().any(|difference| difference.unequal > 0);
-        if verbosity > Verbosity::Quiet {
-            let within = if unequal { " within the tolerance" } else { "" };
-            outln!("the results are equal{within}");
-        }
-        Ok(())
-    } else {
-        let message = format!("the results differ in {}", reasons.join(" and "));
-        Err(Error::run(message))
+        let within = if unequal { " within the tolerance" } else { "" };
+        outln!("the results are equal{within}");
     }
+    Ok(reasons)
 }
 
 /// The printed text.

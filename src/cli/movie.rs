@@ -9,7 +9,7 @@ use fissure::picture::Image;
 use fissure::picture::film::Film;
 
 use super::plot::check_ending;
-use super::plot::picture::{Painter, PictureArguments};
+use super::plot::picture::{Frame, Painter, PictureArguments};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 
@@ -39,7 +39,7 @@ pub struct MovieArguments {
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     rate: u16,
 
-    /// Where to draw to, .png or .apng [default: the field's name and `_movie.png` beside the result].
+    /// Where to draw to, .png or .apng [default: the names of field and component and `_movie.png`, beside the result].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 
@@ -63,22 +63,30 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
-        None => file.with_file_name(format!("{}_movie.png", painter.quantity.field)),
+        None => file.with_file_name(format!("{}_movie.png", painter.name())),
     };
-    let hint = ", an animated PNG; for other kinds, write --frames and join them with ffmpeg";
+    let hint = " (an animated PNG); for other formats, write --frames and encode them with ffmpeg";
     check_ending(&path, &["png", "apng"], hint)?;
-    painter.check_slice(chosen[0])?;
     if let Some(folder) = &arguments.frames {
         create_folder(folder)?;
     }
     // Each output is read twice: for the range of all, and for its frame.
     let count = chosen.len() as u64;
     let mut progress = Progress::new(verbosity > Verbosity::Quiet, "frame", 0, 2 * count);
-    let mut frame = painter.frame(chosen[0])?;
-    for (number, index) in chosen.iter().enumerate().skip(1) {
-        frame = frame.union(painter.frame(*index)?);
+    let mut frame: Option<Frame> = None;
+    for (number, index) in chosen.iter().enumerate() {
+        let own = painter.frame(*index)?;
+        frame = match (frame, own) {
+            (Some(frame), Some(own)) => Some(frame.union(own)),
+            (frame, own) => frame.or(own),
+        };
         progress.update(number as u64 + 1, 2 * count, times[*index]);
     }
+    let Some(frame) = frame else {
+        painter.check_slice(chosen[0])?;
+        let message = format!("{}: no output has points to draw", file.display());
+        return Err(Error::input(message));
+    };
     let clock = Clock::new(times[last]);
     let draw = |index: usize| -> Result<Image> {
         let image = painter.image(index, &clock.time(times[index]), Some(&frame))?;

@@ -5,14 +5,28 @@ use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 use super::source::Source;
 use crate::error::{Error, Result, excerpt};
 
-/// Whether a name is that of a key: one with dots, or of a value outside of all sections.
-pub fn is_key(name: &str) -> bool {
-    name.contains('.') || ["dimension", "title"].contains(&name)
+/// Keys of values outside of all sections.
+const TOP_KEYS: [&str; 5] = [
+    "title",
+    "dimension",
+    "thickness",
+    "cross_section",
+    "constraint",
+];
+
+/// Whether a name is that of a key: a path with dots, or the key of a value outside of all sections, unless the
+/// deck has a parameter of that name.
+pub fn is_key(source: &Source, name: &str) -> bool {
+    let is_parameter = || {
+        let deck = source.text.parse::<DocumentMut>().ok()?;
+        deck.get("parameters")?.get(name).map(|_| ())
+    };
+    name.contains('.') || (TOP_KEYS.contains(&name) && is_parameter().is_none())
 }
 
 /// The deck with the values of these keys, added where they are missing.
 ///
-/// A value is written as in a deck; what is no TOML, such as a bare word or an expression, is a text.
+/// A value is written as in a deck; any other text, such as a bare word or an expression, is a string.
 ///
 /// # Errors
 /// If the deck is not TOML, or a key is not one of a table.
@@ -26,7 +40,10 @@ pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
         let wrong = |message: String| Error::input(format!("--set {key}={text}: {message}"));
         let parts: Vec<&str> = key.split('.').map(str::trim).collect();
         if parts.iter().any(|part| part.is_empty()) {
-            let message = format!("{} is not a key; a key is like time.safety", excerpt(key));
+            let message = format!(
+                "{} is not a key; write a key with its section, such as time.safety",
+                excerpt(key)
+            );
             return Err(wrong(message));
         }
         let value: Value = text.parse().unwrap_or_else(|_| Value::from(*text));
@@ -44,9 +61,9 @@ pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
             let kind = item.type_name();
             table = item.as_table_like_mut().ok_or_else(|| {
                 let advice = if kind.starts_with("array") {
-                    "a list, whose entries can only be changed in the deck"
+                    "a list; change its entries in the deck"
                 } else {
-                    "a value and has no keys"
+                    "a value, not a section"
                 };
                 wrong(format!("`{path}` is {advice}"))
             })?;
@@ -59,7 +76,7 @@ pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
                 *old.decor_mut() = decor;
             }
             Some(_) => {
-                let message = format!("`{key}` is a section; name one of its keys, as {key}.KEY");
+                let message = format!("`{key}` is a section; set one of its keys: {key}.KEY=VALUE");
                 return Err(wrong(message));
             }
             None => {
@@ -115,12 +132,26 @@ mod tests {
     }
 
     #[test]
+    fn names_of_parameters_are_not_keys() {
+        let is_key = |text: &str, name: &str| {
+            let (path, text) = ("deck.toml".into(), text.to_owned());
+            super::is_key(&Source { path, text }, name)
+        };
+        for name in ["thickness", "cross_section", "constraint", "time.end"] {
+            assert!(is_key("dimension = '1d'", name), "{name}");
+        }
+        assert!(!is_key("", "pull"));
+        assert!(!is_key("[parameters]\nthickness = 1", "thickness"));
+        assert!(is_key("parameters = { pull = 1 }", "thickness"));
+    }
+
+    #[test]
     fn keys_that_are_none_are_rejected() {
         let deck = "a = 1\n[[stage]]\nend = 1\n[e]\nf = 4\n";
         for (key, message) in [
-            ("a.b", "--set a.b=1: `a` is a value and has no keys"),
-            ("stage.end", "`stage` is a list, whose entries"),
-            ("e", "`e` is a section; name one of its keys, as e.KEY"),
+            ("a.b", "--set a.b=1: `a` is a value, not a section"),
+            ("stage.end", "`stage` is a list; change its entries"),
+            ("e", "`e` is a section; set one of its keys: e.KEY=VALUE"),
             ("e..f", "is not a key"),
         ] {
             let error = assigned(deck, key, "1").unwrap_err();

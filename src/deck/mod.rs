@@ -51,11 +51,11 @@ pub struct Deck {
 /// # Errors
 /// An input error that names file, line, column and key and says what would be right.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
+    let mut source = Source::read(path)?;
     let (keys, parameters): (Vec<_>, Vec<_>) = set
         .iter()
         .map(|(name, value)| (name.as_str(), value.as_str()))
-        .partition(|(name, _)| assign::is_key(name));
-    let mut source = Source::read(path)?;
+        .partition(|(name, _)| assign::is_key(&source, name));
     if !keys.is_empty() {
         source = assign::assign(&source, &keys)?;
     }

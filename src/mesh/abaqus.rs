@@ -300,14 +300,14 @@ impl Reader {
         let name = &keyword.name[..];
         if GENERATORS.contains(&name) {
             let message =
-                format!("*{name} is not known here; write the mesh with all nodes and elements");
+                format!("*{name} is not supported; write the mesh with all nodes and elements");
             return Err(self.fault(message));
         }
         match name {
             "NODE" => {
                 let system = keyword.get("SYSTEM").unwrap_or("R");
                 if !system.eq_ignore_ascii_case("R") {
-                    return Err(self.fault("*NODE: only Cartesian coordinates are known"));
+                    return Err(self.fault("*NODE: coordinates must be Cartesian"));
                 }
                 let set = keyword.get("NSET");
                 let set = set.map(|set| self.begin_set(Of::Nodes, set, keyword));
@@ -317,8 +317,8 @@ impl Reader {
                 let written = keyword.get("TYPE").unwrap_or_default().to_ascii_uppercase();
                 let Some(kind) = kind(&written) else {
                     let message = format!(
-                        "element type {} is not known; solids, planes, shells and lines of first and second \
-                         order are",
+                        "element type {} is not supported; use solids, planes, shells or lines of first or \
+                         second order",
                         excerpt(&written)
                     );
                     return Err(self.fault(message));
@@ -645,7 +645,7 @@ impl Reader {
         if is_instance {
             let all = [placed.first_element, placed.first_element + count];
             let all = Runs::union([(&[all][..], 0)].into_iter());
-            self.add_group(&placed.name, Of::Elements, all);
+            self.add_group(&placed.name, "instance", Members::Elements(all));
         }
         self.placed.push(placed);
         let own = self.placed.len() - 1;
@@ -667,19 +667,24 @@ impl Reader {
             } else {
                 name
             };
-            self.add_group(&name, key.0, members);
+            self.add_set(&name, key.0, members);
         }
         Ok(())
     }
 
-    fn add_group(&mut self, name: &str, of: Of, members: Runs) {
+    fn add_set(&mut self, name: &str, of: Of, members: Runs) {
+        match of {
+            Of::Nodes => self.add_group(name, "node set", Members::Nodes(members)),
+            Of::Elements => self.add_group(name, "element set", Members::Elements(members)),
+        }
+    }
+
+    fn add_group(&mut self, name: &str, kind: &'static str, members: Members) {
         self.mesh.groups.push(Group {
             name: Some(name.to_owned()),
             number: None,
-            members: match of {
-                Of::Nodes => Members::Nodes(members),
-                Of::Elements => Members::Elements(members),
-            },
+            kind,
+            members,
         });
     }
 
@@ -857,7 +862,7 @@ impl Reader {
         for (of, name, all) in unions {
             if !taken.contains(&(of, name.to_ascii_uppercase())) {
                 let members = Runs::union(all.iter().map(|runs| (runs.ranges(), 0)));
-                self.add_group(&name, of, members);
+                self.add_set(&name, of, members);
             }
         }
     }

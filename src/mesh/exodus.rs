@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::kind::{Between, Form, Kind};
 use super::netcdf::{Fault, Netcdf};
-use super::{Group, Members, Mesh, Runs, fault, position};
+use super::{Group, Members, Mesh, Runs, SIDE_SET, fault, position};
 use crate::error::{Result, excerpt};
 
 /// Orders of Exodus that differ from those used here: what the nodes after the corners lie between.
@@ -127,7 +127,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         };
         let Some(kind) = kind(&written, each) else {
             let message = format!(
-                "block {name}: elements {} with {each} nodes are not known",
+                "block {name}: elements {} with {each} nodes are not supported",
                 excerpt(&written)
             );
             return Err(message);
@@ -150,6 +150,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
         mesh.groups.push(Group {
             name: Some(name),
             number: Some(id),
+            kind: "block",
             members: Members::Elements(Runs::union([(&[all][..], 0)].into_iter())),
         });
     }
@@ -172,6 +173,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
             mesh.groups.push(Group {
                 name: Some(name),
                 number: Some(id),
+                kind: if of_nodes { "node set" } else { SIDE_SET },
                 members: if of_nodes {
                     Members::Nodes(members)
                 } else {

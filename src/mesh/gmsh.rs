@@ -186,7 +186,7 @@ impl File<'_> {
             }
         };
         if size != 8 {
-            let message = format!("numbers have {size} bytes; 8 are known");
+            let message = format!("numbers have {size} bytes, must have 8");
             return Err(self.cursor.fault(message));
         }
         if binary == 1 {
@@ -196,8 +196,8 @@ impl File<'_> {
                 (1, _) => false,
                 (_, 1) => true,
                 _ => {
-                    let message = "the number after the format must be 1 in binary; was the file \
-                                   transferred as text?";
+                    let message = "the number after the format must be 1 in a binary file; a transfer as text \
+                                   damages binary files";
                     return Err(self.cursor.fault(message));
                 }
             };
@@ -320,7 +320,7 @@ impl File<'_> {
     fn kind(&self, number: i64) -> Result<(Kind, Vec<usize>)> {
         let Some((kind, order)) = kind(number) else {
             let message = format!(
-                "element type {number} of Gmsh is not known here; first- and second-order elements are"
+                "Gmsh element type {number} is not supported; use first- or second-order elements"
             );
             return Err(self.cursor.fault(message));
         };
@@ -446,6 +446,12 @@ impl File<'_> {
             self.mesh.groups.push(Group {
                 name: self.names.get(&key).cloned(),
                 number: Some(key.1),
+                kind: match key.0 {
+                    0 => "point",
+                    1 => "curve",
+                    2 => "surface",
+                    _ => "volume",
+                },
                 members: Members::Elements(elements),
             });
         }
@@ -526,7 +532,10 @@ impl<'a> Cursor<'a> {
                 Ok(Some(name))
             }
             None => {
-                let message = format!("must be a section such as `$Nodes`, is {}", excerpt(word));
+                let message = format!(
+                    "a section such as `$Nodes` must begin here, found {}",
+                    excerpt(word)
+                );
                 Err(self.fault(message))
             }
         }

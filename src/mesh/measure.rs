@@ -166,6 +166,13 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
             }
         }
     }
+    // det J of a quadrilateral is linear. If its nodes are crossed, it is negative along an edge, which the Gauss
+    // points can miss.
+    if kind == Kind::new(Form::Quadrilateral, 4) {
+        for at in [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]] {
+            add([at[0], at[1], 0.0], 0.0);
+        }
+    }
     rule
 }
 
@@ -330,6 +337,20 @@ pub struct Measure {
     pub size: f64,
     /// Centroid, m.
     pub centroid: [f64; 3],
+    /// Smallest and largest det J at the points of the Gauss rule.
+    determinants: [f64; 2],
+}
+
+/// Largest det J of the other sign, relative to the largest one, that counts as round-off.
+const ROUND_OFF: f64 = 1e-9;
+
+impl Measure {
+    /// Whether det J has both signs: nodes are crossed, or a part of the element is inverted.
+    pub fn is_folded(&self) -> bool {
+        let [low, high] = self.determinants;
+        let limit = ROUND_OFF * low.abs().max(high.abs());
+        low < -limit && high > limit
+    }
 }
 
 /// Measure an element of a line along x, of the plane of x and y, or of space; `nodes` in m.
@@ -337,6 +358,7 @@ pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
     // Relative to the first node, so that a mesh far from the origin loses no digits.
     let origin = nodes[0];
     let (mut size, mut moments) = (0.0, [0.0; 3]);
+    let mut determinants = [f64::INFINITY, f64::NEG_INFINITY];
     for point in &RULES[kind.index()] {
         let mut place = [0.0; 3];
         let mut jacobian = [[0.0; 3]; 3];
@@ -358,6 +380,10 @@ pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
                     + a[2] * (b[0] * c[1] - b[1] * c[0])
             }
         };
+        determinants = [
+            determinants[0].min(determinant),
+            determinants[1].max(determinant),
+        ];
         size += point.weight * determinant;
         for k in 0..3 {
             moments[k] += point.weight * determinant * place[k];
@@ -366,6 +392,7 @@ pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
     Measure {
         size,
         centroid: std::array::from_fn(|k| origin[k] + moments[k] / size),
+        determinants,
     }
 }
 
@@ -544,6 +571,29 @@ mod tests {
         let kind = Kind::new(Form::Tetrahedron, 4);
         let nodes = [[0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         assert_eq!(measure(kind, &nodes).size, -1.0 / 6.0);
+    }
+
+    #[test]
+    fn crossed_and_partly_inverted_elements_are_folded() {
+        let quadrilateral = Kind::new(Form::Quadrilateral, 4);
+        let square = reference_nodes(quadrilateral);
+        let crossed = [square[0], square[2], square[1], square[3]];
+        assert!(measure(quadrilateral, &crossed).is_folded());
+        // The edges cross close to a corner.
+        let slightly = [[0.0; 3], [1.0, 0.0, 0.0], [0.1, 1.0, 0.0], [0.2, 0.9, 0.0]];
+        assert!(measure(quadrilateral, &slightly).is_folded());
+        // Two equal nodes make a triangle.
+        let triangle = [square[0], square[1], square[2], square[2]];
+        assert!(!measure(quadrilateral, &triangle).is_folded());
+        let tetrahedron = Kind::new(Form::Tetrahedron, 10);
+        let mut nodes = reference_nodes(tetrahedron);
+        // The middle of the edge from the origin to (1, 0, 0) far beyond its end.
+        nodes[4][0] = 1.5;
+        let folded = measure(tetrahedron, &nodes);
+        assert!(folded.is_folded() && folded.size > 0.0, "{folded:?}");
+        for kind in KINDS.into_iter().filter(|kind| kind.form != Form::Point) {
+            assert!(!measure(kind, &reference_nodes(kind)).is_folded());
+        }
     }
 
     #[test]

@@ -25,6 +25,9 @@ use crate::error::{Error, Result, excerpt};
 use crate::message::nearest;
 use kind::KINDS;
 
+/// Kind of a group of faces of elements, which is stored as these elements.
+pub const SIDE_SET: &str = "side set";
+
 /// Most names of groups that a message lists.
 const MOST_LISTED: usize = 8;
 
@@ -177,6 +180,8 @@ pub struct Group {
     pub name: Option<String>,
     /// Its number, if it has one.
     pub number: Option<i64>,
+    /// What the format calls groups like it, such as `side set`.
+    pub kind: &'static str,
     /// What it consists of.
     pub members: Members,
 }
@@ -210,7 +215,7 @@ impl fmt::Display for GroupKey {
 
 impl Mesh {
     /// Largest dimension of a group's elements; 0 for nodes.
-    fn dimension(&self, group: &Group) -> usize {
+    pub fn dimension(&self, group: &Group) -> usize {
         match &group.members {
             Members::Nodes(_) => 0,
             Members::Elements(elements) => {
@@ -222,29 +227,75 @@ impl Mesh {
         }
     }
 
-    /// The group that a key refers to: of several, the one with elements of the largest dimension of at most
-    /// `dimension`; `None` without any.
-    pub fn find(&self, key: &GroupKey, dimension: usize) -> Option<&Group> {
-        let refers = |group: &&Group, ignores_case: bool| match key {
-            GroupKey::Number(number) => group.number == Some(*number),
-            GroupKey::Name(name) => group
+    /// The group that a key refers to, of those that `is_wanted` accepts; `None` without any.
+    ///
+    /// A key is a name, a number, or both with the kind in front, such as `side set 1`.
+    ///
+    /// # Errors
+    /// If it refers to groups of different kinds; the message lists them.
+    pub fn find(
+        &self,
+        key: &GroupKey,
+        is_wanted: impl Fn(&Group) -> bool,
+    ) -> std::result::Result<Option<&Group>, String> {
+        let has_name = |group: &Group, name: &str, ignores_case: bool| {
+            group
                 .name
                 .as_ref()
-                .is_some_and(|own| own == name || (ignores_case && own.eq_ignore_ascii_case(name))),
+                .is_some_and(|own| own == name || (ignores_case && own.eq_ignore_ascii_case(name)))
         };
-        let best = |ignores_case: bool| {
-            let candidates = self
-                .groups
-                .iter()
-                .filter(|group| refers(group, ignores_case));
-            let ranked = candidates.map(|group| (self.dimension(group), group));
-            // The first one of several.
-            ranked
-                .filter(|(own, _)| *own <= dimension)
-                .reduce(|a, b| if b.0 > a.0 { b } else { a })
-                .map(|(_, group)| group)
+        let has_kind = |group: &Group, text: &str| {
+            let rest = text.strip_prefix(group.kind);
+            rest.and_then(|rest| rest.strip_prefix(' '))
+                .is_some_and(|rest| {
+                    let number = rest.parse().ok();
+                    has_name(group, rest, self.ignores_case)
+                        || (number.is_some() && group.number == number)
+                })
         };
-        best(false).or_else(|| best(true).filter(|_| self.ignores_case))
+        let all = |refers: &dyn Fn(&Group) -> bool| -> Vec<&Group> {
+            let groups = self.groups.iter();
+            groups
+                .filter(|group| refers(group) && is_wanted(group))
+                .collect()
+        };
+        let candidates = match key {
+            GroupKey::Number(number) => all(&|group| group.number == Some(*number)),
+            GroupKey::Name(name) => {
+                let exact = all(&|group| has_name(group, name, false));
+                let exact = if exact.is_empty() && self.ignores_case {
+                    all(&|group| has_name(group, name, true))
+                } else {
+                    exact
+                };
+                if exact.is_empty() {
+                    all(&|group| has_kind(group, name))
+                } else {
+                    exact
+                }
+            }
+        };
+        let Some(first) = candidates.first() else {
+            return Ok(None);
+        };
+        if candidates.iter().all(|group| group.kind == first.kind) {
+            return Ok(Some(first));
+        }
+        let label = match key {
+            GroupKey::Number(number) => number.to_string(),
+            GroupKey::Name(name) => name.clone(),
+        };
+        let mut kinds: Vec<&str> = candidates.iter().map(|group| group.kind).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        let full: Vec<String> = kinds
+            .iter()
+            .map(|kind| format!("\"{kind} {label}\""))
+            .collect();
+        Err(format!(
+            "{key} stands for several groups; name one of them: {}",
+            full.join(", ")
+        ))
     }
 
     /// Names, or else numbers, of the groups that `wanted` selects by their dimension.
@@ -264,7 +315,7 @@ impl Mesh {
 /// The end of a message on an unknown name: the nearest of the known ones, and some of them.
 pub fn suggestion(key: &GroupKey, known: &[String]) -> String {
     if known.is_empty() {
-        return "; the mesh has none".to_owned();
+        return "; the mesh has no such groups".to_owned();
     }
     let near = match key {
         GroupKey::Name(name) => nearest(name, known.iter().map(String::as_str)),

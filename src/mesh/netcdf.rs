@@ -326,7 +326,9 @@ impl<'a> Classic<'a> {
         let variable = self.variable(name)?;
         let words = |message: &str| format!("variable {name}: {message}");
         if variable.is_record {
-            return Err(words("has records, which a mesh has not"));
+            return Err(words(
+                "is a record variable; variables of a mesh must have a fixed size",
+            ));
         }
         let each = size_of_kind(variable.kind).map_err(|message| words(&message))?;
         let mut lengths = variable.shape.iter();

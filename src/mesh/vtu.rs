@@ -6,7 +6,7 @@ use std::path::Path;
 use flate2::read::ZlibDecoder;
 use indexmap::IndexMap;
 use roxmltree::{Document, Node};
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::kind::{Form, Kind};
 use super::{Group, Members, Mesh, Runs, fault, measure, position};
@@ -84,7 +84,10 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     }
     let compressor = root.attribute("compressor").filter(|name| !name.is_empty());
     if let Some(name) = compressor.filter(|name| *name != "vtkZLibDataCompressor") {
-        return Err(format!("is compressed by {}; zlib is known", excerpt(name)));
+        return Err(format!(
+            "is compressed by {}; use zlib or no compression",
+            excerpt(name)
+        ));
     }
     let file = File {
         is_big: root.attribute("byte_order") == Some("BigEndian"),
@@ -98,11 +101,16 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     };
     let mut mesh = Mesh::default();
     mesh.elements.continue_in(path);
-    let mut groups = IndexMap::new();
+    let mut groups = Groups::new();
     let pieces = root.descendants().filter(|node| node.has_tag_name("Piece"));
     for piece in pieces {
         file.read_piece(piece, &mut mesh, &mut groups)?;
     }
+    let mut counts: FxHashMap<(bool, String), usize> = FxHashMap::default();
+    for (of_nodes, array, _) in groups.keys() {
+        *counts.entry((*of_nodes, array.clone())).or_default() += 1;
+    }
+    groups.retain(|(of_nodes, array, _), _| counts[&(*of_nodes, array.clone())] <= MOST_GROUPS);
     let arrays: FxHashSet<&String> = groups
         .keys()
         .filter(|(of_nodes, ..)| !of_nodes)
@@ -113,6 +121,7 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
         mesh.groups.push(Group {
             name: Some(format!("{array}={value}")),
             number: Some(*value).filter(|_| is_single && !of_nodes),
+            kind: if *of_nodes { "points" } else { "cells" },
             members: if *of_nodes {
                 Members::Nodes(members.clone())
             } else {
@@ -199,7 +208,7 @@ impl File<'_> {
         for (cell, (end, number)) in offsets.iter().zip(&types).enumerate() {
             let Some((kind, order)) = kind(*number) else {
                 let message = format!(
-                    "cell {cell}: type {number} of VTK is not known here; first- and second-order cells are"
+                    "cell {cell}: VTK cell type {number} is not supported; use first- or second-order cells"
                 );
                 return Err(message);
             };
@@ -209,7 +218,7 @@ impl File<'_> {
             let nodes = end.and_then(|end| connectivity.get(start..end));
             let Some(nodes) = nodes.filter(|nodes| nodes.len() == kind.nodes) else {
                 let message = format!(
-                    "cell {cell}: must have {} points, offsets from {start} on say otherwise",
+                    "cell {cell}: its entries of `offsets` and `connectivity`, from {start} on, must give {} points",
                     kind.nodes
                 );
                 return Err(message);
@@ -281,6 +290,12 @@ impl File<'_> {
         for value in &values {
             different.insert(*value);
             if different.len() > MOST_GROUPS {
+                // One empty group more than the limit: all groups of the array are removed in the end.
+                for value in different {
+                    groups
+                        .entry((of_nodes, name.to_owned(), value))
+                        .or_default();
+                }
                 return Ok(());
             }
         }

@@ -10,6 +10,12 @@ use std::cmp::Ordering;
 /// Points read at once.
 const BLOCK: usize = 1 << 16;
 
+/// Largest difference of matched times, relative to the interval of the outputs or rows.
+const TIME_TOLERANCE: f64 = 1e-6;
+
+/// The same relative to the last time: the round-off of a sum of many steps.
+const ROUND_OFF: f64 = 1e-13;
+
 /// Name of the reference positions among the fields.
 const POSITION: &str = "position";
 
@@ -138,21 +144,20 @@ impl Comparison {
     }
 }
 
-/// Compare two results. Times that differ by at most `time_tolerance` times the end of the first result are
-/// equal. `progress` is called after each pair of outputs with its number, the number of pairs and its time.
+/// Compare two results. `progress` is called after each pair of outputs with its number, the number of pairs and
+/// its time.
 ///
 /// # Errors
 /// If a file is damaged or its points are not in the order of their ids.
 pub fn compare(
     first: &ResultReader,
     second: &ResultReader,
-    time_tolerance: f64,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Comparison> {
     let mut comparison = Comparison::default();
     let fields = common_fields(first, second, &mut comparison)?;
     let times = [first.times()?, second.times()?];
-    let pairs = Matches::of(&times[0], &times[1], time_tolerance);
+    let pairs = Matches::of(&times[0], &times[1]);
     comparison.outputs = pairs.pairs.len();
     comparison.single_outputs = pairs.single(&times);
     let unchanging = !first.is_changing() && !second.is_changing();
@@ -169,11 +174,7 @@ pub fn compare(
         outputs.compare(&compared, &mut comparison)?;
         progress(number + 1, pairs.pairs.len(), outputs.time);
     }
-    compare_histories(
-        [&first.history()?, &second.history()?],
-        time_tolerance,
-        &mut comparison,
-    );
+    compare_histories([&first.history()?, &second.history()?], &mut comparison);
     Ok(comparison)
 }
 
@@ -330,15 +331,32 @@ struct Matches {
 }
 
 impl Matches {
-    fn of(first: &[f64], second: &[f64], tolerance: f64) -> Self {
+    /// Match each time of the first list with the nearest unmatched one of the second, within
+    /// [`TIME_TOLERANCE`].
+    fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
-        let (mut pairs, mut next) = (Vec::new(), [0; 2]);
-        while let (Some(a), Some(b)) = (first.get(next[0]), second.get(next[1])) {
-            if a == b || (a - b).abs() <= tolerance * end {
-                pairs.push(next);
-                next = next.map(|index| index + 1);
-            } else {
-                next[usize::from(a > b)] += 1;
+        let reach = |index: usize, time: f64| {
+            let neighbours = [
+                index.checked_sub(1).map(|before| first[before]),
+                first.get(index + 1).copied(),
+            ];
+            let gaps = neighbours.into_iter().flatten();
+            let gap = gaps
+                .map(|neighbour| (neighbour - time).abs())
+                .filter(|gap| *gap > 0.0)
+                .fold(f64::INFINITY, f64::min);
+            let interval = if gap.is_finite() { gap } else { end };
+            (TIME_TOLERANCE * interval).max(ROUND_OFF * end)
+        };
+        let (mut pairs, mut next) = (Vec::new(), 0);
+        for (index, time) in first.iter().enumerate() {
+            let distance = |k: usize| (second[k] - time).abs();
+            while next + 1 < second.len() && distance(next + 1) < distance(next) {
+                next += 1;
+            }
+            if next < second.len() && distance(next) <= reach(index, *time) {
+                pairs.push([index, next]);
+                next += 1;
             }
         }
         Self { pairs }
@@ -356,11 +374,7 @@ impl Matches {
 }
 
 /// Compare the histories column by column.
-fn compare_histories(
-    histories: [&[StoredColumn]; 2],
-    time_tolerance: f64,
-    comparison: &mut Comparison,
-) {
+fn compare_histories(histories: [&[StoredColumn]; 2], comparison: &mut Comparison) {
     let find = |columns: &[StoredColumn], name: &str, unit: &str| {
         let mut places = columns.iter();
         places.position(|column| column.name == name && column.unit == unit)
@@ -369,7 +383,7 @@ fn compare_histories(
         let time = columns.iter().find(|column| column.name == TIME);
         time.map_or(&[][..], |column| &column.values[..])
     });
-    let rows = Matches::of(times[0], times[1], time_tolerance).pairs;
+    let rows = Matches::of(times[0], times[1]).pairs;
     comparison.rows = rows.len();
     comparison.single_rows = [0, 1].map(|side: usize| times[side].len() - rows.len());
     for side in 0..2 {
@@ -417,11 +431,15 @@ mod tests {
     #[test]
     fn times_are_matched_within_the_tolerance() {
         let times = [vec![0.0, 1.0, 2.0, 2.0], vec![0.0, 1.1, 2.0]];
-        let matches = Matches::of(&times[0], &times[1], 0.0);
+        let matches = Matches::of(&times[0], &times[1]);
         assert_eq!(matches.pairs, [[0, 0], [2, 2]]);
         assert_eq!(matches.single(&times), [vec![1.0, 2.0], vec![1.1]]);
-        assert_eq!(Matches::of(&times[0], &times[1], 0.1).pairs.len(), 3);
-        assert_eq!(Matches::of(&[], &times[1], 0.1).pairs.len(), 0);
+        assert_eq!(Matches::of(&[], &times[1]).pairs.len(), 0);
+        assert_eq!(Matches::of(&times[0], &[]).pairs.len(), 0);
+        // The nearest time is taken, not the first one in reach.
+        let close = [1.0, 1.0 + 5e-7, 2.0];
+        assert_eq!(Matches::of(&[0.0, 1.0 + 6e-7], &close).pairs, [[1, 1]]);
+        assert_eq!(Matches::of(&[0.0, 1.0], &[0.0, 1.0 + 2e-6]).pairs, [[0, 0]]);
     }
 
     #[test]

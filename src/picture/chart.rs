@@ -42,6 +42,12 @@ const MARGIN: f64 = 0.04;
 /// Height of the picture as a share of its width.
 const HEIGHT: f64 = 0.62;
 
+/// Edge of the marker of an isolated point, in thicknesses.
+const MARKER: f64 = 5.0;
+
+/// Places on a line at which the legend looks for it.
+const LINE_SAMPLES: usize = 32;
+
 /// Distance in pixels within which points of a curve are drawn as one.
 const RESOLUTION: f64 = 0.3;
 
@@ -59,7 +65,7 @@ pub struct Label<'a> {
 pub struct Series {
     /// Name for the legend.
     pub name: String,
-    /// The points; one that is not finite breaks the curve.
+    /// The points; one that is not finite breaks the curve, and an isolated one is drawn as a marker.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -108,6 +114,12 @@ enum Shape {
 }
 
 impl Chart<'_> {
+    /// Whether there is a point to draw.
+    pub fn has_points(&self) -> bool {
+        let mut all = self.series.iter().flat_map(|series| &series.points);
+        all.any(|point| point.iter().all(|number| number.is_finite()))
+    }
+
     /// Draw the chart as pixels.
     pub fn image(&self) -> Image {
         let lettering = Lettering::new();
@@ -331,15 +343,28 @@ impl Chart<'_> {
             .iter()
             .map(|series| reduced(series.points.iter().map(|point| pixel(*point))))
             .collect();
-        // Curves run over the legend, so that it hides none.
-        if self.series.len() > 1 {
-            let drawn: Vec<[f64; 2]> = curves.iter().flatten().flatten().copied().collect();
-            self.legend(&mut shapes, lettering, (columns, rows, text), &drawn);
-        }
         for (number, parts) in curves.iter().enumerate() {
             for points in parts {
-                stroke(&mut shapes, points, number, 1.8 * thickness);
+                match points[..] {
+                    [point] => mark(&mut shapes, point, number, MARKER * thickness),
+                    _ => stroke(&mut shapes, points, number, 1.8 * thickness),
+                }
             }
+        }
+        if self.series.len() > 1 {
+            // Lines between distant points count as well.
+            let step = |ends: &[[f64; 2]], k: usize| {
+                let share = k as f64 / LINE_SAMPLES as f64;
+                [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))
+            };
+            let mut drawn = Vec::new();
+            for points in curves.iter().flatten() {
+                for ends in points.windows(2) {
+                    drawn.extend((0..LINE_SAMPLES).map(|k| step(ends, k)));
+                }
+                drawn.extend(points.last());
+            }
+            self.legend(&mut shapes, lettering, (columns, rows, text), &drawn);
         }
         shapes
     }
@@ -433,6 +458,7 @@ fn reduced(pixels: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
             curve.push(pixel);
         }
     }
+    curves.retain(|curve| !curve.is_empty());
     curves
 }
 
@@ -448,6 +474,16 @@ fn stroke(shapes: &mut Vec<Shape>, points: &[[f64; 2]], number: usize, thickness
         thickness,
         colour,
     }));
+}
+
+/// Draw a square at an isolated point, in the colour of its curve.
+fn mark(shapes: &mut Vec<Shape>, point: [f64; 2], number: usize, size: f64) {
+    let [columns, rows] = point.map(|centre| [centre - size / 2.0, centre + size / 2.0]);
+    shapes.push(Shape::Rectangle {
+        columns,
+        rows,
+        colour: COLOURS[number % COLOURS.len()],
+    });
 }
 
 /// The dashes of a curve, of alternating lengths of dash and gap.
@@ -569,6 +605,28 @@ mod tests {
             assert!(svg.contains(words), "{words}: {svg}");
         }
         assert!(!chart(&series[..1]).svg().contains(">one<"));
+    }
+
+    #[test]
+    fn isolated_points_have_markers_and_the_legend_covers_curves() {
+        let single = [series("one", &[[1.0, 2.0]])];
+        assert!(chart(&single).has_points());
+        assert!(pixels(&chart(&single).image(), COLOURS[0]).len() >= 9);
+        let none = [series("none", &[[1.0, f64::NAN], [f64::INFINITY, 0.0]])];
+        assert!(!chart(&none).has_points());
+        // A curve crosses all corners of the frame: its part below the legend is hidden.
+        let corners = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
+        let svg = chart(&[series("a", &corners), series("b", &[])]).svg();
+        // The legend leaves the corner at the top right, which only the line between two points crosses.
+        let line = chart(&[series("a", &[[0.0, 0.0], [1.0, 1.0]]), series("b", &[])]).svg();
+        let box_left = |svg: &str| -> f64 {
+            let end = svg.rfind("fill=\"#ffffff\"").unwrap();
+            let start = svg[..end].rfind("x=\"").unwrap() + 3;
+            svg[start..].split('"').next().unwrap().parse().unwrap()
+        };
+        assert!(box_left(&line) < 300.0, "{line}");
+        let curve = svg.find(&hexadecimal(COLOURS[0])).unwrap();
+        assert!(svg.rfind("fill=\"#ffffff\"").unwrap() > curve, "{svg}");
     }
 
     #[test]

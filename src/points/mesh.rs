@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
-use crate::mesh::{self, Format, GroupKey, Members, Mesh, Runs};
+use crate::mesh::{self, Format, Group, GroupKey, Members, Mesh, Runs};
 use crate::problem::{PointSource, Problem, Selector};
 
 use super::Point;
@@ -19,7 +19,10 @@ const NO_BODY: u16 = u16::MAX;
 /// Mark of an element without a point.
 const NO_POINT: u32 = u32::MAX;
 
-/// Largest share of its own size by which an element of a plane mesh may leave the plane.
+/// Most corners of an element.
+const MOST_CORNERS: usize = 8;
+
+/// Largest distance of an element from the plane of a plane mesh, relative to its size.
 const PLANE_SLACK: f64 = 1e-6;
 
 /// A body whose points come from a mesh.
@@ -149,25 +152,26 @@ pub fn read(problem: &Problem, path: &Path) -> Result<Found> {
     are_apart(&mesh, &points, &point_of)?;
     let dimension = problem.dimension.count();
     let mut marks = vec![false; mesh.nodes.len()];
-    let mut set = |selector: &Selector| {
-        let Selector::Mesh(set) = selector else {
-            return None;
+    let mut sets = Vec::with_capacity(problem.sets.len());
+    for entry in &problem.sets {
+        let Selector::Mesh(set) = &entry.selector else {
+            sets.push(None);
+            continue;
         };
-        let group = mesh.find(&set.group, dimension)?;
-        Some(members(
-            &mesh,
-            &group.members,
-            &point_of,
-            dimension,
-            &mut marks,
-        ))
-    };
+        let group = mesh
+            .find(&set.group, |group| mesh.dimension(group) <= dimension)
+            .map_err(|message| {
+                let message = format!("[set.{}] mesh: {message}", entry.name);
+                Error::input(message).at(&set.span)
+            })?;
+        let ids = |group: &Group| {
+            let group = &group.members;
+            members(&mesh, group, &point_of, dimension, &mut marks)
+        };
+        sets.push(group.map(ids));
+    }
     Ok(Found {
-        sets: problem
-            .sets
-            .iter()
-            .map(|entry| set(&entry.selector))
-            .collect(),
+        sets,
         names: mesh.names(|own| own <= dimension),
         points,
     })
@@ -180,15 +184,22 @@ fn bodies_of_elements(problem: &Problem, mesh: &Mesh, users: &[User]) -> Result<
     let mut bodies = vec![NO_BODY; mesh.elements.len()];
     for user in users {
         let Some(block) = user.block else { continue };
-        let has_solids = |members: &Members| match members {
+        let has_solids = |group: &Group| match &group.members {
             Members::Elements(elements) => {
                 elements.iter().any(|element| is_solid(element as usize))
             }
             Members::Nodes(_) => false,
         };
-        let group = mesh
-            .find(block, dimension)
-            .filter(|group| has_solids(&group.members));
+        let ambiguous = |message: String| {
+            let body = &problem.bodies[user.body].name;
+            let message = format!("[body.{body}] points block: {message}");
+            Error::input(message).at(user.block_span)
+        };
+        let is_block = |group: &Group| group.kind != mesh::SIDE_SET && has_solids(group);
+        let group = match mesh.find(block, is_block).map_err(ambiguous)? {
+            Some(group) => Some(group),
+            None => mesh.find(block, has_solids).map_err(ambiguous)?,
+        };
         let Some(group) = group else {
             let known = mesh.names(|own| own == dimension);
             let message = format!(
@@ -243,6 +254,7 @@ fn points(
     let mut points = Vec::with_capacity(count);
     let mut point_of = vec![NO_POINT; bodies.len()];
     let mut nodes = Vec::new();
+    let mut plane = None;
     for (element, body) in bodies.iter().enumerate() {
         if *body == NO_BODY {
             continue;
@@ -250,11 +262,19 @@ fn points(
         let scale = scales[usize::from(*body)];
         nodes.clear();
         let indices = mesh.elements.nodes(element).iter();
-        nodes.extend(indices.map(|node| mesh.nodes[*node as usize].map(|x| scale * x)));
-        lies_in_plane(&nodes, dimension)
+        nodes.extend(indices.map(|node| mesh.nodes[*node as usize]));
+        lies_in_plane(&nodes, dimension, plane.get_or_insert(nodes[0]))
             .map_err(|message| mesh.elements.fault(element, message))?;
+        for node in &mut nodes {
+            *node = node.map(|x| scale * x);
+        }
         let kind = mesh.elements.kind(element);
         let measure = mesh::measure(kind, &nodes);
+        if measure.is_folded() {
+            let message = "det J changes sign; the nodes must follow the order of the format, and no part of the \
+                           element may be inverted";
+            return Err(mesh.elements.fault(element, message));
+        }
         // A face or a line may be seen from either side.
         let size = if dimension < 3 {
             measure.size.abs()
@@ -285,8 +305,12 @@ fn points(
     Ok((points, point_of))
 }
 
-/// An error if the nodes of an element differ in coordinates that the problem does not have.
-fn lies_in_plane(nodes: &[[f64; 3]], dimension: usize) -> std::result::Result<(), String> {
+/// Check that an element lies in the line or plane of a problem, through the first node of the mesh.
+fn lies_in_plane(
+    nodes: &[[f64; 3]],
+    dimension: usize,
+    first: &[f64; 3],
+) -> std::result::Result<(), String> {
     let extent = |k: usize| {
         let along = nodes.iter().map(|node| node[k]);
         let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
@@ -294,38 +318,59 @@ fn lies_in_plane(nodes: &[[f64; 3]], dimension: usize) -> std::result::Result<()
         });
         high - low
     };
+    let distance = |k: usize| {
+        let distances = nodes.iter().map(|node| (node[k] - first[k]).abs());
+        distances.fold(0.0, f64::max)
+    };
     let size = (0..dimension).map(extent).fold(0.0, f64::max);
-    match (dimension..3).find(|k| extent(*k) > PLANE_SLACK * size) {
+    match (dimension..3).find(|k| distance(*k) > PLANE_SLACK * size) {
         None => Ok(()),
         Some(k) => Err(format!(
-            "its nodes differ in {}; a {dimension}-D problem has {} only",
-            ["x", "y", "z"][k],
-            ["x", "x and y"][dimension - 1]
+            "its nodes must have the same {axis} as all others of the mesh, {:e}; a {dimension}-D problem has {} only",
+            first[k],
+            ["x", "x and y"][dimension - 1],
+            axis = ["x", "y", "z"][k],
         )),
     }
 }
 
-/// An error if two points lie at the same place.
+/// Check that no two elements have the same corners or the same centroid.
 fn are_apart(mesh: &Mesh, points: &[Point], point_of: &[u32]) -> Result<()> {
-    let key = |point: &u32| points[*point as usize].position.map(f64::to_bits);
-    let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    order.sort_unstable_by_key(|point| (key(point), *point));
-    let pairs = order
-        .windows(2)
-        .filter(|pair| key(&pair[0]) == key(&pair[1]));
-    let Some(pair) = pairs.min_by_key(|pair| pair[1]) else {
-        return Ok(());
+    let corners = (0..point_of.len())
+        .filter(|element| point_of[*element] != NO_POINT)
+        .map(|element| {
+            let mut key = [u32::MAX; MOST_CORNERS];
+            let corners = mesh.elements.kind(element).corners();
+            key[..corners].copy_from_slice(&mesh.elements.nodes(element)[..corners]);
+            key.sort_unstable();
+            key
+        });
+    let centroids = points.iter().map(|point| point.position.map(f64::to_bits));
+    let (pair, shared) = match first_equal(corners) {
+        Some(pair) => (pair, "corner nodes"),
+        None => match first_equal(centroids) {
+            Some(pair) => (pair, "centroid"),
+            None => return Ok(()),
+        },
     };
-    let element = |point: u32| {
+    let [first, second] = pair.map(|point| {
         let found = point_of.iter().position(|own| *own == point);
         found.expect("every point has an element")
-    };
-    let [first, second] = [element(pair[0]), element(pair[1])];
+    });
     let message = format!(
-        "has its centroid where that of element {} is; does the file hold it twice?",
+        "has the same {shared} as element {}; remove one of the two",
         mesh.elements.number(first)
     );
     Err(mesh.elements.fault(second, message))
+}
+
+/// The first point whose key is that of an earlier one, after that one.
+fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
+    let mut order: Vec<(Key, u32)> = keys.zip(0..).collect();
+    order.sort_unstable();
+    let pairs = order.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+    let pair = pairs.min_by_key(|pair| pair[1].1)?;
+    Some([pair[0].1, pair[1].1])
 }
 
 /// The ids of the points of a group: of its own elements; of elements that have all corners of one of its faces,

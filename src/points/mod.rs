@@ -182,10 +182,10 @@ fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Poi
             let body = &problem.bodies[empty];
             let why = match &body.points {
                 PointSource::Lattice { .. } => {
-                    "is its shape smaller than the spacing, or covered by a later body?"
+                    "its shape is smaller than the spacing, or a later body covers it"
                 }
-                PointSource::File { .. } => "no row of its file is its own",
-                PointSource::Mesh { .. } => "no element of its mesh is its own",
+                PointSource::File { .. } => "no row of its file belongs to it",
+                PointSource::Mesh { .. } => "no element of its mesh belongs to it",
             };
             let message = format!("[body.{}]: has no points; {why}", body.name);
             Err(Error::input(message).at(&body.span))

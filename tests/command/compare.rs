@@ -126,6 +126,10 @@ fn a_difference_is_found_with_its_point_and_time() {
     let options = ["--tolerance", "0.01", "--tolerance", "displacement=1e-4"];
     expect(&compare(&first, &other, &options), 1, &["DIFFERENT"]);
 
+    // A path below a file cannot be read.
+    let unreadable = runs.deck.join("result.vtkhdf");
+    expect(&compare(&first, &unreadable, &[]), 2, &["cannot read"]);
+
     let output = compare(&first, &other, &["--quiet"]);
     assert!(output.stdout.is_empty(), "{}", text(&output));
     for (options, words) in [
@@ -167,7 +171,7 @@ fn what_only_one_result_has_is_named() {
             "only in A: 500 points, over all outputs",
             "displacement  equal",
             "position      equal",
-            "error: the results differ in what only one of them has",
+            "error: the results differ in outputs, points, fields, rows or columns that one of them lacks",
         ],
     );
     expect(

@@ -96,7 +96,11 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
         &["stress.png: stress, von_mises at t = 2.000 µs"],
     );
     let wanted = ["--field", "stress", "--component", "xy", "--time", "6e-7"];
-    expect(&plot(&wanted), 0, &["stress xy at t = 500.0 ns"]);
+    expect(
+        &plot(&wanted),
+        0,
+        &["stress_xy.png: stress xy at t = 500.0 ns"],
+    );
     expect(
         &plot(&["--field", "velocity", "--width", "401"]),
         0,
@@ -110,6 +114,7 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
             ["--time", "25"],
             "--time 25: the outputs are between 0e0 and 2e-6 s",
         ),
+        (["--time", "-1"], "--time -1: the outputs are between 0e0"),
         (["--time", "2.9e-6"], "the nearest one is at --time 2e-6"),
         (
             ["-o", "movie.gif"],
@@ -118,13 +123,14 @@ fn components_are_drawn_and_wrong_inputs_say_what_is_there() {
         (["-o", "movie"], "the file must end in .png"),
         (["--field", "damage"], "has no field `damage` (known: "),
         (["--component", "von_misses"], "did you mean `von_mises`?"),
-        (["--range", "5%,4%"], "LOW below HIGH"),
+        (["--range", "5%,4%"], "LOW must be below HIGH"),
         (["--x", "time"], "--x is for curves"),
     ] {
         expect(&plot(&options), 2, &[words]);
     }
     let block = run(&folder, "block", BLOCK, &[]);
     let plot = |options: &[&str]| command("plot", &[&block], options);
+    expect(&plot(&["--deform", "-1"]), 0, &["damage at t = "]);
     expect(&plot(&["--slice", "x=0.0031"]), 0, &["damage at t = "]);
     let outside = "--slice x=1: no points are drawn there; they are between x = 5.0000e-4 and 5.5";
     expect(
@@ -147,7 +153,7 @@ fn curves_of_histories() {
         "-o",
         energies.to_str().unwrap(),
     ];
-    expect(&command("plot", &[&history], &options), 0, &["2 curve(s)"]);
+    expect(&command("plot", &[&history], &options), 0, &["2 curves"]);
     let svg = std::fs::read_to_string(&energies).unwrap();
     for words in [
         ">time (µs)<",
@@ -172,7 +178,7 @@ fn curves_of_histories() {
     expect(
         &command("plot", &[&one, &second], &options),
         0,
-        &["2 curve(s)"],
+        &["2 curves"],
     );
     let svg = std::fs::read_to_string(&runs).unwrap();
     for words in [">one<", ">two<", ">momentum_x (", ">strain_energy ("] {
@@ -184,7 +190,14 @@ fn curves_of_histories() {
         &["kinetic_energy.png"],
     );
     assert_eq!(png(&one.join("kinetic_energy.png")), (1200, 744, 0));
+    let all = "kinetic_energy,strain_energy,momentum_x,momentum_y";
+    expect(
+        &command("plot", &[&one], &["--y", all]),
+        0,
+        &["kinetic_energy_strain_energy_momentum_x.png: 4 curves"],
+    );
 
+    let empty = folder.write("empty.csv", "time [s],a\n0,NaN\n1,inf\n");
     let broken = folder.write("broken.csv", "time [s],a\n0,1\n1\n");
     for (result, options, words) in [
         (
@@ -196,7 +209,7 @@ fn curves_of_histories() {
         (
             &history,
             &[],
-            "name the columns to draw: --y COLUMN,COLUMN; ",
+            "--y is missing; name the columns to draw with --y COLUMN,COLUMN; ",
         ),
         (
             &history,
@@ -209,6 +222,17 @@ fn curves_of_histories() {
             "broken.csv:3: has 1 values for 2 columns",
         ),
         (&folder.join("none.csv"), &["--y", "a"], "cannot read"),
+        (&empty, &["--y", "a"], "--y a: no finite values to draw"),
+        (
+            &history,
+            &["--y", "step", "--slice", "z=0"],
+            "cannot be used with",
+        ),
+        (
+            &history,
+            &["--y", "step", "--time", "last"],
+            "cannot be used with",
+        ),
     ] {
         expect(&command("plot", &[result], options), 2, &[words]);
     }

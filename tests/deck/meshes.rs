@@ -660,6 +660,27 @@ fn groups_of_any_dimension_become_sets() {
 }
 
 #[test]
+fn the_kind_tells_groups_of_the_same_number_apart() {
+    let folder = Folder::new("kinds");
+    let mut written = two_cubes();
+    // The face between the cubes has the number of the second cube.
+    written.elements[1].1 = 2;
+    written.names.clear();
+    for (encoding, bytes) in written.all() {
+        let path = folder.write("two.msh", bytes);
+        let problem = solid(&path, &["surface 2", "volume 2"]);
+        points(&problem);
+        assert_eq!(ids(&problem, "surface 2"), [0, 1], "{encoding}");
+        assert_eq!(ids(&problem, "volume 2"), [1], "{encoding}");
+    }
+    let mesh = parse("two.msh", written.version_2(None)).unwrap();
+    let message = mesh.find(&GroupKey::Number(2), |_| true).unwrap_err();
+    assert!(message.contains("\"surface 2\", \"volume 2\""), "{message}");
+    let solids = mesh.find(&GroupKey::Number(2), |group| mesh.dimension(group) == 3);
+    assert_eq!(solids.unwrap().unwrap().kind, "volume");
+}
+
+#[test]
 fn a_block_may_be_a_number_and_a_body_without_one_gets_the_rest() {
     let folder = Folder::new("blocks");
     let path = folder.write("two.msh", two_cubes().version_2(None));
@@ -688,7 +709,7 @@ fn version_2_repeats_an_element_for_each_of_its_groups() {
     assert_eq!(points(&problem).len(), 2);
     assert_eq!(ids(&problem, "first"), [0]);
     let mesh = parse("two.msh", written.version_2(None)).unwrap();
-    let second = mesh.find(&GroupKey::Number(2), 3).unwrap();
+    let second = mesh.find(&GroupKey::Number(2), |_| true).unwrap().unwrap();
     let Members::Elements(elements) = &second.members else {
         panic!("a group of elements");
     };
@@ -860,11 +881,11 @@ fn damaged_lines_of_abaqus_have_their_message() {
         ),
         (
             "*NODE, SYSTEM=C\n",
-            "a.inp:1: *NODE: only Cartesian coordinates are known",
+            "a.inp:1: *NODE: coordinates must be Cartesian",
         ),
         (
             "*NGEN\n",
-            "a.inp:1: *NGEN is not known here; write the mesh with all nodes and elements",
+            "a.inp:1: *NGEN is not supported; write the mesh with all nodes and elements",
         ),
         (
             "NODES*ELEMENT, TYPE=CPS3\n1, 1, 2\n*ELSET, ELSET=a\n",
@@ -1188,8 +1209,47 @@ fn an_unstructured_grid_is_read_in_any_encoding() {
         assert_eq!(ids(&problem, "material=5"), [1], "{way:?}");
         assert_eq!(ids(&problem, "left=1"), [0], "{way:?}");
         let mesh = parse("two.vtu", unstructured(way)).unwrap();
-        assert!(mesh.find(&GroupKey::Number(4), 3).is_some());
+        assert!(mesh.find(&GroupKey::Number(4), |_| true).unwrap().is_some());
     }
+}
+
+#[test]
+fn an_array_of_many_values_in_all_pieces_has_no_groups() {
+    // A piece of vertices with the values of a range.
+    let piece = |values: std::ops::Range<usize>| {
+        let count = values.len();
+        let join = |numbers: Vec<usize>| {
+            let words: Vec<String> = numbers.iter().map(usize::to_string).collect();
+            words.join(" ")
+        };
+        let array = |name: &str, numbers: Vec<usize>| {
+            let numbers = join(numbers);
+            format!(
+                "<DataArray type=\"Int64\" Name=\"{name}\" format=\"ascii\">{numbers}</DataArray>"
+            )
+        };
+        format!(
+            "<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\
+             <Points><DataArray type=\"Int64\" NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points>\
+             <Cells>{}{}{}</Cells><CellData>{}</CellData></Piece>",
+            join(vec![0; 3 * count]),
+            array("connectivity", (0..count).collect()),
+            array("offsets", (1..=count).collect()),
+            array("types", vec![1; count]),
+            array("id", values.collect()),
+        )
+    };
+    let groups = |pieces: &[std::ops::Range<usize>]| {
+        let pieces: String = pieces.iter().cloned().map(piece).collect();
+        let text = format!(
+            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{pieces}</UnstructuredGrid></VTKFile>"
+        );
+        parse("a.vtu", text).unwrap().groups.len()
+    };
+    assert_eq!(groups(&[0..600, 400..1000]), 1000);
+    assert_eq!(groups(&[0..600, 401..1001]), 0);
+    assert_eq!(groups(&[0..2, 0..1001]), 0);
+    assert_eq!(groups(&[0..1001, 0..2]), 0);
 }
 
 #[test]
@@ -1238,12 +1298,12 @@ fn damaged_grids_have_their_message() {
         (
             ">12 12 ",
             ">12 42 ",
-            "cell 1: type 42 of VTK is not known here; first- and second-order cells are",
+            "cell 1: VTK cell type 42 is not supported; use first- or second-order cells",
         ),
         (
             ">8 16 ",
             ">8 17 ",
-            "cell 1: must have 8 points, offsets from 8 on say otherwise",
+            "cell 1: its entries of `offsets` and `connectivity`, from 8 on, must give 8 points",
         ),
         (">0 1 2 3 ", ">0 1 2 99 ", "cell 0: there is no point 99"),
         (
@@ -1259,7 +1319,7 @@ fn damaged_grids_have_their_message() {
         (
             "version=\"1.0\" byte",
             "compressor=\"vtkLZ4DataCompressor\" byte",
-            "is compressed by `vtkLZ4DataCompressor`; zlib is known",
+            "is compressed by `vtkLZ4DataCompressor`; use zlib or no compression",
         ),
     ] {
         assert!(text.contains(from), "{from}");

@@ -13,6 +13,9 @@ use crate::cli::{Verbosity, file_error, outln};
 /// The default of `--x`.
 const TIME: &str = "time";
 
+/// Most columns in the default name of a picture.
+const MOST_NAMED: usize = 3;
+
 /// The columns of a file.
 struct Table {
     path: PathBuf,
@@ -25,24 +28,6 @@ struct Table {
 /// If a file has no such column or cannot be read or written.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let first = &arguments.results[0];
-    let path = arguments.output.clone().unwrap_or_else(|| {
-        let name = Path::new("history.png");
-        let stem = arguments
-            .y
-            .first()
-            .map_or(String::new(), |name| format!("{name}.png"));
-        let name = if stem.is_empty() {
-            name
-        } else {
-            Path::new(&stem)
-        };
-        if first.is_dir() {
-            first.join(name)
-        } else {
-            first.with_file_name(name)
-        }
-    });
-    check_ending(&path, &["png", "svg"], "")?;
     let tables: Vec<Table> = arguments
         .results
         .iter()
@@ -52,11 +37,21 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     if arguments.y.is_empty() {
         let names: Vec<&str> = tables[0].names().collect();
         return Err(Error::input(format!(
-            "name the columns to draw: --y COLUMN,COLUMN; {} has {}",
+            "--y is missing; name the columns to draw with --y COLUMN,COLUMN; {} has {}",
             tables[0].path.display(),
             names.join(", ")
         )));
     }
+    let path = arguments.output.clone().unwrap_or_else(|| {
+        let columns = &arguments.y[..arguments.y.len().min(MOST_NAMED)];
+        let name = format!("{}.png", columns.join("_"));
+        if first.is_dir() {
+            first.join(name)
+        } else {
+            first.with_file_name(name)
+        }
+    });
+    check_ending(&path, &["png", "svg"], "")?;
     let horizontal = tables[0].column(x, "--x")?;
     let mut units: Vec<&str> = Vec::new();
     for table in &tables {
@@ -111,6 +106,12 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
         series: &series,
         width: arguments.picture.width,
     };
+    if !chart.has_points() {
+        return Err(Error::input(format!(
+            "--y {}: no finite values to draw",
+            arguments.y.join(",")
+        )));
+    }
     let is_svg = path
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
@@ -121,7 +122,11 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     };
     written.map_err(|error| file_error(&path, "write", &error))?;
     if verbosity > Verbosity::Quiet {
-        outln!("wrote {}: {} curve(s)", path.display(), series.len());
+        let curves = match series.len() {
+            1 => "1 curve".to_owned(),
+            count => format!("{count} curves"),
+        };
+        outln!("wrote {}: {curves}", path.display());
     }
     Ok(())
 }

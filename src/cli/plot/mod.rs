@@ -39,18 +39,26 @@ pub struct PlotArguments {
     picture: PictureArguments,
 
     /// Time in s (the nearest output is taken), `last` or `all`.
-    #[arg(short, long, value_name = "T", default_value = "last")]
+    #[arg(
+        short,
+        long,
+        value_name = "T",
+        default_value = "last",
+        allow_hyphen_values = true
+    )]
     time: String,
 
     /// Columns of the history to draw as curves.
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    #[arg(conflicts_with_all = ["field", "component", "deform", "slice", "path", "range", "time"])]
     y: Vec<String>,
 
     /// Column of the horizontal axis of curves [default: time].
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
 
-    /// Where to draw to: .png, or .svg for curves [default: the name of what is drawn beside the result].
+    /// Where to draw to: .png, or .svg for curves [default: beside the result, named
+    /// after the field and component, or the columns].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }

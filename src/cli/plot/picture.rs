@@ -48,7 +48,12 @@ pub struct PictureArguments {
     component: Option<String>,
 
     /// Factor of the drawn displacement, or `auto`.
-    #[arg(long, value_name = "FACTOR", default_value = "auto")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
     deform: String,
 
     /// Draw only the points nearest to this plane of a solid, such as z=0.005.
@@ -83,7 +88,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
-        None => file.with_file_name(format!("{}.png", painter.quantity.field)),
+        None => file.with_file_name(format!("{}.png", painter.name())),
     };
     let hint = "; `--y` draws curves, and `fissure movie` films";
     check_ending(&path, &["png"], hint)?;
@@ -324,6 +329,15 @@ impl<'a> Painter<'a> {
         Ok(painter)
     }
 
+    /// Name of what is drawn for the name of a file.
+    pub fn name(&self) -> String {
+        let field = &self.quantity.field;
+        match &self.arguments.component {
+            Some(component) => format!("{field}_{component}"),
+            None => field.clone(),
+        }
+    }
+
     fn displacements(&self, index: usize) -> Result<Vec<f64>> {
         if self.has_displacement {
             self.result.field("displacement", index)
@@ -404,17 +418,20 @@ impl<'a> Painter<'a> {
         Limits::of(scene.drawn_values(), range)
     }
 
-    /// What a picture of an output shows, to be united with that of other outputs.
+    /// What a picture of an output shows, to be united with that of other outputs; `None` if no point is drawn.
     ///
     /// # Errors
     /// If the result is damaged.
-    pub fn frame(&self, index: usize) -> Result<Frame> {
+    pub fn frame(&self, index: usize) -> Result<Option<Frame>> {
         let points = self.points(index)?;
         let scene = self.scene(&points);
-        Ok(Frame {
+        if scene.marks().is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Frame {
             bounds: scene.extent(),
             limits: self.limits(&scene),
-        })
+        }))
     }
 
     /// Draw an output at a time, in a given frame or in one of its own.
@@ -455,13 +472,13 @@ impl<'a> Painter<'a> {
     /// Check that a slice cuts the body.
     ///
     /// # Errors
-    /// If no points are near it; the nearest ones are named.
+    /// If the output has points, but none near the slice; the message gives the nearest position.
     pub fn check_slice(&self, index: usize) -> Result<()> {
         let View::Slice { axis, position } = self.view else {
             return Ok(());
         };
         let points = self.points(index)?;
-        if !self.scene(&points).marks().is_empty() {
+        if points.positions.is_empty() || !self.scene(&points).marks().is_empty() {
             return Ok(());
         }
         let name = axis.letter();
@@ -550,7 +567,7 @@ fn range(text: &str) -> Result<Range> {
     };
     if low >= high {
         return Err(Error::input(format!(
-            "{wanted} with LOW below HIGH, is `{text}`"
+            "--range {text}: LOW must be below HIGH"
         )));
     }
     if !percentiles {
