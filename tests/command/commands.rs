@@ -65,7 +65,7 @@ fn from_an_example_deck_to_pictures() {
         ),
         (["--time", "soon"], "--time must be"),
         (["--slice", "z=0"], "--slice is for solids"),
-        (["--range", "1,0"], "LOW below HIGH"),
+        (["--range", "1,0"], "LOW must be below HIGH"),
     ] {
         let output = plot(&wrong);
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));
@@ -113,7 +113,7 @@ fn any_key_is_set_from_the_command_line() {
             "note: lines are those of the deck as changed by --set",
         ),
         ("time.safety=high", "safety"),
-        ("dimension.x=1", "`dimension` is a value and has no keys"),
+        ("dimension.x=1", "`dimension` is a value, not a section"),
         ("body.plate=1", "`body.plate` is a section"),
         ("safety=0.4", "[parameters] of "),
     ] {
