@@ -52,6 +52,12 @@ impl Dimension {
         }
     }
 
+    /// Edge of a cube, square or line of a volume (m³), m.
+    pub fn edge(self, volume: f64) -> f64 {
+        let extent = volume / self.out_of_plane_measure();
+        libm::pow(extent, 1.0 / self.count() as f64)
+    }
+
     /// Poisson's ratio of bond-based laws.
     pub fn bond_based_poisson_ratio(self) -> f64 {
         match self {

@@ -154,7 +154,7 @@ pub(super) fn rule(scope: &Scope, section: &str, keys: Keys<'_>) -> Result<Optio
     let restitution = match keys.restitution {
         Some(number) => {
             let key = format!("{section} restitution");
-            let range = LEAST_RESTITUTION..1.0 + f64::EPSILON;
+            let range = LEAST_RESTITUTION..1.0_f64.next_up();
             scope.within(number, &key, range, "between 0.01 and 1")?
         }
         None => 1.0,

@@ -1,6 +1,6 @@
 //! Input files of Abaqus: nodes, elements, sets, surfaces, parts, instances and included files.
 //!
-//! Other keywords are skipped, but those that would change the mesh are errors.
+//! Keywords that would change the mesh are errors. Other keywords are skipped.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

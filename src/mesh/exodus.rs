@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use super::Fault;
 use super::kind::{Between, Form, Kind};
-use super::netcdf::{Fault, Netcdf};
+use super::netcdf::Netcdf;
 use super::{Group, Members, Mesh, Runs, SIDE_SET, fault, position};
 use crate::error::{Result, excerpt};
 

@@ -227,7 +227,7 @@ impl Mesh {
         }
     }
 
-    /// The group that a key refers to, of those that `is_wanted` accepts; `None` without any.
+    /// The group of a key, among those that `is_wanted` accepts; `None` if there is none.
     ///
     /// A key is a name, a number, or both with the kind in front, such as `side set 1`.
     ///
@@ -392,3 +392,9 @@ fn position(place: [f64; 3]) -> std::result::Result<[f64; 3], String> {
 
 /// Largest absolute coordinate; squared distances stay far from overflow.
 const FARTHEST: f64 = 1e30;
+
+/// An error without the file that it is in.
+type Fault<T> = std::result::Result<T, String>;
+
+/// Upper limit of the ratio of compression, of zlib: a file cannot hold more than its size times this.
+const LARGEST_RATIO: usize = 1100;

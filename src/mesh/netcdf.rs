@@ -4,11 +4,7 @@ use std::path::Path;
 
 use rustc_hash::FxHashMap;
 
-/// What is wrong, without the file.
-pub type Fault<T> = std::result::Result<T, String>;
-
-/// Bytes that a byte of a compressed file can stand for at most.
-const LARGEST_RATIO: u64 = 1100;
+use super::{Fault, LARGEST_RATIO};
 
 /// First bytes of an HDF5 file.
 pub const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
@@ -75,7 +71,7 @@ impl<'a> Netcdf<'a> {
             .iter()
             .try_fold(each, |all, length| all.checked_mul(*length as u64));
         // A chunk that is not written takes no bytes; no mesh has only such.
-        if count.is_none_or(|count| count > LARGEST_RATIO.saturating_mul(size)) {
+        if count.is_none_or(|count| count > (LARGEST_RATIO as u64).saturating_mul(size)) {
             return Err(format!("variable {name}: is larger than the file can hold"));
         }
         Ok(dataset)

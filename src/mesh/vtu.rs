@@ -9,17 +9,11 @@ use roxmltree::{Document, Node};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::kind::{Form, Kind};
-use super::{Group, Members, Mesh, Runs, fault, measure, position};
+use super::{Fault, Group, LARGEST_RATIO, Members, Mesh, Runs, fault, measure, position};
 use crate::error::{Result, excerpt};
 
 /// Arrays with more different values than this describe no groups.
 const MOST_GROUPS: usize = 1000;
-
-/// Bytes that a byte of zlib's can stand for at most, and some more.
-const LARGEST_RATIO: usize = 1100;
-
-/// What is wrong, without the file.
-type Fault<T> = std::result::Result<T, String>;
 
 /// The type of a cell by its number, with the order of its nodes where that differs.
 fn kind(number: i64) -> Option<(Kind, Option<&'static [usize]>)> {

@@ -7,9 +7,9 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, StepRule, Time};
+use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, Time};
 use crate::refine::Grids;
-use crate::{families, points, problem};
+use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
@@ -31,12 +31,6 @@ use super::steps::choose_steps;
 /// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
 /// cell off their grid.
 const SLACK: f64 = 1e-5;
-
-/// A step that contact has made too long becomes so much shorter than it must, for contact most likely stiffens further.
-const CONTACT_RESERVE: f64 = 0.95;
-
-/// A step is worth being longer that is below this share of what it may be.
-const CALM_SHARE: f64 = 0.8;
 
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
@@ -314,42 +308,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// The step (s) from here on, where contact is too stiff for the present one, or has long been soft enough for a longer
-    /// one. It divides the rest of the stage evenly.
-    pub fn step_for_contact(&self) -> Option<f64> {
-        let (contact, limit) = (self.contact.as_ref()?, self.contact_limit()?);
-        let most = self.steps[self.stage].0.min(CONTACT_RESERVE * limit);
-        let step = self.clock.step();
-        let is_too_long = contact.is_felt() && step > limit;
-        let is_too_short = contact.is_calm() && step < most;
-        if self.is_stage_over() || !(is_too_long || is_too_short) {
-            return None;
-        }
-        let left = self.clock.end() - self.clock.time();
-        Some(left / (left / most).ceil())
-    }
-
-    /// The longest step (s) with contact as it is now.
-    pub(super) fn contact_limit(&self) -> Option<f64> {
-        let contact = self.contact.as_ref()?;
-        let safety = match self.time_rule().step {
-            StepRule::Automatic(safety) => safety,
-            StepRule::Fixed(_) => 1.0,
-        };
-        Some(safety * contact.stable_step(self.scaled_stable_step()))
-    }
-
-    /// Counts the steps that contact would have let be longer.
-    fn count_calm_steps(&mut self) {
-        let Some(limit) = self.contact_limit() else {
-            return;
-        };
-        let could_be_longer = self.clock.step() < CALM_SHARE * limit.min(self.steps[self.stage].0);
-        if let Some(contact) = &mut self.contact {
-            contact.count_calm(could_be_longer);
-        }
-    }
-
     /// Makes the second half kick of the present step.
     pub(super) fn kick(&mut self) {
         let start = Instant::now();
@@ -544,19 +502,6 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 id: self.model.ids[index],
                 index,
             })
-    }
-
-    /// An error if the motion of a rigid body is not finite; the same on all ranks.
-    fn check_rigid(&self) -> Result<()> {
-        let lost = self.contact.as_ref().and_then(Contact::lost_rigid);
-        lost.map_or(Ok(()), |lost| {
-            let problem::Rigid { name, span, .. } = &self.problem.rigid[lost];
-            let message = format!(
-                "[rigid.{name}]: its motion is not finite at t = {:.6e} s; look at `motion` or `force`",
-                self.clock.time()
-            );
-            Err(Error::run(message).at(span))
-        })
     }
 
     /// Looks on all ranks whether every value is still finite.

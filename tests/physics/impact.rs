@@ -67,6 +67,7 @@ fn equal_bars_exchange_their_velocities_in_the_time_of_two_waves() {
         let lasted = touching.last().unwrap() - touching[0];
         assert!((lasted / 40e-6 - 1.0).abs() < 0.02, "{model}: {lasted} s");
         let [first, last] = [&rows[0], rows.last().unwrap()];
+        // What is missing is left in the bars as vibration, from the front that the lattice disperses.
         assert!((last[1] / first[1] - 1.0).abs() < 0.02, "{model}: {last:?}");
         assert!((last[2] / first[1]).abs() < 0.01, "{model}: {last:?}");
         let momentum = 0.1 * 8000.0 * 10.0;
@@ -91,6 +92,7 @@ fn damping_takes_what_the_motion_loses() {
     let [first, last] = [&rows[0], rows.last().unwrap()];
     assert!(last[2] > 0.005 * first[0], "{last:?}");
     assert_eq!(last[3], 0.0);
+    // Opening and closing between two steps costs some per cent of the energy in the contact.
     assert!(last[1].abs() < 0.1 * last[2], "{last:?}");
     assert!(last[4].abs() < 1e-9, "{last:?}");
 }
@@ -345,8 +347,10 @@ fn a_closed_crack_carries_load() {
     let closed = force(&cracked_block("contact = {}"));
     let open = force(&cracked_block(""));
     assert!(open.abs() < 0.02 * whole, "{open} of {whole}");
+    // The layer of contact, δ thick and free across (E for E/(1 − ν²)), lies in line with the 17 m between the supports:
+    // 17/(17 + 3.015/(1 − 1/16)) = 0.84. The faces, which are surfaces, take a little more.
     assert!(
-        (0.7..1.05).contains(&(closed / whole)),
+        (0.77..0.84).contains(&(closed / whole)),
         "{closed} of {whole}"
     );
 }

@@ -47,7 +47,7 @@ pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Contac
     let Some(contact) = &mut simulation.contact else {
         return ContactNow::default();
     };
-    contact.update_foreign(comm, fields);
+    contact.ghosts.update(comm, fields);
     let contact = &*contact;
     let bodies = bodies_of_pairs(simulation.problem);
     let new = || PairSum {

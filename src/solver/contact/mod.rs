@@ -1,7 +1,7 @@
 //! Contact: repulsion, friction and damping between points that no intact bond joins.
 //!
 //! Every owned point has a list of the points that may touch it before the next search, in ascending order of ids, so
-//! that its forces are summed in the same order on any ranks. Points are searched anew when one has moved half a skin
+//! that its forces are summed in the same order on any ranks. The lists are rebuilt when a point has moved half a skin
 //! since the last search. A pair touches where it is nearer than its distance of contact, which is never more than its reference
 //! distance: a body at rest has no contact forces. The faces of cracks are points whose bond has broken.
 //!
@@ -12,45 +12,42 @@
 
 mod by_pair;
 mod cells;
-mod foreign;
+mod ghosts;
 mod pair;
 mod rigid;
 mod rows;
+mod search;
 mod shape;
+mod start;
+mod state;
 
-use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
+use crate::comm::Communicator;
 use crate::comm::sum::{ExactSum, reduce};
-use crate::comm::{Communicator, Found, Halo, least};
 use crate::dimension::Dimension;
-use crate::error::{Error, Result};
-use crate::problem::{self, Problem};
+use crate::error::Result;
+use crate::problem::Problem;
 
 use super::bonds::Forces;
 use super::model::Model;
 use super::motion::Fields;
-use cells::Cells;
-use foreign::Foreign;
+use ghosts::Ghosts;
 use pair::{ContactPoint, Demand, PairRule, Touch};
 use rigid::{RigidBody, WrenchSums};
-use rows::{FoundPair, Rows};
+use rows::Rows;
+use start::check_outside;
+use state::StepDemand;
 
 pub use by_pair::{ContactNow, contact_now};
 pub use rigid::RigidState;
-
-/// The distance that points may approach between two searches, as a share of the largest distance of contact: at rest, a
-/// row of a lattice holds the nearest neighbours only.
-const SKIN: f64 = 0.4;
+pub use state::ContactState;
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
 /// Steps in which what approaches counts as touching already: it is seen one step before a step too long is made.
 const LOOK_AHEAD: f64 = 2.0;
-
-/// Steps that could have been longer before they become so.
-const CALM: u64 = 100;
 
 /// Contact on one rank.
 pub struct Contact<const D: usize> {
@@ -62,7 +59,7 @@ pub struct Contact<const D: usize> {
     largest: f64,
     /// Edge of a cell of each owned point's volume, m.
     edges: Vec<f64>,
-    foreign: ForeignPoints<D>,
+    ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
     /// Owned points that touch a rigid body, now and at the last evaluation.
     at_rigid: [Vec<u32>; 2],
@@ -72,44 +69,13 @@ pub struct Contact<const D: usize> {
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
-    /// The candidates and their bonds must be searched anew; equal on all ranks.
+    /// The lists and their bonds must be rebuilt; equal on all ranks.
     is_stale: bool,
     /// What contact demands of the step.
     demand: StepDemand,
     /// Buffers of [`Self::add_forces`]: the points with forces, and these.
     active: Vec<u32>,
     sums: Vec<PointSum<D>>,
-}
-
-/// What contact demands of the step, over all ranks and over what will touch within two steps.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-struct StepDemand {
-    /// The largest 2 Σ k/m of a point or body, 1/s²: a bound of what contact adds to the squares of the frequencies.
-    stiffness: f64,
-    /// The largest 2 Σ c/m, 1/s.
-    damping: f64,
-    /// Steps in a row that could have been longer.
-    calm: u64,
-}
-
-/// What of contact changes besides the fields of the points; the same on all ranks.
-#[derive(Debug, Clone, Default)]
-pub struct ContactState {
-    rigid: Vec<RigidState>,
-    demand: StepDemand,
-    /// Owned points that touch a rigid body.
-    at_rigid: Vec<u32>,
-}
-
-/// Points of other ranks that may touch own ones.
-#[derive(Default)]
-struct ForeignPoints<const D: usize> {
-    points: Vec<Foreign>,
-    edges: Vec<f64>,
-    displacement: Vec<Vec<f64>>,
-    velocity: Vec<Vec<f64>>,
-    halo: Halo,
 }
 
 /// The end of a step.
@@ -140,24 +106,6 @@ struct PointSum<const D: usize> {
     touches: bool,
 }
 
-impl ContactState {
-    /// As a checkpoint holds it; points that touch rigid bodies are found anew.
-    pub fn words(&self) -> Vec<u64> {
-        let demand = bytemuck::cast_slice(std::slice::from_ref(&self.demand));
-        [demand, bytemuck::cast_slice(&self.rigid)].concat()
-    }
-
-    /// What [`Self::words`] gave.
-    pub fn of_words(words: &[u64]) -> Self {
-        let (demand, rigid) = words.split_at(size_of::<StepDemand>() / size_of::<u64>());
-        Self {
-            rigid: bytemuck::cast_slice(rigid).to_vec(),
-            demand: bytemuck::cast_slice(demand)[0],
-            at_rigid: Vec::new(),
-        }
-    }
-}
-
 impl<const D: usize> Contact<D> {
     /// Contact of the points of a run with one another and with rigid bodies, if its deck asks for any. Collective.
     ///
@@ -186,7 +134,7 @@ impl<const D: usize> Contact<D> {
         let edges: Vec<f64> = model
             .volume
             .iter()
-            .map(|volume| edge_of(dimension, volume))
+            .map(|volume| dimension.edge(volume))
             .collect();
         let mut largest_edges = vec![0.0_f64; blocks.len()];
         for (block, edge) in model.block.iter().zip(&edges) {
@@ -207,7 +155,7 @@ impl<const D: usize> Contact<D> {
         let rigid = problem.rigid.iter();
         let rigid = rigid.map(|rigid| RigidBody::new(rigid, dimension, &blocks));
         let rigid: Vec<_> = rigid.collect();
-        are_outside(problem, comm, model, &rigid)?;
+        check_outside(problem, comm, model, &rigid)?;
         Ok(Some(Self {
             dimension,
             rigid,
@@ -217,7 +165,7 @@ impl<const D: usize> Contact<D> {
             rules,
             largest,
             edges: edges[..model.owned()].to_vec(),
-            foreign: ForeignPoints::default(),
+            ghosts: Ghosts::default(),
             rows: Rows::default(),
             open: Vec::new(),
             is_open: vec![false; model.owned()],
@@ -226,25 +174,6 @@ impl<const D: usize> Contact<D> {
             demand: StepDemand::default(),
             sums: Vec::new(),
         }))
-    }
-
-    /// What of it changes besides the fields.
-    pub fn state(&self) -> ContactState {
-        ContactState {
-            rigid: self.rigid.iter().map(|rigid| rigid.state).collect(),
-            demand: self.demand,
-            at_rigid: self.at_rigid[0].clone(),
-        }
-    }
-
-    /// Goes back to a state; bonds and fields were put back, too.
-    pub fn set_state(&mut self, state: &ContactState) {
-        for (rigid, state) in self.rigid.iter_mut().zip(&state.rigid) {
-            rigid.state = *state;
-        }
-        self.demand = state.demand;
-        self.at_rigid[0].clone_from(&state.at_rigid);
-        self.is_stale = true;
     }
 
     /// The rigid body, by index, whose motion is not finite, if there is one.
@@ -257,52 +186,6 @@ impl<const D: usize> Contact<D> {
         for rigid in &mut self.rigid {
             rigid.drift(time, step);
         }
-    }
-
-    /// Whether anything touches or will soon.
-    pub fn is_felt(&self) -> bool {
-        self.demand.stiffness > 0.0
-    }
-
-    /// Whether steps have been shorter than they must be for so long that they may become longer.
-    pub fn is_calm(&self) -> bool {
-        self.demand.calm >= CALM
-    }
-
-    /// The stable step (s) with contact as it is now, where it is `step` (s) without.
-    ///
-    /// With damping at the velocities half a step before, Δt² ω² + 2 Δt C/m < 4 is stable.
-    pub fn stable_step(&self, step: f64) -> f64 {
-        let square = 4.0 / (step * step) + self.demand.stiffness;
-        let damping = self.demand.damping;
-        ((damping * damping + 4.0 * square).sqrt() - damping) / square
-    }
-
-    /// Takes note of whether the present step could have been longer.
-    pub fn count_calm(&mut self, could_be_longer: bool) {
-        self.demand.calm = if could_be_longer {
-            self.demand.calm + 1
-        } else {
-            0
-        };
-    }
-
-    /// Densities of the points were multiplied by a factor.
-    pub fn scale_density(&mut self, factor: f64) {
-        self.demand.stiffness /= factor.min(1.0);
-        self.demand.damping /= factor.min(1.0);
-    }
-
-    /// Memory, bytes.
-    pub fn bytes(&self) -> usize {
-        self.rows.bytes()
-            + size_of_val(&self.edges[..])
-            + self.foreign.points.len() * (size_of::<Foreign>() + (2 * D + 1) * size_of::<f64>())
-            + self
-                .searched
-                .iter()
-                .map(|column| size_of_val(&column[..]))
-                .sum::<usize>()
     }
 
     /// Adds the forces of contact at the present positions to the internal forces. At the end of a step, friction and
@@ -321,8 +204,8 @@ impl<const D: usize> Contact<D> {
             if !is_finite {
                 return;
             }
-            self.note_broken(model, forces);
-            self.update_foreign(comm, fields);
+            self.update_bonds(model, forces);
+            self.ghosts.update(comm, fields);
         }
         let look_ahead = end.map_or(0.0, |end| LOOK_AHEAD * end.next);
         let mut active = std::mem::take(&mut self.active);
@@ -398,6 +281,12 @@ impl<const D: usize> Contact<D> {
         [stiffness, damping]: [f64; 2],
         end: StepEnd,
     ) {
+        if self.rigid.is_empty() {
+            let mut largest = [stiffness, damping];
+            comm.max(&mut largest);
+            [self.demand.stiffness, self.demand.damping] = largest;
+            return;
+        }
         // Then the distance of the farthest point that touches each rigid body.
         let mut largest = vec![0.0; 2 + self.rigid.len()];
         (largest[0], largest[1]) = (stiffness, damping);
@@ -422,9 +311,6 @@ impl<const D: usize> Contact<D> {
         comm.max(&mut largest);
         let (points, reaches) = largest.split_at(2);
         (self.demand.stiffness, self.demand.damping) = (points[0], points[1]);
-        if self.rigid.is_empty() {
-            return;
-        }
         let sums = reduce(comm, &mut sums);
         let each = sums.chunks_exact(WrenchSums::COUNT + 2).zip(reaches);
         for (rigid, (sums, reach)) in self.rigid.iter_mut().zip(each) {
@@ -436,177 +322,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Searches anew where points have moved too far. Returns whether all positions are finite on all ranks. Collective.
-    fn search_where_due(
-        &mut self,
-        comm: &dyn Communicator,
-        model: &Model<D>,
-        forces: &Forces<D>,
-        fields: &mut Fields<D>,
-    ) -> bool {
-        let displacement = &fields.displacement;
-        let searched = &self.searched;
-        let is_stale = self.is_stale;
-        let moved = (0..model.owned())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|point| {
-                let square: f64 = (0..D)
-                    .map(|d| {
-                        let before = if is_stale { 0.0 } else { searched[d][point] };
-                        (displacement[d][point] - before).powi(2)
-                    })
-                    .sum();
-                if square.is_nan() {
-                    f64::INFINITY
-                } else {
-                    square
-                }
-            });
-        let mut moved = [moved.reduce(|| 0.0, f64::max)];
-        comm.max(&mut moved);
-        let skin = SKIN * self.largest;
-        if moved[0].is_infinite() {
-            return false;
-        }
-        if is_stale || 4.0 * moved[0] > skin * skin {
-            self.search(comm, model, forces, fields);
-        }
-        true
-    }
-
-    /// Finds the pairs that may touch before the next search. Collective.
-    fn search(
-        &mut self,
-        comm: &dyn Communicator,
-        model: &Model<D>,
-        forces: &Forces<D>,
-        fields: &mut Fields<D>,
-    ) {
-        let skin = SKIN * self.largest;
-        let reach = self.largest + skin;
-        let own: Vec<Foreign> = (0..model.owned())
-            .map(|point| {
-                let reference = model.position(point);
-                let mut place = reference;
-                for d in 0..D {
-                    place[d] += fields.displacement[d][point];
-                }
-                Foreign {
-                    id: model.ids[point],
-                    index: point as u64,
-                    block: model.block[point].into(),
-                    volume: model.volume[point],
-                    reference,
-                    place,
-                }
-            })
-            .collect();
-        let (points, halo) = foreign::find(comm, &own, reach, D, 2 * D);
-        let edges = points
-            .iter()
-            .map(|point| edge_of(self.dimension, point.volume));
-        let columns = || vec![vec![0.0; points.len()]; D];
-        self.foreign = ForeignPoints {
-            edges: edges.collect(),
-            displacement: columns(),
-            velocity: columns(),
-            points,
-            halo,
-        };
-        let all: Vec<Foreign> = own.iter().chain(&self.foreign.points).copied().collect();
-        let places: Vec<[f64; 3]> = all.iter().map(|point| point.place).collect();
-        let cells = Cells::new(&places, reach, D);
-        let edge = |index: usize| match index.checked_sub(model.owned()) {
-            None => self.edges[index],
-            Some(foreign) => self.foreign.edges[foreign],
-        };
-        let mut rows = Rows::new(model.owned(), |point, row| {
-            let here = &all[point];
-            cells.near(here.place, |index| {
-                let there = &all[index];
-                let rule = &self.rules[here.block as usize * self.blocks + there.block as usize];
-                let (Some(rule), true) = (rule, index != point) else {
-                    return;
-                };
-                let apart = |a: &[f64; 3], b: &[f64; 3]| {
-                    (0..D).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
-                };
-                let reference = apart(&here.reference, &there.reference);
-                let distance = rule.distance([edge(point), edge(index)], reference);
-                if apart(&here.place, &there.place) <= distance + skin {
-                    row.push(FoundPair {
-                        id: there.id,
-                        other: index as u32,
-                    });
-                }
-            });
-        });
-        if self.is_stale {
-            forces.for_each_intact(|point, other| {
-                if !rows.is_empty(point) {
-                    rows.set_bonded(point, model.ids[other]);
-                }
-            });
-        } else {
-            for point in rows.inherit(&self.rows) {
-                find_bonds(&mut rows, model, forces, point);
-            }
-        }
-        self.rows = rows;
-        let before = std::mem::take(&mut self.open);
-        for point in 0..model.owned() {
-            self.is_open[point] = self.rows.is_open(point);
-            if self.is_open[point] {
-                self.open.push(point as u32);
-            }
-        }
-        for point in before {
-            if !self.is_open[point as usize] {
-                fields.clear_contact(point as usize);
-            }
-        }
-        for d in 0..D {
-            self.searched[d].clear();
-            self.searched[d].extend_from_slice(&fields.displacement[d][..model.owned()]);
-        }
-        self.is_stale = false;
-    }
-
-    /// Takes note of the bonds that broke in the last evaluation of bonds.
-    fn note_broken(&mut self, model: &Model<D>, forces: &Forces<D>) {
-        for broken in forces.broken() {
-            let point = broken.point;
-            find_bonds(&mut self.rows, model, forces, point);
-            if !self.is_open[point] && self.rows.is_open(point) {
-                self.is_open[point] = true;
-                self.open.push(point as u32);
-            }
-        }
-    }
-
-    /// Brings the motion of the points of other ranks. Collective.
-    fn update_foreign(&mut self, comm: &dyn Communicator, fields: &Fields<D>) {
-        let ForeignPoints {
-            displacement,
-            velocity,
-            halo,
-            ..
-        } = &mut self.foreign;
-        let count = 2 * D;
-        let column = |k: usize| -> &[f64] {
-            match k.checked_sub(D) {
-                None => &fields.displacement[k],
-                Some(k) => &fields.velocity[k],
-            }
-        };
-        halo.pack((0..count).map(column));
-        halo.exchange(comm, &mut |_| {});
-        let received = displacement.iter_mut().chain(velocity);
-        halo.unpack(received.map(Vec::as_mut_slice));
-    }
-
-    /// A point by its index: owned points, then those of other ranks.
+    /// A point by its index: owned points, then ghosts.
     fn point(
         &self,
         model: &Model<D>,
@@ -630,17 +346,17 @@ impl<const D: usize> Contact<D> {
                 )
             }
             Some(index) => {
-                let foreign = &self.foreign;
-                let point = &foreign.points[index];
+                let ghosts = &self.ghosts;
+                let point = &ghosts.points[index];
                 let block = point.block as usize;
                 (
                     block,
                     ContactPoint {
                         reference: std::array::from_fn(|d| point.reference[d]),
-                        displacement: std::array::from_fn(|d| foreign.displacement[d][index]),
-                        velocity: std::array::from_fn(|d| foreign.velocity[d][index]),
+                        displacement: std::array::from_fn(|d| ghosts.displacement[d][index]),
+                        velocity: std::array::from_fn(|d| ghosts.velocity[d][index]),
                         volume: point.volume,
-                        edge: foreign.edges[index],
+                        edge: ghosts.edges[index],
                         mass: model.density[block] * point.volume,
                     },
                 )
@@ -738,58 +454,5 @@ impl<const D: usize> PointSum<D> {
             self.demand.stiffness += stiffness;
             self.demand.damping += damping;
         }
-    }
-}
-
-/// An error if a point begins in a rigid body. Collective.
-fn are_outside<const D: usize>(
-    problem: &Problem,
-    comm: &dyn Communicator,
-    model: &Model<D>,
-    rigid: &[RigidBody],
-) -> Result<()> {
-    for rigid in rigid {
-        let depth = |point: usize| rigid.start_distance(model.position(point));
-        let inside = (0..model.owned()).filter(|point| depth(*point) <= 0.0);
-        let first = inside.min_by_key(|point| model.ids[*point]);
-        let own = first.map(|point| Found {
-            key: 0.0,
-            ids: [model.ids[point]],
-            payload: [f64::from(model.block[point]), depth(point)],
-        });
-        if let Some(Found {
-            ids: [id],
-            payload: [block, depth],
-            ..
-        }) = least(comm, own)
-        {
-            let body = &problem.block(block as usize).body.name;
-            let problem::Rigid { name, span, .. } = rigid.problem();
-            let message = format!(
-                "[rigid.{name}]: point {id} of [body.{body}] begins {:.3e} m within it; move it away",
-                -depth
-            );
-            return Err(Error::input(message).at(span));
-        }
-    }
-    Ok(())
-}
-
-/// Finds which points of a row an intact bond joins to its point.
-fn find_bonds<const D: usize>(rows: &mut Rows, model: &Model<D>, forces: &Forces<D>, point: usize) {
-    if rows.is_empty(point) {
-        return;
-    }
-    rows.set_unbonded(point);
-    forces.for_each_neighbour(point, |other| rows.set_bonded(point, model.ids[other]));
-}
-
-/// Edge of a cube, square or line of a volume (m³), m.
-fn edge_of(dimension: Dimension, volume: f64) -> f64 {
-    let extent = volume / dimension.out_of_plane_measure();
-    match dimension.count() {
-        1 => extent,
-        2 => extent.sqrt(),
-        _ => libm::cbrt(extent),
     }
 }

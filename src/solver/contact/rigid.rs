@@ -303,7 +303,7 @@ impl RigidBody {
     }
 
     /// What a point demands of the step if it touches the body or will within a time (s), at the speed at which it
-    /// approaches now.
+    /// approaches now; only within an edge of its cell, so that most points need no velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -311,10 +311,14 @@ impl RigidBody {
         time: f64,
     ) -> Option<Demand> {
         let (apart, normal) = self.surface(point.place());
+        let gap = apart - 0.5 * point.edge;
+        if gap > point.edge {
+            return None;
+        }
         let arm = Vector3::from(point.place()) - Vector3::from(self.state.position);
         let velocity = Vector3::from(whole(point.velocity)) - self.surface_velocity(arm);
         let approach = -velocity.dot(&normal);
-        let touches = apart - time * approach.max(0.0) <= 0.5 * point.edge;
+        let touches = gap <= time * approach.max(0.0);
         touches.then(|| {
             self.response
                 .demand(self.point_stiffness(block, point), self.reduced(point.mass))

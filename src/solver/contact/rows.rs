@@ -109,10 +109,4 @@ impl Rows {
         }
         new
     }
-
-    /// Memory, bytes.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..])
-            + self.ids.len() * (size_of::<u32>() + size_of::<u64>() + size_of::<bool>())
-    }
 }

@@ -2,6 +2,7 @@
 
 pub mod adaptive;
 pub mod clock;
+mod contact_step;
 pub mod fields;
 mod pieces;
 pub mod relaxation;

@@ -77,7 +77,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.density_scale_energy = scaled.first().copied().map_or(0.0, f64::from_bits);
         self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
         if let Some(contact) = &mut self.contact {
-            contact.set_state(&ContactState::of_words(contact_words));
+            contact.restore(&ContactState::of_words(contact_words));
         }
     }
 

@@ -44,7 +44,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
         self.forces.undo(&kept.bonds);
         if let (Some(contact), Some(state)) = (&mut self.contact, &kept.contact) {
-            contact.set_state(state);
+            contact.undo(state, &self.model, &self.forces);
         }
         // Loads know their values at the present time.
         self.apply_loads(clock.time(), true);

@@ -1,5 +1,5 @@
 //! Runs without `[contact]`: bodies that no bond joins go through one another. This finds whether points of such bodies
-//! have come nearer than their spacing, so that the user is told.
+//! have come nearer than their spacing, and tells the user.
 //!
 //! Where the boxes around two bodies meet, their points are dealt out to the ranks by cells of space, the
 //! points of one body to all cells that they may meet others in; so each rank compares a part.
@@ -89,7 +89,12 @@ impl ContactWatch {
         let mut spacing = vec![0.0_f64; bodies];
         for (point, block) in model.block.iter().enumerate() {
             let largest = &mut spacing[simulation.problem.body_of(usize::from(*block))];
-            *largest = largest.max(spacing_of(simulation, point));
+            *largest = largest.max(
+                simulation
+                    .problem
+                    .dimension
+                    .edge(simulation.model.volume[point]),
+            );
         }
         comm.max(&mut spacing);
         Self { pairs, spacing }
@@ -165,13 +170,6 @@ impl ContactWatch {
     }
 }
 
-/// Edge of a cube, square or line of a point's volume, m.
-fn spacing_of<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
-    let extent =
-        simulation.model.volume[point] / simulation.problem.dimension.out_of_plane_measure();
-    libm::pow(extent, 1.0 / D as f64)
-}
-
 /// Present place of an owned point, m.
 fn place_of<const D: usize>(
     model: &Model<D>,
@@ -211,7 +209,10 @@ fn candidates<const D: usize>(
                 id: model.ids[point],
                 place,
                 reference: model.position(point),
-                spacing: spacing_of(simulation, point),
+                spacing: simulation
+                    .problem
+                    .dimension
+                    .edge(simulation.model.volume[point]),
             };
             let reach = *second as f64 * meeting.radius;
             for rank in homes::<D>(place, reach, CELL * meeting.radius, ranks) {

@@ -49,10 +49,7 @@ impl CrackPath {
         let volumes = (0..model.owned()).map(|point| model.volume[point]);
         let mut largest = [volumes.fold(0.0, f64::max)];
         comm.max(&mut largest);
-        let spacing = libm::pow(
-            largest[0] / problem.dimension.out_of_plane_measure(),
-            1.0 / D as f64,
-        );
+        let spacing = problem.dimension.edge(largest[0]);
         let link = (LINK * problem.horizon).max(DIAGONAL * spacing);
         let reach = Reach {
             link,

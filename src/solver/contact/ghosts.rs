@@ -1,4 +1,5 @@
-//! Points of other ranks that may touch own ones: which they are, and how their motion arrives.
+//! The ghosts of contact: points of other ranks that may touch own ones. They are not those of the bonds, for contact
+//! follows present positions.
 //!
 //! Any two ranks can meet. Each cell of present space has a home rank, found by its hash. It tells every rank with points
 //! in the cell which other ranks have points in the cell or next to it.
@@ -9,6 +10,8 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::comm::halo::Neighbour;
 use crate::comm::{Communicator, Halo};
+use crate::dimension::Dimension;
+use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
 
@@ -18,7 +21,7 @@ const CELL: f64 = 4.0;
 /// A point as other ranks see it.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Foreign {
+pub(super) struct Ghost {
     /// Its id.
     pub id: u64,
     /// Local index with its owner.
@@ -31,6 +34,55 @@ pub(super) struct Foreign {
     pub reference: [f64; 3],
     /// Present position, m.
     pub place: [f64; 3],
+}
+
+/// The points of other ranks that may touch own ones, with their motion.
+#[derive(Default)]
+pub(super) struct Ghosts<const D: usize> {
+    /// The points, sorted by owner and then by id.
+    pub points: Vec<Ghost>,
+    /// Edges of their cells, m.
+    pub edges: Vec<f64>,
+    /// By component, m.
+    pub displacement: Vec<Vec<f64>>,
+    /// By component, m/s.
+    pub velocity: Vec<Vec<f64>>,
+    halo: Halo,
+}
+
+impl<const D: usize> Ghosts<D> {
+    /// Those within `reach` (m) of own points; their motion is still to be brought. Collective.
+    pub fn within(
+        comm: &dyn Communicator,
+        dimension: Dimension,
+        own: &[Ghost],
+        reach: f64,
+    ) -> Self {
+        let (points, halo) = find(comm, own, reach, D, 2 * D);
+        let columns = || vec![vec![0.0; points.len()]; D];
+        let edges = points.iter().map(|point| dimension.edge(point.volume));
+        Self {
+            edges: edges.collect(),
+            displacement: columns(),
+            velocity: columns(),
+            points,
+            halo,
+        }
+    }
+
+    /// Brings their motion. Collective.
+    pub fn update(&mut self, comm: &dyn Communicator, fields: &Fields<D>) {
+        let column = |k: usize| -> &[f64] {
+            match k.checked_sub(D) {
+                None => &fields.displacement[k],
+                Some(k) => &fields.velocity[k],
+            }
+        };
+        self.halo.pack((0..2 * D).map(column));
+        self.halo.exchange(comm, &mut |_| {});
+        let received = self.displacement.iter_mut().chain(&mut self.velocity);
+        self.halo.unpack(received.map(Vec::as_mut_slice));
+    }
 }
 
 /// A rank has points in a cell, or beside it.
@@ -52,13 +104,13 @@ struct Partner {
 
 /// The points of other ranks within `reach` (m) of own ones, in a space of so many dimensions, sorted by owner and then by
 /// id, and the plan by which values of them arrive, as many as `width` a point. Collective.
-pub(super) fn find(
+fn find(
     comm: &dyn Communicator,
-    own: &[Foreign],
+    own: &[Ghost],
     reach: f64,
     dimension: usize,
     width: usize,
-) -> (Vec<Foreign>, Halo) {
+) -> (Vec<Ghost>, Halo) {
     if comm.size() == 1 {
         return (Vec::new(), Halo::default());
     }
@@ -79,7 +131,7 @@ pub(super) fn find(
 
     let places: Vec<[f64; 3]> = own.iter().map(|point| point.place).collect();
     let cells = Cells::new(&places, reach, dimension);
-    let is_near = |point: &Foreign| {
+    let is_near = |point: &Ghost| {
         let mut is_near = false;
         cells.near(point.place, |index| {
             let square = (0..dimension).map(|d| (places[index][d] - point.place[d]).powi(2));
@@ -87,11 +139,11 @@ pub(super) fn find(
         });
         is_near
     };
-    let mut found: Vec<Foreign> = Vec::new();
+    let mut found: Vec<Ghost> = Vec::new();
     let mut requests = vec![Vec::new(); comm.size()];
     let mut received = vec![0..0; comm.size()];
     for (rank, bytes) in offered.into_iter().enumerate() {
-        let mut points: Vec<Foreign> = bytemuck::pod_collect_to_vec(&bytes);
+        let mut points: Vec<Ghost> = bytemuck::pod_collect_to_vec(&bytes);
         points.retain(is_near);
         points.sort_unstable_by_key(|point| point.id);
         for point in &points {

@@ -1,0 +1,166 @@
+//! The search of the pairs that may touch, and of the bonds that keep them apart.
+
+use rayon::prelude::*;
+
+use crate::comm::Communicator;
+use crate::solver::bonds::Forces;
+use crate::solver::model::Model;
+use crate::solver::motion::Fields;
+
+use super::cells::Cells;
+use super::ghosts::{Ghost, Ghosts};
+use super::rows::{FoundPair, Rows};
+use super::{CHUNK, Contact};
+
+/// The distance that points may approach between two searches, as a share of the largest distance of contact: at rest, a
+/// row of a lattice holds the nearest neighbours only.
+const SKIN: f64 = 0.4;
+
+impl<const D: usize> Contact<D> {
+    /// Searches if a point has moved half a skin. Returns whether all positions are finite on all ranks. Collective.
+    pub(super) fn search_where_due(
+        &mut self,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+        forces: &Forces<D>,
+        fields: &mut Fields<D>,
+    ) -> bool {
+        let displacement = &fields.displacement;
+        let searched = &self.searched;
+        let is_stale = self.is_stale;
+        let moved = (0..model.owned())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|point| {
+                let square: f64 = (0..D)
+                    .map(|d| {
+                        let before = if is_stale { 0.0 } else { searched[d][point] };
+                        (displacement[d][point] - before).powi(2)
+                    })
+                    .sum();
+                if square.is_nan() {
+                    f64::INFINITY
+                } else {
+                    square
+                }
+            });
+        let mut moved = [moved.reduce(|| 0.0, f64::max)];
+        comm.max(&mut moved);
+        let skin = SKIN * self.largest;
+        if moved[0].is_infinite() {
+            return false;
+        }
+        if is_stale || 4.0 * moved[0] > skin * skin {
+            self.search(comm, model, forces, fields);
+        }
+        true
+    }
+
+    /// Finds the pairs that may touch before the next search. Collective.
+    fn search(
+        &mut self,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+        forces: &Forces<D>,
+        fields: &mut Fields<D>,
+    ) {
+        let skin = SKIN * self.largest;
+        let reach = self.largest + skin;
+        let own: Vec<Ghost> = (0..model.owned())
+            .map(|point| {
+                let reference = model.position(point);
+                let mut place = reference;
+                for d in 0..D {
+                    place[d] += fields.displacement[d][point];
+                }
+                Ghost {
+                    id: model.ids[point],
+                    index: point as u64,
+                    block: model.block[point].into(),
+                    volume: model.volume[point],
+                    reference,
+                    place,
+                }
+            })
+            .collect();
+        self.ghosts = Ghosts::within(comm, self.dimension, &own, reach);
+        let all: Vec<Ghost> = own.iter().chain(&self.ghosts.points).copied().collect();
+        let places: Vec<[f64; 3]> = all.iter().map(|point| point.place).collect();
+        let cells = Cells::new(&places, reach, D);
+        let edge = |index: usize| match index.checked_sub(model.owned()) {
+            None => self.edges[index],
+            Some(ghost) => self.ghosts.edges[ghost],
+        };
+        let mut rows = Rows::new(model.owned(), |point, row| {
+            let here = &all[point];
+            cells.near(here.place, |index| {
+                let there = &all[index];
+                let rule = &self.rules[here.block as usize * self.blocks + there.block as usize];
+                let (Some(rule), true) = (rule, index != point) else {
+                    return;
+                };
+                let apart = |a: &[f64; 3], b: &[f64; 3]| {
+                    (0..D).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
+                };
+                let reference = apart(&here.reference, &there.reference);
+                let distance = rule.distance([edge(point), edge(index)], reference);
+                if apart(&here.place, &there.place) <= distance + skin {
+                    row.push(FoundPair {
+                        id: there.id,
+                        other: index as u32,
+                    });
+                }
+            });
+        });
+        if self.is_stale {
+            forces.for_each_intact(|point, other| {
+                if !rows.is_empty(point) {
+                    rows.set_bonded(point, model.ids[other]);
+                }
+            });
+        } else {
+            for point in rows.inherit(&self.rows) {
+                find_bonds(&mut rows, model, forces, point);
+            }
+        }
+        self.rows = rows;
+        let before = std::mem::take(&mut self.open);
+        for point in 0..model.owned() {
+            self.is_open[point] = self.rows.is_open(point);
+            if self.is_open[point] {
+                self.open.push(point as u32);
+            }
+        }
+        for point in before {
+            if !self.is_open[point as usize] {
+                fields.clear_contact(point as usize);
+            }
+        }
+        for d in 0..D {
+            self.searched[d].clear();
+            self.searched[d].extend_from_slice(&fields.displacement[d][..model.owned()]);
+        }
+        self.is_stale = false;
+    }
+
+    /// Finds the bonds again of the points where some broke in the last evaluation of bonds, or were put back since.
+    pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
+        for broken in forces.broken() {
+            let point = broken.point;
+            find_bonds(&mut self.rows, model, forces, point);
+            if !self.is_open[point] && self.rows.is_open(point) {
+                self.is_open[point] = true;
+                self.open.push(point as u32);
+            }
+        }
+    }
+}
+
+/// Finds which candidates of a point an intact bond joins to it.
+fn find_bonds<const D: usize>(rows: &mut Rows, model: &Model<D>, forces: &Forces<D>, point: usize) {
+    if rows.is_empty(point) {
+        return;
+    }
+    rows.set_unbonded(point);
+    forces.for_each_neighbour(point, |other| rows.set_bonded(point, model.ids[other]));
+}
