@@ -160,14 +160,14 @@ impl Criterion {
             ),
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
                 let [i, j] = ends.weights.acting();
-                let spent = simd.at_least(work, self.threshold(simd, ends)) & (i | j);
+                let spent = simd.at_least(work, self.threshold(simd, bond, ends)) & (i | j);
                 match rule.sense {
                     Sense::Pulled => spent & bond.relative_square_extension.above(0.0),
                     Sense::Either => spent,
                 }
             }
             Self::Stretch(_) | Self::Thresholds(_) => {
-                let threshold = self.threshold(simd, ends);
+                let threshold = self.threshold(simd, bond, ends);
                 let threshold = threshold * (Lanes::splat(2.0) + threshold);
                 simd.at_least(bond.relative_square_extension, threshold)
             }
@@ -179,12 +179,10 @@ impl Criterion {
     fn threshold<S: Simd, L: Law<D>, const D: usize>(
         self,
         simd: S,
+        bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
     ) -> Lanes {
-        let scale = || {
-            let [here, there] = ends.points;
-            ends.laws[0].toughness_scale(here, &ends.laws[1], there)
-        };
+        let scale = || ends.laws[0].toughness_scale(bond, ends.points, &ends.laws[1]);
         match self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
@@ -220,7 +218,7 @@ impl Criterion {
         ends: Ends<'_, L, L::Point>,
         work: Lanes,
     ) -> Lanes {
-        let threshold = self.threshold(simd, ends);
+        let threshold = self.threshold(simd, bond, ends);
         let ratio = if self.reads_work() {
             threshold / work
         } else {
