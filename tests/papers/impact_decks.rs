@@ -64,21 +64,20 @@ fn an_indenter_breaks_glass_and_is_pulled_back() {
         "external_work",
         "kinetic_energy",
         "fracture_energy",
-        "fragments",
         "rigid_indenter_position_z",
         "rigid_indenter_force_z",
         "momentum_z",
     ];
     simulate_input::<3, _>("indenter", &[("dx", "1e-3")], |simulation| {
         let [middle, last] = ends(simulation, &names);
-        assert!(last[3] > 0.0 && last[4] > 1.0, "{last:?}");
+        assert!(last[3] > 0.01 * last[1], "{last:?}");
         assert!(last[0].abs() < 0.02 * last[1], "{last:?}");
         // Deepest in the middle, back at the start in the end.
         assert!(
-            middle[5] < 0.0 && (last[5] - 1.5e-3).abs() < 1e-9,
+            middle[4] < 0.0 && (last[4] - 1.5e-3).abs() < 1e-9,
             "{middle:?} {last:?}"
         );
-        assert!(last[6] == 0.0 && last[7] < 0.0, "{last:?}");
+        assert!(last[5] == 0.0 && last[6] < 0.0, "{last:?}");
     });
 }
 

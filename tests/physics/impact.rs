@@ -335,7 +335,10 @@ fn a_rigid_ball_rolls_down_a_plane_of_points() {
         "{found} for {expected}"
     );
     let without_overlap = 5.0 / 7.0 * gravity * angle.sin();
-    assert!((found / without_overlap - 1.0).abs() < 0.02, "{found} for {without_overlap}");
+    assert!(
+        (found / without_overlap - 1.0).abs() < 0.02,
+        "{found} for {without_overlap}"
+    );
     // It turns as it rolls.
     let of_spin = last[2] / (0.5 * mass * last[1].powi(2)) - 1.0;
     assert!((of_spin / inertia - 1.0).abs() < 0.05, "{of_spin}");
