@@ -19,6 +19,7 @@ pub mod points;
 pub mod problem;
 pub mod refine;
 pub mod run;
+pub mod scatter;
 pub mod solver;
 pub mod survey;
 

@@ -35,6 +35,7 @@ mod physics {
     mod contact;
     mod dynamics;
     mod impact;
+    mod pressed;
     mod refinement;
     mod relaxation;
     mod stable_step;
@@ -47,6 +48,7 @@ mod fracture {
     mod crack_paths;
     mod fracture_energy;
     mod fronts;
+    mod scatter;
     mod surfaces;
 }
 
@@ -66,5 +68,6 @@ mod papers {
     mod crack_branching;
     mod edge_on_impact;
     mod emmrich_weckner;
+    mod impact_decks;
     mod pmma;
 }

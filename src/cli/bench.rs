@@ -90,6 +90,25 @@ impl Family {
     }
 }
 
+/// The largest share of the points that can touch: cracks must be more than a bond apart.
+const MOST_TOUCHING: f64 = 0.25;
+
+/// Strain by which the faces of cracks are pressed on each other.
+const PRESSED: f64 = -1e-5;
+
+/// Parse the share of the points that touch.
+pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
+    let share = text.parse().ok();
+    let share = share.filter(|share| (0.0..=MOST_TOUCHING).contains(share));
+    share.ok_or_else(|| format!("must be a number from 0 to {MOST_TOUCHING}"))
+}
+
+/// Number of cracks through the block, across x, whose faces are the wanted share of its points.
+fn cracks(arguments: &BenchArguments) -> u64 {
+    let share = arguments.contact.unwrap_or(0.0);
+    (0.5 * share * arguments.points[0] as f64).round() as u64
+}
+
 /// Minimum memory traffic per point and step of the motion in 3-D, bytes: displacement, velocity and
 /// response read and written, block read, displacement written for the bond loops.
 const MOTION_BYTES: u64 = 170;
@@ -119,6 +138,20 @@ fn deck(arguments: &BenchArguments) -> String {
     let family = arguments.family.name();
     let [x, y, z] = arguments.points;
     let last = u64::from(warm_up(arguments)) + u64::from(arguments.steps);
+    let (contact, strain) = match arguments.contact {
+        None => (String::new(), 0.0),
+        Some(_) => {
+            let cracks = cracks(arguments);
+            let crack = |number: u64| {
+                let place = x * (number + 1) / (cracks + 1);
+                format!(
+                    "crack.c{number}.rectangle = {{ corner = ['{place}*1e-3', -1, -1], edge_a = [0, 9, 0], edge_b = [0, 0, 9] }}\n"
+                )
+            };
+            let cracks: String = (0..cracks).map(crack).collect();
+            (format!("contact.model = 'penalty'\n{cracks}"), PRESSED)
+        }
+    };
     let damage = if arguments.no_failure {
         ""
     } else {
@@ -130,12 +163,13 @@ fn deck(arguments: &BenchArguments) -> String {
         grid = {{ volume_correction = 'none', spacing = 1e-3, horizon = 3.015e-3, family = '{family}' }}
         material.block.{law}
         damage.block.{breaking}
+        {contact}
         [body.block]
         material = 'block'
         {damage}
         shape.box = {{ lower = [0, 0, 0], upper = ['{x}*1e-3', '{y}*1e-3', '{z}*1e-3'] }}
         [initial.wave]
-        displacement = ['1e-9*sin(400*x)', '1e-9*sin(300*y)', '1e-9*sin(200*z)']
+        displacement = ['{strain}*x + 1e-9*sin(400*x)', '1e-9*sin(300*y)', '1e-9*sin(200*z)']
         [time]
         step = 1e-8
         end = '{last}*1e-8'
@@ -194,13 +228,17 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
     // Only the first exchange of a step was repeated; those of further passes send less.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
-    let phases = vec![
+    let mut phases = vec![
         phase("bonds", times.forces.bonds),
         phase("halo", times.forces.halo),
         phase("motion", times.motion),
-        phase("loop", speed.whole),
     ];
-    let seconds = phases[3].slowest;
+    if arguments.contact.is_some() {
+        phases.push(phase("contact", times.contact));
+    }
+    let whole = phase("loop", speed.whole);
+    let seconds = whole.slowest;
+    phases.push(whole);
     let resident = |of: fn(Resident) -> f64, at: Resident| total(of(at) as u64);
     let memory = vec![
         ("before set-up", resident(|r| r.now, before)),
@@ -233,6 +271,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
         family,
         instructions: speed.instructions,
         failure: !arguments.no_failure,
+        touching: (arguments.contact)
+            .map(|_| 2.0 * cracks(arguments) as f64 / arguments.points[0] as f64),
         edges: arguments.points,
         points: points as f64,
         bonds,
@@ -258,6 +298,14 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shares_of_touching_points() {
+        assert_eq!(touching_share("0.1"), Ok(0.1));
+        for wrong in ["-0.1", "0.3", "nan", "many"] {
+            assert!(touching_share(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn edges_of_the_nearest_cube_or_of_a_block() {

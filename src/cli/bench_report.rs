@@ -40,6 +40,8 @@ pub struct Figures {
     pub instructions: Instructions,
     /// Bonds can break.
     pub failure: bool,
+    /// Share of the points that touch others, if there is contact.
+    pub touching: Option<f64>,
     /// Points along each edge.
     pub edges: [u64; 3],
     /// Number of points.
@@ -101,6 +103,15 @@ impl Figures {
         }
     }
 
+    /// Mean time of contact over that of the bonds, if there is contact.
+    fn contact_over_bonds(&self) -> Option<f64> {
+        let mean = |name: &str| {
+            let phase = self.phases.iter().find(|phase| phase.name == name)?;
+            Some(phase.mean)
+        };
+        Some(mean("contact")? / mean("bonds")?)
+    }
+
     fn law_name(&self) -> String {
         let value = self.law.to_possible_value();
         value.map_or_else(String::new, |value| value.get_name().to_owned())
@@ -150,6 +161,16 @@ impl Figures {
         {
             let share = 100.0 * mean / self.seconds();
             outln!("  {name:<12}{mean:9.3} s {share:5.1} %{slowest:8.3} s");
+        }
+        if let (Some(touching), Some(ratio)) = (self.touching, self.contact_over_bonds()) {
+            let touching = 100.0 * touching;
+            line(
+                "contact",
+                format!(
+                    "{:.1} % of bonds   ({touching:.1} % of the points touch)",
+                    100.0 * ratio
+                ),
+            );
         }
         outln!("memory             of all ranks   a point");
         for (name, all) in &self.memory {
@@ -232,6 +253,10 @@ impl Figures {
         {
             number(&format!("{name}_seconds"), *mean);
             number(&format!("{name}_seconds_slowest"), *slowest);
+        }
+        if let (Some(touching), Some(ratio)) = (self.touching, self.contact_over_bonds()) {
+            number("touching_share", touching);
+            number("contact_over_bonds", ratio);
         }
         for (name, all) in &self.memory {
             number(&format!("memory_{name}_bytes"), *all);

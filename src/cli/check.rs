@@ -98,6 +98,7 @@ fn simulate(problem: &Problem, request: &Request) -> Result<Report> {
     }
     section::joints(&mut report, problem, survey);
     section::contact(&mut report, problem);
+    section::rigid(&mut report, problem);
     section::places(&mut report, problem, survey, dimension);
     section::sets(&mut report, problem, survey);
     report.heading("size");

@@ -9,7 +9,8 @@ use fissure::dimension::Dimension;
 use fissure::error::Warning;
 use fissure::problem::Problem;
 use fissure::problem::{
-    Block, Body, ContactModel, ContactRule, DamageRule, PointSource, Sense, Time,
+    Block, Body, ContactModel, ContactRule, DamageRule, PointSource, RigidMotion, RigidShape,
+    Sense, Time,
 };
 use fissure::solver::assign::block_laws;
 use fissure::solver::calibration::separation_energy_ratio;
@@ -67,6 +68,9 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                 }
             }
             report.line("alpha", damage.alpha());
+            if let Some(weibull) = laws.weibull {
+                report.line("Weibull modulus", weibull.modulus);
+            }
         }
     }
     if let PointSource::Lattice { spacing, .. } = body.points {
@@ -226,6 +230,44 @@ pub fn contact(report: &mut Report, problem: &Problem) {
             };
             report.line(&name, described(contact.between(here, there)));
         }
+    }
+}
+
+/// The rigid bodies.
+pub fn rigid(report: &mut Report, problem: &Problem) {
+    if !problem.rigid.is_empty() {
+        report.heading("rigid bodies");
+    }
+    let dimension = problem.dimension.count();
+    for rigid in &problem.rigid {
+        let shape = match rigid.shape {
+            RigidShape::Ball { radius } => format!("radius {}", si(radius, "m")),
+            RigidShape::Cylinder {
+                half_length,
+                radius,
+                ..
+            } => format!(
+                "cylinder, radius {}, length {}",
+                si(radius, "m"),
+                si(2.0 * half_length, "m")
+            ),
+            RigidShape::Box { half } => {
+                let edges = half[..dimension].iter().map(|edge| si(2.0 * edge, "m"));
+                format!("box, {}", edges.collect::<Vec<_>>().join(" × "))
+            }
+            RigidShape::HalfSpace { .. } => "half space".to_owned(),
+        };
+        let motion = match &rigid.motion {
+            RigidMotion::Driven(motion) if motion.is_empty() => "fixed".to_owned(),
+            RigidMotion::Driven(_) => "driven".to_owned(),
+            RigidMotion::Free { mass, .. } => format!("free, {}", si(*mass, "kg")),
+        };
+        let at = place(&rigid.centre[..dimension]);
+        let friction = rigid.rule.kinetic_friction;
+        report.line(
+            &rigid.name,
+            format_args!("{shape}, at {at}, {motion}, friction {friction}"),
+        );
     }
 }
 

@@ -223,6 +223,11 @@ struct BenchArguments {
     #[arg(long)]
     no_failure: bool,
 
+    /// Contact between points that no bond joins. This share of the points, 0 to 0.25, touches others, at the faces of
+    /// closed cracks.
+    #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
+    contact: Option<f64>,
+
     /// Points of a cube (the nearest one is taken), or the edges of a block: X,Y,Z.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],

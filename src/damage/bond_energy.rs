@@ -79,11 +79,11 @@ impl BondEnergy {
             }
     }
 
-    /// The threshold (J/m⁶) of a point whose intact bonds have this smallest stretch: that of a stretch
-    /// s0 − α s_min in place of s0.
+    /// The threshold (J/m⁶) of a point with this strength f, 1 without scatter, whose intact bonds have this smallest
+    /// stretch: that of a stretch f s0 − α s_min in place of s0.
     #[inline(always)]
-    pub fn threshold(&self, smallest: f64) -> f64 {
-        let share = (1.0 - self.alpha * smallest / self.stretch).max(0.0);
+    pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
+        let share = (strength - self.alpha * smallest / self.stretch).max(0.0);
         self.critical * share * share
     }
 }
@@ -158,6 +158,8 @@ mod tests {
             },
         };
         // s0 − α s_min = 0.03 is 1.5 s0.
-        assert!((law.threshold(-0.02) - 9.0).abs() < 1e-12);
+        assert!((law.threshold(1.0, -0.02) - 9.0).abs() < 1e-12);
+        // The work grows with the square of the strength.
+        assert!((law.threshold(0.5, 0.0) - 0.25 * law.critical).abs() < 1e-12);
     }
 }

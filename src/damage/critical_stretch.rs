@@ -70,10 +70,11 @@ impl CriticalStretch {
         toughness * toughness / effective
     }
 
-    /// The threshold of a point whose intact bonds have this smallest stretch.
+    /// The threshold of a point with this strength, 1 without scatter, whose intact bonds have this smallest stretch:
+    /// s0 times the strength takes the place of s0.
     #[inline(always)]
-    pub fn threshold(&self, smallest: f64) -> f64 {
-        self.critical - self.alpha * smallest
+    pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
+        strength * self.critical - self.alpha * smallest
     }
 }
 

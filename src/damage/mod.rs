@@ -53,12 +53,12 @@ impl DamageLaw {
         }
     }
 
-    /// The threshold of a point whose intact bonds have this smallest stretch.
+    /// The threshold of a point with this strength, 1 without scatter, whose intact bonds have this smallest stretch.
     #[inline(always)]
-    pub fn threshold(&self, smallest: f64) -> f64 {
+    pub fn threshold(&self, strength: f64, smallest: f64) -> f64 {
         match self {
-            Self::CriticalStretch(law) => law.threshold(smallest),
-            Self::BondEnergy(law) => law.threshold(smallest),
+            Self::CriticalStretch(law) => law.threshold(strength, smallest),
+            Self::BondEnergy(law) => law.threshold(strength, smallest),
         }
     }
 }

@@ -47,7 +47,7 @@ pub fn contact(
         restitution: table.restitution.as_ref(),
     };
     let mut contact = problem::Contact {
-        rule: rule(scope, "[contact]", all)?,
+        rule: rule(scope, "[contact]", all, relaxes(deck))?,
         pairs: Vec::new(),
     };
     for (name, table) in &table.pair {
@@ -93,13 +93,13 @@ pub fn contact(
         contact.pairs.push(problem::ContactPair {
             name: name.clone(),
             bodies: names,
-            rule: rule(scope, &key, own)?,
+            rule: rule(scope, &key, own, relaxes(deck))?,
         });
     }
     Ok(Some(contact))
 }
 
-/// An error if a run with contact is a relaxation or refines its grid.
+/// An error if a run with contact refines its grid.
 fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     let refinement = deck.refinement.as_ref();
     if let Some(trigger) = refinement.and_then(|table| table.get_ref().trigger.as_ref()) {
@@ -107,23 +107,24 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
                        regions from the start, or remove [contact] and [rigid]";
         return Err(scope.error(trigger.span(), message));
     }
-    let of_time = ("[time]", &deck.time.get_ref().method);
-    let of_stages = deck.stage.iter();
-    let of_stages =
-        of_stages.filter_map(|stage| Some(("[[stage]]", stage.get_ref().method.as_ref()?)));
-    for (section, method) in std::iter::once(of_time).chain(of_stages) {
-        if *method.get_ref() == grammar::Method::Relaxation {
-            let message = format!(
-                "{section} method: contact is not available in a relaxation; use \"explicit\", or remove [contact] and [rigid]"
-            );
-            return Err(scope.error(method.span(), message));
-        }
-    }
     Ok(())
 }
 
-/// Validates a rule; `None` where there is no contact.
-pub(super) fn rule(scope: &Scope, section: &str, keys: Keys<'_>) -> Result<Option<ContactRule>> {
+/// Whether any stage of a run is a relaxation.
+pub(super) fn relaxes(deck: &Deck) -> bool {
+    let of_stages = deck.stage.iter();
+    let of_stages = of_stages.filter_map(|stage| stage.get_ref().method.as_ref());
+    let mut all = std::iter::once(&deck.time.get_ref().method).chain(of_stages);
+    all.any(|method| *method.get_ref() == grammar::Method::Relaxation)
+}
+
+/// Validates a rule of a run that may have relaxations; `None` where there is no contact.
+pub(super) fn rule(
+    scope: &Scope,
+    section: &str,
+    keys: Keys<'_>,
+    relaxes: bool,
+) -> Result<Option<ContactRule>> {
     let positive = |number: Option<&Number>, key: &str| {
         let number = number.map(|number| scope.positive(number, &format!("{section} {key}")));
         number.transpose()
@@ -150,6 +151,19 @@ pub(super) fn rule(scope: &Scope, section: &str, keys: Keys<'_>) -> Result<Optio
             "{section} static_friction: must be at least `friction`, {kinetic_friction}, is {static_friction}"
         );
         return Err(scope.error(number.span(), message));
+    }
+    let frictions = [
+        ("friction", keys.friction, kinetic_friction),
+        ("static_friction", keys.static_friction, static_friction),
+    ];
+    for (key, number, value) in frictions {
+        if let (Some(number), true) = (number, relaxes && value > 0.0) {
+            let message = format!(
+                "{section} {key}: friction is not available in a relaxation, in which nothing has a velocity; leave it \
+                 out, or load slowly with \"explicit\""
+            );
+            return Err(scope.error(number.span(), message));
+        }
     }
     let restitution = match keys.restitution {
         Some(number) => {

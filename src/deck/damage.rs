@@ -8,6 +8,7 @@ use super::resolve::Scope;
 use super::sets::find_sets;
 use crate::error::Result;
 use crate::problem::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
+use crate::scatter::Weibull;
 
 /// A key that says how much it takes for bonds to break, and what it means.
 type Measure<'a> = (&'a str, &'a Option<Number>, fn(f64) -> Toughness);
@@ -37,6 +38,7 @@ pub fn damage(
                 rule: DamageRule::CriticalStretch,
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
+                weibull: weibull(scope, &law.weibull_modulus, &law.seed, &key)?,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
             })
         }
@@ -80,6 +82,7 @@ pub fn damage(
                 rule: DamageRule::Energy { calibration, work },
                 toughness: measure(scope, spanned, &key, &all)?,
                 alpha: alpha(scope, &law.alpha, &key)?,
+                weibull: weibull(scope, &law.weibull_modulus, &law.seed, &key)?,
                 no_failure: no_failure(scope, sets, &law.no_failure, &key)?,
             })
         }
@@ -117,6 +120,27 @@ fn measure<T>(
 fn alpha(scope: &Scope, number: &Number, key: &str) -> Result<f64> {
     let words = "at least 0 and below 1";
     scope.within(number, &format!("{key} alpha"), 0.0..1.0, words)
+}
+
+fn weibull(
+    scope: &Scope,
+    modulus: &Option<Number>,
+    seed: &Option<Spanned<u64>>,
+    key: &str,
+) -> Result<Option<Weibull>> {
+    let Some(modulus) = modulus else {
+        return match seed {
+            None => Ok(None),
+            Some(seed) => {
+                let message = format!("{key} seed: only `weibull_modulus` has a seed");
+                Err(scope.error(seed.span(), message))
+            }
+        };
+    };
+    let key = format!("{key} weibull_modulus");
+    let modulus = scope.within(modulus, &key, 1.0..f64::INFINITY, "1 or more")?;
+    let seed = seed.as_ref().map_or(0, |seed| *seed.get_ref());
+    Ok(Some(Weibull { modulus, seed }))
 }
 
 fn family_correction(scope: &Scope, number: &Number, key: &str) -> Result<f64> {

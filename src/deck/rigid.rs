@@ -19,11 +19,16 @@ use crate::problem::{self, RigidMotion, RigidShape, Shape};
 pub fn rigid(scope: &Scope, deck: &Deck) -> Result<Vec<problem::Rigid>> {
     let bodies = deck.rigid.iter();
     bodies
-        .map(|(name, table)| body(scope, name, table))
+        .map(|(name, table)| body(scope, name, table, contact::relaxes(deck)))
         .collect()
 }
 
-fn body(scope: &Scope, name: &str, table: &Spanned<grammar::Rigid>) -> Result<problem::Rigid> {
+fn body(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::Rigid>,
+    relaxes: bool,
+) -> Result<problem::Rigid> {
     let key = format!("[rigid.{name}]");
     let (span, table) = (table.span(), table.get_ref());
     let given = [
@@ -51,7 +56,13 @@ fn body(scope: &Scope, name: &str, table: &Spanned<grammar::Rigid>) -> Result<pr
         static_friction: table.static_friction.as_ref(),
         restitution: table.restitution.as_ref(),
     };
-    let rule = contact::rule(scope, &key, keys)?;
+    let rule = contact::rule(scope, &key, keys, relaxes)?;
+    if let (Some(mass), true) = (&table.mass, relaxes) {
+        let message = format!(
+            "{key} mass: a free body is not available in a relaxation; drive it by `motion`, or use \"explicit\""
+        );
+        return Err(scope.error(mass.span(), message));
+    }
     Ok(problem::Rigid {
         name: name.to_owned(),
         span,

@@ -37,6 +37,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     })?;
     let bodies = bodies::bodies(scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(scope, deck, &bodies)?;
+    let jitter = jitter(scope, deck)?;
     let family = family(scope, deck)?;
     let interface = interface::interface(scope, deck, &bodies)?;
     let contact = contact::contact(scope, deck, &bodies)?;
@@ -58,6 +59,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
             Quadrature::Midpoint => problem::Quadrature::Midpoint,
             Quadrature::Gauss => problem::Quadrature::Gauss,
         },
+        jitter,
         family,
         interface,
         contact,
@@ -172,10 +174,14 @@ fn volume_correction(
         Some(VolumeCorrection::Exact) | None => problem::VolumeCorrection::Exact,
     };
     let gauss = grid.quadrature == Quadrature::Gauss;
+    let is_jittered = grid.jitter.is_some();
     let without_cells = |body: &problem::Body| match &body.points {
         problem::PointSource::File { .. } => Some("has its points from a file"),
         problem::PointSource::Mesh { .. } => Some("has its points from a mesh"),
         problem::PointSource::Lattice { .. } if gauss => Some("has Gauss points"),
+        problem::PointSource::Lattice { .. } if is_jittered => {
+            Some("has points that `jitter` moves")
+        }
         problem::PointSource::Lattice { spacing, .. } => {
             let edges = &spacing[..scope.dimension];
             let alike = edges.iter().all(|edge| *edge == edges[0]);
@@ -198,11 +204,39 @@ fn volume_correction(
     Err(scope.error(given.span(), message))
 }
 
+/// The random displacement of points.
+fn jitter(scope: &Scope, deck: &Deck) -> Result<Option<problem::Jitter>> {
+    let grid = deck.grid.get_ref();
+    let Some(share) = &grid.jitter else {
+        return match &grid.seed {
+            None => Ok(None),
+            Some(seed) => Err(scope.error(seed.span(), "[grid] seed: only `jitter` has a seed")),
+        };
+    };
+    let error = |message: &str| Err(scope.error(share.span(), format!("[grid] jitter: {message}")));
+    if grid.quadrature == Quadrature::Gauss {
+        return error("needs `quadrature = \"midpoint\"`, one point a cell");
+    }
+    if deck.refinement.is_some() {
+        return error("is not available with [refinement], whose points lie on grids");
+    }
+    // Points of two cells that touch cannot meet below a half.
+    let words = "at least 0 and below 0.5";
+    Ok(Some(problem::Jitter {
+        share: scope.within(share, "[grid] jitter", 0.0..0.5, words)?,
+        seed: grid.seed.as_ref().map_or(0, |seed| *seed.get_ref()),
+    }))
+}
+
 fn family(scope: &Scope, deck: &Deck) -> Result<problem::FamilyRule> {
     let grid = deck.grid.get_ref();
     match grid.family.get_ref() {
         Family::Auto => Ok(problem::FamilyRule::Auto),
         Family::List => Ok(problem::FamilyRule::List),
+        Family::Lattice if grid.jitter.is_some() => {
+            let message = "[grid] family: points that `jitter` moves do not lie on a lattice; take \"auto\" or \"list\"";
+            Err(scope.error(grid.family.span(), message))
+        }
         Family::Lattice if grid.quadrature == Quadrature::Midpoint => {
             Ok(problem::FamilyRule::Lattice)
         }

@@ -21,7 +21,8 @@ use nalgebra::Vector3;
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::mesh::{Runs, suggestion};
-use crate::problem::{PointSource, Problem, Selector};
+use crate::problem::{Jitter, PointSource, Problem, Selector};
+use crate::scatter::{Scattered, uniform};
 
 /// Maximum number of points per rank.
 pub const MAX_PER_RANK: f64 = 2_147_483_647.0;
@@ -95,6 +96,11 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
         for (point, id) in piece.iter_mut().zip(total + before..) {
             point.id = id;
         }
+        if let (PointSource::Lattice { spacing, .. }, Some(jitter)) = (&body.points, problem.jitter)
+        {
+            let dimension = problem.dimension.count();
+            scatter(&mut piece, jitter, &spacing[..dimension]);
+        }
         // Appending would copy the first piece, which is usually the only one.
         if points.is_empty() {
             points = piece
@@ -116,6 +122,16 @@ pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point
     };
     agree(comm, fits)?;
     Ok((points, total))
+}
+
+/// Move points from the centres of their cells, which have edges of `spacing` (m).
+fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
+    for point in points {
+        for (k, edge) in spacing.iter().enumerate() {
+            let shift = 2.0 * uniform(jitter.seed, Scattered::Position(k), point.id) - 1.0;
+            point.position[k] += jitter.share * edge * shift;
+        }
+    }
 }
 
 /// Give the sets that name groups of meshes their points; `meshes` have the id of their first point.

@@ -10,6 +10,7 @@ use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
 use crate::points::Polygon;
+use crate::scatter::Weibull;
 
 /// A body, which is a block with its own material and damage.
 #[derive(Debug, Clone)]
@@ -30,6 +31,13 @@ pub struct Body {
     pub horizon_place: Range<usize>,
     /// Where its points come from.
     pub points: PointSource,
+}
+
+impl Body {
+    /// Whether its points are the centres of the cells of a lattice, or its Gauss points.
+    pub fn is_on_lattice(&self, jitter: Option<Jitter>) -> bool {
+        jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })
+    }
 }
 
 /// A material: density, elastic constants and the law that uses them.
@@ -77,6 +85,15 @@ impl Quadrature {
             Self::Gauss => 1 << dimension,
         }
     }
+}
+
+/// Random displacement of the points of shapes from the centres of their cells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jitter {
+    /// The largest displacement by direction, as a share of the cell's edge.
+    pub share: f64,
+    /// The seed.
+    pub seed: u64,
 }
 
 /// How bonds are kept.
@@ -137,6 +154,8 @@ pub struct Damage {
     pub toughness: Toughness,
     /// α in s ≥ s0 − α s_min.
     pub alpha: f64,
+    /// Scatter of the strength of the points, if there is any.
+    pub weibull: Option<Weibull>,
     /// Indices of sets whose bonds never break.
     pub no_failure: Vec<usize>,
 }

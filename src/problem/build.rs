@@ -25,6 +25,7 @@ impl Problem {
             horizon,
             volume_correction: VolumeCorrection::Exact,
             quadrature: Quadrature::Midpoint,
+            jitter: None,
             family: FamilyRule::Auto,
             interface: Interface {
                 rule: InterfaceRule::Own,
@@ -184,6 +185,7 @@ impl Damage {
             rule,
             toughness,
             alpha: 0.0,
+            weibull: None,
             no_failure: Vec::new(),
         }
     }

@@ -52,6 +52,8 @@ pub struct Problem {
     pub volume_correction: VolumeCorrection,
     /// Where the points of a lattice cell lie.
     pub quadrature: Quadrature,
+    /// Random displacement of the points of shapes, if there is any.
+    pub jitter: Option<Jitter>,
     /// How bonds are kept.
     pub family: FamilyRule,
     /// The bonds between blocks.

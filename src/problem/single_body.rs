@@ -10,6 +10,7 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
     };
     if let Some(damage) = &mut body.damage {
         damage.no_failure.clear();
+        damage.weibull = None;
     }
     // No time steps are made.
     body.material.damping = 0.0;

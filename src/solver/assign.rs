@@ -214,6 +214,7 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     BlockLaws {
         law: build(problem, block.body, constants).law,
         damage: damage(problem, block.body, constants),
+        weibull: (block.body.damage.as_ref()).and_then(|damage| damage.weibull),
     }
 }
 
@@ -325,9 +326,7 @@ pub fn assign<const D: usize>(
     blocks: &[BlockLaws],
     all: Vec<BlockBonds>,
 ) -> std::result::Result<Vec<Interaction>, Fault> {
-    let per_point = blocks
-        .iter()
-        .any(|block| block.damage.is_some_and(|law| law.alpha() > 0.0));
+    let per_point = blocks.iter().any(BlockLaws::has_thresholds);
     let give = |mut bonds: BlockBonds| {
         let indices = bonds.blocks();
         let [here, there] = indices.map(|block| problem.block(block));

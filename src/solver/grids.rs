@@ -44,6 +44,7 @@ pub fn grids(
     let dimension = problem.dimension.count();
     for (index, body) in problem.bodies.iter().enumerate() {
         let found = match body.points {
+            PointSource::Lattice { .. } if problem.jitter.is_some() => None,
             PointSource::Lattice {
                 spacing, origin, ..
             } => Some(described(origin, spacing, dimension)),

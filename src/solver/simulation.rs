@@ -14,7 +14,7 @@ use crate::{families, points};
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
 use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
-use super::contact::{Contact, StepEnd};
+use super::contact::{Contact, Occasion, StepEnd};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
@@ -401,6 +401,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// As [`Self::evaluate`], after [`Part::write_bond_inputs`] of all parts of the points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
+        let is_relaxing = self.relaxes();
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -429,7 +430,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 }),
                 BondUpdate::None | BondUpdate::Trial(_) => None,
             };
-            contact.add_forces(self.comm, &self.model, &self.forces, fields, end);
+            let occasion = Occasion { is_relaxing, end };
+            contact.add_forces(self.comm, &self.model, &self.forces, fields, occasion);
             self.times.contact += start.elapsed();
         }
     }

@@ -56,6 +56,7 @@ impl<const D: usize> Simulation<'_, D> {
             velocity
                 .iter_mut()
                 .for_each(|component| component.fill(0.0));
+            self.fields.clear_dissipative_contact();
         }
         let forces = [&mut self.fields.external_force, &mut self.fields.reaction];
         let components = forces.into_iter().flatten().flatten();

@@ -28,7 +28,7 @@ pub struct BodyFigures {
     pub shape_volume: Option<f64>,
     /// Mean distance to the nearest neighbour for points from a file, m; 0 without neighbours.
     pub spacing: f64,
-    /// Least, median and largest number of neighbours of a point from a file or a mesh, without pre-cracked bonds.
+    /// Least, median and largest number of neighbours of a point that does not lie on a lattice, without pre-cracked bonds.
     pub neighbours: Option<[u64; 3]>,
 }
 
@@ -98,12 +98,12 @@ fn is_from_file(body: &Body) -> bool {
     !matches!(body.points, PointSource::Lattice { .. })
 }
 
-/// Least, median and largest number of neighbours of the points of each body from a file or a mesh. Collective.
+/// Least, median and largest number of neighbours of the points of each body that do not lie on a lattice. Collective.
 fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64; 3]>> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let bodies = problem.bodies.iter().enumerate();
     let scattered = bodies
-        .filter(|(_, body)| is_from_file(body))
+        .filter(|(_, body)| !body.is_on_lattice(problem.jitter))
         .map(|(index, _)| index);
     let scattered: Vec<usize> = scattered.collect();
     let mut found = vec![None; problem.bodies.len()];

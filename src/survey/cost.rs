@@ -2,7 +2,7 @@
 
 use super::Size;
 use crate::material::{Law, PlasticState};
-use crate::problem::{Action, Block, Body, FamilyRule, PointSource, Problem, Quadrature};
+use crate::problem::{Action, Block, Body, FamilyRule, Problem, Quadrature};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::motion::Clock;
@@ -107,10 +107,10 @@ impl Cost {
     /// Estimate the cost of a run from its size and the steps of its clock.
     pub fn estimate(problem: &Problem, size: &Size, clock: &Clock) -> Self {
         let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
-        let is_lattice = |source: &PointSource| matches!(source, PointSource::Lattice { .. });
+        let mut bodies = problem.bodies.iter();
         let on_lattice = problem.family != FamilyRule::List
             && problem.quadrature == Quadrature::Midpoint
-            && problem.bodies.iter().all(|body| is_lattice(&body.points));
+            && bodies.all(|body| body.is_on_lattice(problem.jitter));
         let (bytes, listed) = if on_lattice {
             (ON_LATTICE, 0.0)
         } else {

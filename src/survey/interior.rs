@@ -32,8 +32,11 @@ pub struct Interior {
     pub exact: [f64; 2],
 }
 
-/// The interior of a lattice body; `None` for points from a file and for families too large for a block.
+/// The interior of a lattice body; `None` for scattered points and for families too large for a block.
 pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
+    if !problem.bodies[body].is_on_lattice(problem.jitter) {
+        return None;
+    }
     let block = block(problem, body)?;
     match problem.dimension.count() {
         1 => measure::<1>(&block),

@@ -25,6 +25,7 @@ use crate::problem::{Block, PointSource, Problem, Selector, Stage, StepRule};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::conditions::members;
+use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
 /// Number of intact bonds, by dimension, below which a point is weakly bonded: half of a family at a
@@ -82,6 +83,7 @@ impl Survey {
         let probes = probes(simulation, &mut warnings);
         loads::check_conditions(simulation, &mut warnings);
         few_neighbours(simulation, &mut warnings);
+        coincident(simulation, &mut warnings);
         time(simulation, &mut warnings);
         Self {
             bodies,
@@ -215,6 +217,22 @@ fn probes<const D: usize>(
         found
     };
     problem.history.probes.iter().map(follow).collect()
+}
+
+/// Warn of points of different bodies at the same position, between which contact cannot act.
+fn coincident<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let contact = simulation.contact.as_ref();
+    let found = contact.and_then(|contact| contact.coincident(problem, simulation.comm, model));
+    if let Some(Coincident { pairs, ids, blocks }) = found {
+        let [first, second] = blocks.map(|block| problem.block(block).body);
+        let message = format!(
+            "[body.{}]: {pairs} pair(s) of points of different bodies lie at the same position and never touch, such as \
+             point {} of `{}` and point {} of this body; move one of the bodies, or leave these points out of it",
+            second.name, ids[0], first.name, ids[1]
+        );
+        warnings.push(Warning::new(message).at(&second.span));
+    }
 }
 
 fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<Warning>) {

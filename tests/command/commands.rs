@@ -300,6 +300,16 @@ fn the_benchmark_counts_what_it_does() {
             }
         }
     }
+    // Two faces of 4 × 4 points of 8 layers.
+    let mut command = fissure(1);
+    command.args(["bench", "--points", "8,4,4", "--steps", "3", "--json"]);
+    let json = succeed(command.args(["--no-limits", "--contact", "0.25"]));
+    assert_eq!(figure(&json, "touching_share"), 0.25, "{json}");
+    let ratio = figure(&json, "contact_seconds") / figure(&json, "bonds_seconds");
+    assert_eq!(figure(&json, "contact_over_bonds"), ratio, "{json}");
+    assert!(ratio > 0.0);
+    let wrong = finish(fissure(1).args(["bench", "--contact", "0.9"]));
+    assert_eq!(wrong.status.code(), Some(2));
     let wrong = finish(fissure(1).args(["bench", "--points", "5,4"]));
     assert_eq!(wrong.status.code(), Some(2));
     assert!(text(&wrong).contains("edges such as"), "{}", text(&wrong));

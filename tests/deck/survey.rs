@@ -551,3 +551,43 @@ fn steps_follow_the_limits_of_an_adaptive_step() {
         assert_eq!((first, steps), (expected, made as f64), "{time}");
     }
 }
+
+#[test]
+fn points_of_two_bodies_at_one_position_are_told() {
+    let folder = Folder::new("coincident");
+    let mut points = String::from("x,y,volume,block\n");
+    for block in [1, 2] {
+        for k in 0..12 {
+            // Three points of the second body lie on those of the first.
+            let shift = if block == 2 && k > 2 { 0.4 } else { 0.0 };
+            let (x, y) = (k % 4, k / 4);
+            points += &format!("{x},{},1,{block}\n", f64::from(y) + shift);
+        }
+    }
+    let path = folder.write("points.csv", &points);
+    let deck = |contact: &str| {
+        let path = path.display();
+        format!(
+            "dimension = 'plane-strain'
+            grid = {{ horizon = 3 }}
+            interface.rule = 'none'
+            {contact}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.first = {{ material = 'rubber', points = {{ file = '{path}', block = 1 }} }}
+            body.second = {{ material = 'rubber', points = {{ file = '{path}', block = 2 }} }}
+            time.end = 1
+            "
+        )
+    };
+    let expected = "[body.second]: 3 pair(s) of points of different bodies lie at the same position and never touch, such as \
+                    point 0 of `first` and point 12 of this body; move one of the bodies, or leave these points out of it";
+    let about = |warnings: Vec<String>| {
+        let mut all = warnings.into_iter();
+        all.find(|warning| warning.contains("same position"))
+    };
+    assert_eq!(
+        about(warnings(&deck("contact = {}"))).as_deref(),
+        Some(expected)
+    );
+    assert_eq!(about(warnings(&deck(""))), None);
+}

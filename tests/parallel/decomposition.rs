@@ -542,6 +542,43 @@ fn a_plate_relaxed_and_let_go() {
 }
 
 #[test]
+fn a_plate_of_scattered_strength() {
+    let scattered = |alpha: &str| {
+        let damage = format!("{alpha}\nweibull_modulus = 6\nseed = 11");
+        PLATE.replace("alpha = 0.25", &damage)
+    };
+    same_everywhere("weibull-alpha", &scattered("alpha = 0.25"), true);
+    same_with_either_family("weibull", &scattered("alpha = 0"));
+    let jitter = "[grid]\njitter = 0.3\nseed = 5";
+    let jittered = scattered("alpha = 0").replace("[grid]", jitter);
+    same_everywhere("jitter", &jittered, true);
+    let by_work =
+        "[damage.brittle.energy]\nfracture_energy = 0.05\nalpha = 0.25\nweibull_modulus = 6";
+    let law =
+        "[material.rubber.correspondence]\ndensity = 2\nyoungs_modulus = 5\npoisson_ratio = 0.3";
+    let deck = format!(
+        "dimension = 'plane-strain'
+        {by_work}
+        {law}
+        {jitter}
+        spacing = 1
+        horizon = 2.5
+        [body.plate]
+        material = 'rubber'
+        damage = 'brittle'
+        shape.box = {{ lower = [0, 0], upper = [14, 8] }}
+        [initial.burst]
+        velocity = ['0.1*(x - 7)', 0]
+        [time]
+        end = 12
+        [history]
+        every_steps = 5
+        "
+    );
+    same_everywhere("weibull-work", &deck, true);
+}
+
+#[test]
 fn fewer_points_than_ranks() {
     same_everywhere("few", FEW, false);
 }

@@ -302,6 +302,52 @@ fn a_free_rigid_box_tumbles_with_its_energy() {
 }
 
 #[test]
+fn a_rigid_ball_rolls_down_a_plane_of_points() {
+    let (mass, gravity, angle) = (100.0, 0.03, 0.2_f64);
+    let (along, down) = (mass * gravity * angle.sin(), -mass * gravity * angle.cos());
+    let deck = format!(
+        "dimension = '3d'
+        grid = {{ spacing = 1, horizon = 1.5 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.plane = {{ material = 'rubber', shape.box = {{ lower = [-12, -1.5, -1], upper = [24, 1.5, 0] }} }}
+        rigid.ball = {{ shape.sphere = {{ centre = [0.3, 0, 40], radius = 40 }}, mass = {mass}, force = [{along}, 0, {down}], friction = 0.5, restitution = 0.9 }}
+        condition.hold = {{ set = 'plane', displacement = [0, 0, 0] }}
+        time.end = 90
+        "
+    );
+    let names = [
+        "time",
+        "rigid_ball_velocity_x",
+        "rigid_ball_kinetic_energy",
+        "rigid_ball_position_x",
+        "energy_error",
+        "friction_energy",
+    ];
+    let rows = history::<3>(&deck, 5, &names);
+    // By half of the time the ball rolls. Damping of the points that it leaves would slow it down.
+    let [middle, last] = [&rows[rows.len() / 2], rows.last().unwrap()];
+    // The points touch half a spacing below their plane's surface: the ball rolls on this radius.
+    let inertia = 0.4 * (40.0_f64 / 40.5).powi(2);
+    let expected = gravity * angle.sin() / (1.0 + inertia);
+    let found = (last[1] - middle[1]) / (last[0] - middle[0]);
+    assert!(
+        (found / expected - 1.0).abs() < 0.01,
+        "{found} for {expected}"
+    );
+    let without_overlap = 5.0 / 7.0 * gravity * angle.sin();
+    assert!(
+        (found / without_overlap - 1.0).abs() < 0.02,
+        "{found} for {without_overlap}"
+    );
+    // It turns as it rolls.
+    let of_spin = last[2] / (0.5 * mass * last[1].powi(2)) - 1.0;
+    assert!((of_spin / inertia - 1.0).abs() < 0.05, "{of_spin}");
+    assert!(last[3] < 23.0, "it has left the plane: {last:?}");
+    assert!(last[4].abs() < 0.01 * last[2], "{last:?}");
+    assert!(last[5] < 0.05 * last[2], "it does not slide: {last:?}");
+}
+
+#[test]
 fn a_point_in_a_rigid_body_is_an_error() {
     let deck = problem(
         "dimension = 'plane-strain'

@@ -448,12 +448,23 @@ fn points_that_flow_go_on_as_if_they_had_never_stopped() {
 
 #[test]
 fn a_collision_goes_on_as_if_it_had_never_stopped() {
-    let folder = Folder::new("collision");
+    collision_goes_on("collision", ["", ""]);
+}
+
+#[test]
+fn a_collision_of_scattered_bodies_goes_on_as_if_it_had_never_stopped() {
+    let scatter = ["jitter = 0.2, seed = 4,", ", weibull_modulus = 8, seed = 5"];
+    collision_goes_on("scattered-collision", scatter);
+}
+
+/// A collision that is stopped in the middle and goes on, on other ranks, has the result of one that is not.
+fn collision_goes_on(name: &str, [jitter, weibull]: [&str; 2]) {
+    let folder = Folder::new(name);
     let text = "
         dimension = 'plane-stress'
-        grid = { spacing = 1, horizon = 3 }
+        grid = { JITTER spacing = 1, horizon = 3 }
         material.rubber.pmb = { density = 2, youngs_modulus = 5 }
-        damage.brittle.critical_stretch = { critical_stretch = 0.05 }
+        damage.brittle.critical_stretch = { critical_stretch = 0.05 WEIBULL }
         parameters.end = 6
         contact = { friction = 0.3, restitution = 0.5 }
         body.flying = { material = 'rubber', damage = 'brittle', shape.box = { lower = [0, 0], upper = [10, 8] } }
@@ -463,7 +474,8 @@ fn a_collision_goes_on_as_if_it_had_never_stopped() {
         time = { end = 'end', step = 0.1 }
         output.every_steps = 10
         ";
-    let deck = folder.write("deck.toml", text);
+    let text = text.replace("JITTER", jitter).replace("WEIBULL", weibull);
+    let deck = folder.write("deck.toml", &text);
     let out = folder.join("out");
     succeed(&mut run(2, &deck, &out, &[]));
     let further = ["--restart", "--set", "end=16"];

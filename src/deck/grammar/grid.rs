@@ -26,6 +26,13 @@ pub struct Grid {
     /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
+    /// How far points of shapes are moved at random from the centres of their cells: by direction by up to this share of
+    /// the spacing, below 0.5. Not at all if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jitter: Option<Number>,
+    /// Seed of `jitter`: other numbers move the points otherwise; 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<Spanned<u64>>,
     /// How bonds are kept: `"lattice"`, one bit each, for points on a regular grid (those of a file
     /// may be), `"list"` for any, or `"auto"`, a lattice where possible. Bonds between bodies on
     /// different grids are always listed. Results differ by rounding only.

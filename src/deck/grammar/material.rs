@@ -107,6 +107,12 @@ pub struct CriticalStretch {
     /// α in s ≥ s0 − α s_min; 0 if not given, a plain critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
+    /// Modulus m of a Weibull distribution of the strength of the points, 1 or more; all are equally strong if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weibull_modulus: Option<Number>,
+    /// Seed of `weibull_modulus`: other numbers distribute the strength otherwise; 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<Spanned<u64>>,
     /// Sets of points whose bonds never break.
     #[serde(default)]
     pub no_failure: Vec<Text>,
@@ -139,6 +145,12 @@ pub struct BondEnergy {
     /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
     #[serde(default = "nothing")]
     pub alpha: Number,
+    /// Modulus m of a Weibull distribution of the strength of the points, 1 or more; all are equally strong if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weibull_modulus: Option<Number>,
+    /// Seed of `weibull_modulus`: other numbers distribute the strength otherwise; 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<Spanned<u64>>,
     /// Sets of points whose bonds never break.
     #[serde(default)]
     pub no_failure: Vec<Text>,

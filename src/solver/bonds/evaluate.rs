@@ -337,18 +337,22 @@ impl<const D: usize> Forces<D> {
         let blocks = &self.blocks;
         match pass {
             Pass::SmallestStretch => {
+                let strength = &self.strength;
                 let thresholds = self.limits.thresholds[points.clone()].par_iter_mut();
-                let block = &model.block[points];
                 thresholds
                     .with_min_len(CHUNK)
-                    .zip(block)
-                    .for_each(|(value, block)| {
-                        *value = match blocks[usize::from(*block)].damage {
-                            // A point without intact bonds has no smallest stretch.
-                            Some(law) if value.is_infinite() => law.critical(),
-                            Some(law) => law.threshold(stretch_of(*value)),
-                            None => f64::INFINITY,
+                    .zip(points)
+                    .for_each(|(value, point)| {
+                        // A point without intact bonds has no smallest stretch.
+                        let smallest = if value.is_infinite() {
+                            0.0
+                        } else {
+                            stretch_of(*value)
                         };
+                        let damage = blocks[usize::from(model.block[point])].damage;
+                        let strength = strength.get(point).copied().unwrap_or(1.0);
+                        *value =
+                            damage.map_or(f64::INFINITY, |law| law.threshold(strength, smallest));
                     });
             }
             Pass::PointSum(number) => {

@@ -3,6 +3,7 @@
 use crate::damage::{Criterion, DamageLaw};
 use crate::families::BlockBonds;
 use crate::material::{AnyLaw, PairLaw};
+use crate::scatter::Weibull;
 
 /// The bonds between two blocks, their laws, and when they break.
 pub struct Interaction {
@@ -23,4 +24,18 @@ pub struct BlockLaws {
     pub law: AnyLaw,
     /// The damage law, if bonds can break.
     pub damage: Option<DamageLaw>,
+    /// Scatter of the strength of the points, if there is any.
+    pub weibull: Option<Weibull>,
+}
+
+impl BlockLaws {
+    /// Whether the points have thresholds of their own.
+    pub fn has_thresholds(&self) -> bool {
+        self.weibull.is_some() || self.follows_smallest_stretch()
+    }
+
+    /// Whether the thresholds of the points change with the smallest stretches of their families.
+    pub fn follows_smallest_stretch(&self) -> bool {
+        self.damage.is_some_and(|law| law.alpha() > 0.0)
+    }
 }

@@ -25,7 +25,7 @@ impl LimitsRead {
             laws.any(reads)
         };
         Self {
-            thresholds: any(|law| law.alpha() > 0.0),
+            thresholds: blocks.iter().any(BlockLaws::has_thresholds),
             truncation_factors: any(|law| law.family_correction() > 0.0),
             rotations: any(DamageLaw::is_objective_work)
                 && !blocks.iter().all(|block| block.law.counts::<D>().central),

@@ -27,6 +27,8 @@ mod sweep;
 use std::ops::Range;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Fault, Grid, Which};
@@ -90,6 +92,18 @@ pub fn history_fits<const D: usize>(
     })
 }
 
+/// Strengths of the owned points over that of their blocks; empty without scatter.
+fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64> {
+    if blocks.iter().all(|block| block.weibull.is_none()) {
+        return Vec::new();
+    }
+    let strength = |point: usize| {
+        let weibull = blocks[usize::from(model.block[point])].weibull;
+        weibull.map_or(1.0, |weibull| weibull.strength(model.ids[point]))
+    };
+    (0..model.owned()).into_par_iter().map(strength).collect()
+}
+
 /// The bonds of a rank and what it takes to sum over them.
 pub struct Forces<const D: usize> {
     interactions: Vec<Interaction>,
@@ -102,6 +116,8 @@ pub struct Forces<const D: usize> {
     numbers: PointNumbers,
     /// What criteria read of the local points.
     limits: LimitColumns,
+    /// Strengths of the owned points over that of their blocks; empty without scatter.
+    strength: Vec<f64>,
     /// The passes of a force evaluation.
     passes: Vec<Pass>,
     halo: Halo,
@@ -141,10 +157,8 @@ impl<const D: usize> Forces<D> {
             let width = history_width::<D>(interaction);
             interaction.bonds.allocate_history(width);
         }
-        let passes = [
-            read.thresholds.then_some(Pass::SmallestStretch),
-            Some(Pass::Force),
-        ];
+        let follows = blocks.iter().any(BlockLaws::follows_smallest_stretch);
+        let passes = [follows.then_some(Pass::SmallestStretch), Some(Pass::Force)];
         let mut passes: Vec<Pass> = passes.into_iter().flatten().collect();
         let force = passes.len() - 1;
         passes.splice(force..force, (0..numbers.passes).map(Pass::PointSum));
@@ -160,6 +174,7 @@ impl<const D: usize> Forces<D> {
                 .map(|grid| GridValues::new(grid, numbers.read, read, is_thermal))
                 .collect(),
             limits,
+            strength: strengths(&blocks, model),
             interactions,
             blocks,
             numbers,
@@ -177,6 +192,9 @@ impl<const D: usize> Forces<D> {
     /// else is broken yet. Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
+        if read.thresholds && !self.passes.contains(&Pass::SmallestStretch) {
+            self.set_thresholds(comm, model);
+        }
         if !self.numbers.with_constants && !read.truncation_factors {
             return;
         }
@@ -228,6 +246,27 @@ impl<const D: usize> Forces<D> {
         });
         let truncation_factors = &mut self.limits.truncation_factors;
         (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
+    }
+
+    /// Sets the thresholds of the points, which no stretch changes. Collective.
+    fn set_thresholds(&mut self, comm: &dyn Communicator, model: &Model<D>) {
+        let Self {
+            limits,
+            strength,
+            blocks,
+            halo,
+            grids,
+            ..
+        } = self;
+        for (point, strength) in strength.iter().enumerate() {
+            let damage = blocks[usize::from(model.block[point])].damage;
+            limits.thresholds[point] =
+                damage.map_or(f64::INFINITY, |law| law.threshold(*strength, 0.0));
+        }
+        halo.update_ghosts(comm, &mut [&mut limits.thresholds[..]]);
+        for grid in grids {
+            grid.update_thresholds(Which::All, &limits.thresholds);
+        }
     }
 
     /// Calls `work` for all bonds between two blocks after one another.

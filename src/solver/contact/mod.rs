@@ -32,6 +32,7 @@ use crate::problem::Problem;
 use super::bonds::Forces;
 use super::model::Model;
 use super::motion::Fields;
+use super::motion::relaxation::stable_density;
 use ghosts::Ghosts;
 use pair::{ContactPoint, Demand, PairRule, Touch};
 use rigid::{RigidBody, WrenchSums};
@@ -41,6 +42,7 @@ use state::StepDemand;
 
 pub use by_pair::{ContactNow, contact_now};
 pub use rigid::RigidState;
+pub use start::Coincident;
 pub use state::ContactState;
 
 /// Points handled by one task.
@@ -73,9 +75,20 @@ pub struct Contact<const D: usize> {
     is_stale: bool,
     /// What contact demands of the step.
     demand: StepDemand,
+    /// Sum of the squares of the forces of rigid bodies on the owned points at the last evaluation, N².
+    rigid_forces: ExactSum,
     /// Buffers of [`Self::add_forces`]: the points with forces, and these.
     active: Vec<u32>,
     sums: Vec<PointSum<D>>,
+}
+
+/// When forces of contact are evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct Occasion {
+    /// In a relaxation nothing has a velocity, and what touches adds to the fictitious density.
+    pub is_relaxing: bool,
+    /// The end of a step, or of a load step that has come to its equilibrium, if it is one.
+    pub end: Option<StepEnd>,
 }
 
 /// The end of a step.
@@ -98,6 +111,8 @@ struct PointSum<const D: usize> {
     damping: [f64; D],
     /// N.
     friction: [f64; D],
+    /// What rigid bodies exert of all that, N.
+    of_rigid: [f64; D],
     /// Its share of the potential energies, J.
     energy: f64,
     /// Summed over what touches or will within two steps.
@@ -172,6 +187,7 @@ impl<const D: usize> Contact<D> {
             searched: std::array::from_fn(|_| Vec::new()),
             is_stale: true,
             demand: StepDemand::default(),
+            rigid_forces: ExactSum::ZERO,
             sums: Vec::new(),
         }))
     }
@@ -188,6 +204,18 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Puts driven rigid bodies in their places at a time (s), for the next load step of a relaxation.
+    pub fn place_rigid(&mut self, time: f64) {
+        for rigid in &mut self.rigid {
+            rigid.place(time);
+        }
+    }
+
+    /// Sum of the squares of the forces of rigid bodies on the owned points at the last evaluation, N².
+    pub fn rigid_forces(&self) -> &ExactSum {
+        &self.rigid_forces
+    }
+
     /// Adds the forces of contact at the present positions to the internal forces. At the end of a step, friction and
     /// damping follow from the present velocities, their work is booked, and rigid bodies get their second half kick; else
     /// they stay as they are. Collective.
@@ -197,7 +225,7 @@ impl<const D: usize> Contact<D> {
         model: &Model<D>,
         forces: &Forces<D>,
         fields: &mut Fields<D>,
-        end: Option<StepEnd>,
+        Occasion { is_relaxing, end }: Occasion,
     ) {
         if self.largest > 0.0 {
             let is_finite = self.search_where_due(comm, model, forces, fields);
@@ -207,7 +235,10 @@ impl<const D: usize> Contact<D> {
             self.update_bonds(model, forces);
             self.ghosts.update(comm, fields);
         }
-        let look_ahead = end.map_or(0.0, |end| LOOK_AHEAD * end.next);
+        let look_ahead = match end {
+            Some(end) if !is_relaxing => LOOK_AHEAD * end.next,
+            _ => 0.0,
+        };
         let mut active = std::mem::take(&mut self.active);
         self.find_active(model, fields, look_ahead, &mut active);
         let mut sums = std::mem::take(&mut self.sums);
@@ -217,6 +248,7 @@ impl<const D: usize> Contact<D> {
             .map(|point| self.point_sum(model, fields, *point as usize, look_ahead))
             .collect_into_vec(&mut sums);
         let mut largest = [0.0_f64; 2];
+        self.rigid_forces = ExactSum::ZERO;
         for (point, sum) in active.iter().zip(&sums) {
             let point = *point as usize;
             let volume = model.volume[point];
@@ -234,6 +266,13 @@ impl<const D: usize> Contact<D> {
                 fields.add_contact(point, repulsion, sum.energy);
             } else {
                 fields.clear_contact(point);
+            }
+            if is_relaxing {
+                let square = sum.of_rigid.iter().map(|component| component * component);
+                self.rigid_forces.add(square.sum());
+                if let Some(density) = &mut fields.contact_density {
+                    density[point] = stable_density(stiffness / volume);
+                }
             }
         }
         (self.active, self.sums) = (active, sums);
@@ -413,6 +452,7 @@ impl<const D: usize> Contact<D> {
             repulsion: [0.0; D],
             damping: [0.0; D],
             friction: [0.0; D],
+            of_rigid: [0.0; D],
             energy: 0.0,
             demand: Demand::default(),
             touches: false,
@@ -430,6 +470,10 @@ impl<const D: usize> Contact<D> {
                 sum.add_demand(rigid.demand(block, &here, look_ahead));
                 if let Some(touch) = rigid.touch(block, &here) {
                     sum.add(&touch, 1.0);
+                    for d in 0..D {
+                        sum.of_rigid[d] +=
+                            touch.repulsion[d] + touch.damping[d] + touch.friction[d];
+                    }
                 }
             }
         }

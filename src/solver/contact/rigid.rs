@@ -34,6 +34,8 @@ pub struct RigidState {
     /// The shares of friction and damping in that.
     friction: Wrench,
     damping: Wrench,
+    /// Displacement since the last equilibrium, m; 0 but in a relaxation.
+    advance: [f64; 3],
     /// Prescribed force, N.
     load: [f64; 3],
     /// Work done on it by its load, or by what drives it, J.
@@ -190,6 +192,19 @@ impl RigidBody {
         }
     }
 
+    /// Goes to the place of a driven body at a time (s), at rest: the next load step of a relaxation begins.
+    pub fn place(&mut self, time: f64) {
+        if let RigidMotion::Driven(displacement) = &self.problem.motion {
+            let moved = Self::values(displacement, time);
+            for d in 0..3 {
+                let new = self.problem.centre[d] + moved[d];
+                self.state.advance[d] = new - self.state.position[d];
+                self.state.position[d] = new;
+                self.state.velocity[d] = 0.0;
+            }
+        }
+    }
+
     fn kick(&mut self, time: f64) {
         if self.mass > 0.0 {
             for d in 0..3 {
@@ -216,7 +231,14 @@ impl RigidBody {
         state.friction_energy -= work(&state.friction, &friction);
         state.damping_energy -= work(&state.damping, &damping);
         match &self.problem.motion {
-            RigidMotion::Driven(_) => state.work -= work(&state.contact, &contact),
+            RigidMotion::Driven(_) => {
+                state.work -= work(&state.contact, &contact);
+                // In a relaxation there is no velocity; further equilibria of a load step have no advance.
+                for (d, advance) in state.advance.iter_mut().enumerate() {
+                    let advance = std::mem::take(advance);
+                    state.work -= 0.5 * (state.contact[d] + contact[d]) * advance;
+                }
+            }
             RigidMotion::Free { force, .. } => {
                 let load = Self::values(force, time);
                 let both = (0..3).map(|d| (state.load[d] + load[d]) * state.velocity[d]);

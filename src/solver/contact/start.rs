@@ -1,10 +1,11 @@
 //! What must hold of contact at the start.
 
-use crate::comm::{Communicator, Found, least};
+use crate::comm::{Communicator, Found, least, total};
 use crate::error::{Error, Result};
 use crate::problem::{self, Problem};
 use crate::solver::model::Model;
 
+use super::Contact;
 use super::rigid::RigidBody;
 
 /// An error if a point begins in a rigid body. Collective.
@@ -39,4 +40,67 @@ pub(super) fn check_outside<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// Pairs of points of different bodies that begin at the same position and therefore never touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Coincident {
+    /// Number of pairs.
+    pub pairs: u64,
+    /// Ids of the first pair, the smaller one first.
+    pub ids: [u64; 2],
+    /// Blocks of these points.
+    pub blocks: [usize; 2],
+}
+
+impl<const D: usize> Contact<D> {
+    /// The points of different bodies that begin at the same position, if there are any; the same on all ranks. To be
+    /// called before the first step. Collective.
+    pub fn coincident(
+        &self,
+        problem: &Problem,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+    ) -> Option<Coincident> {
+        let mut pairs = 0;
+        let mut first: Option<Found<[f64; 2], 2>> = None;
+        for point in self.open.iter().map(|point| *point as usize) {
+            for other in self.rows.touching(point) {
+                let (id, block, position) = match other.checked_sub(model.owned()) {
+                    None => (
+                        model.ids[other],
+                        model.block[other].into(),
+                        model.position(other),
+                    ),
+                    Some(ghost) => {
+                        let ghost = &self.ghosts.points[ghost];
+                        (ghost.id, ghost.block as usize, ghost.reference)
+                    }
+                };
+                let own = usize::from(model.block[point]);
+                let coincide = position == model.position(point)
+                    && problem.body_of(own) != problem.body_of(block);
+                // Each pair once.
+                if !coincide || id < model.ids[point] {
+                    continue;
+                }
+                pairs += 1;
+                let ids = [model.ids[point], id];
+                if first.as_ref().is_none_or(|found| ids < found.ids) {
+                    first = Some(Found {
+                        key: 0.0,
+                        ids,
+                        payload: [own as f64, block as f64],
+                    });
+                }
+            }
+        }
+        let pairs = total(comm, pairs);
+        let Found { ids, payload, .. } = least(comm, first)?;
+        Some(Coincident {
+            pairs,
+            ids,
+            blocks: payload.map(|block| block as usize),
+        })
+    }
 }

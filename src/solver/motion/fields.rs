@@ -302,9 +302,18 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Density of the relaxation, with which an iteration is stable, N/m⁴; none without relaxation.
+    /// Density of the relaxation, with which an iteration is stable without contact, N/m⁴; none without relaxation.
     fictitious_density: Option<Vec<f64>> = Description {
         name: "fictitious_density",
+        unit: "N/m^4",
+        state: false,
+        undone: false,
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
+    /// The share of contact in the density of the relaxation, N/m⁴; none without contact or relaxation.
+    contact_density: Option<Vec<f64>> = Description {
+        name: "contact_density",
         unit: "N/m^4",
         state: false,
         undone: false,
@@ -358,6 +367,24 @@ pub fn plastic_columns<'a>(
     let fields: [&mut dyn Columns; 3] = [strain, equivalent, work];
     let mut columns = fields.into_iter().flat_map(Columns::columns_mut);
     std::array::from_fn(|_| columns.next().map(Vec::as_mut_slice).unwrap_or_default())
+}
+
+/// Density of the relaxation of the owned points, N/m⁴.
+#[derive(Clone, Copy)]
+pub struct RelaxationDensity<'a> {
+    bonds: &'a [f64],
+    contact: Option<&'a [f64]>,
+}
+
+impl RelaxationDensity<'_> {
+    /// That of a point.
+    #[inline(always)]
+    pub fn at(&self, point: usize) -> f64 {
+        match self.contact {
+            Some(contact) => self.bonds[point] + contact[point],
+            None => self.bonds[point],
+        }
+    }
 }
 
 /// A component of the force densities of bonds and loads, N/m³.
@@ -425,6 +452,7 @@ impl<const D: usize> Fields<D> {
             equilibrium_displacement: needs.relaxation.then(|| vector(owned)),
             equilibrium_reaction: (needs.relaxation && needs.supports).then(|| vector(owned)),
             fictitious_density: needs.relaxation.then(scalar),
+            contact_density: (needs.relaxation && needs.contact).then(scalar),
             last_seen: needs.coarsening.then(scalar),
             damped_energy: needs.damping.then(scalar),
         }
@@ -492,8 +520,31 @@ impl<const D: usize> Fields<D> {
     /// An owned point touches nothing.
     pub fn clear_contact(&mut self, point: usize) {
         let columns = self.contact_force.iter_mut().flatten();
-        for column in columns.chain(&mut self.contact_energy) {
+        let scalars = self
+            .contact_energy
+            .iter_mut()
+            .chain(&mut self.contact_density);
+        for column in columns.chain(scalars) {
             column[point] = 0.0;
+        }
+    }
+
+    /// Forgets friction and contact damping, which do not act in a relaxation.
+    pub fn clear_dissipative_contact(&mut self) {
+        let forces = [&mut self.friction, &mut self.contact_damping];
+        let columns = forces.into_iter().flatten().flatten();
+        columns.for_each(|column| column.fill(0.0));
+    }
+
+    /// Density of the relaxation, with which an iteration is stable, of each owned point (N/m⁴); infinite for one that does
+    /// not take part, having no bonds.
+    ///
+    /// # Panics
+    /// Without relaxation.
+    pub fn relaxation_density(&self) -> RelaxationDensity<'_> {
+        RelaxationDensity {
+            bonds: self.fictitious_density.as_deref().expect("a relaxation"),
+            contact: self.contact_density.as_deref(),
         }
     }
 

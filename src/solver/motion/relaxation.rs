@@ -24,6 +24,10 @@
 //! The equilibrium is found when ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). Without loads and reactions, as in a
 //! free body that is moved, both sides are round-off; so ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is an equilibrium, too. ρ bounds
 //! the stiffness of a point, hence ε ‖V ρ u‖ the forces that come from rounding u.
+//!
+//! Contact is a part of the equilibrium: its repulsion has a potential, and neither friction nor damping acts. What touches
+//! adds its stiffness to ρ as long as it touches; driven rigid bodies move with time, as supports do, and what they exert on
+//! the points counts as reactions.
 
 use std::time::Instant;
 
@@ -160,12 +164,18 @@ impl LoadStep {
     }
 }
 
+/// The density (N/m⁴) with which iterations of Δt = 1 are stable, for the largest eigenvalue of D of
+/// [`super::stable_step`], N/m⁴.
+pub fn stable_density(eigenvalue: f64) -> f64 {
+    0.5 * MARGIN * eigenvalue
+}
+
 /// The density of each owned point (N/m⁴) with which iterations of Δt = 1 are stable; infinite for one
 /// without bonds. `stiffness` is that of [`super::stable_step`].
 pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     let density = |point: usize| {
         let entries = stiffness.each_ref().map(|column| column[point]);
-        match 0.5 * MARGIN * largest_eigenvalue(&entries) {
+        match stable_density(largest_eigenvalue(&entries)) {
             0.0 => f64::INFINITY,
             density => density,
         }
@@ -217,6 +227,9 @@ impl<const D: usize> Simulation<'_, D> {
         let (time, step) = (self.clock.time(), self.clock.step());
         self.apply_displacements(time, step);
         self.apply_loads(time, false);
+        if let Some(contact) = &mut self.contact {
+            contact.place_rigid(time);
+        }
         self.load_step = LoadStep {
             scale: self.load_step.scale,
             is_settled: false,
@@ -262,17 +275,17 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.since_breaking += 1;
         let damping = self.load_step.damping;
         let (model, fields) = (&self.model, &mut self.fields);
-        // Taken out while they are written.
+        // Taken out while it is written.
         let mut velocity = fields.relaxation_velocity.take();
-        let density = fields.fictitious_density.take();
-        if let (Some(velocity), Some(density)) = (&mut velocity, &density) {
+        if let Some(velocity) = &mut velocity {
             for d in 0..D {
+                let density = fields.relaxation_density();
                 velocity[d]
                     .par_iter_mut()
                     .with_min_len(CHUNK)
                     .enumerate()
                     .for_each(|(point, velocity)| {
-                        let kick = fields.total_force(model, d, point) / density[point];
+                        let kick = fields.total_force(model, d, point) / density.at(point);
                         *velocity = if damping.is_nan() {
                             0.5 * kick
                         } else {
@@ -286,7 +299,7 @@ impl<const D: usize> Simulation<'_, D> {
                     .for_each(|(displacement, velocity)| *displacement += velocity);
             }
         }
-        (fields.relaxation_velocity, fields.fictitious_density) = (velocity, density);
+        fields.relaxation_velocity = velocity;
         let fields = &self.fields;
         let [power, inertia] = sums(model, fields, |point, density| {
             let velocity = |d: usize| {
@@ -329,6 +342,8 @@ impl<const D: usize> Simulation<'_, D> {
             power: ExactSum::ZERO,
             inertia: ExactSum::ZERO,
         });
+        let mut reactions = reactions;
+        reactions.merge(&self.rigid_forces());
         let mut all = [power, old, inertia, free, loads, reactions, stiffness];
         let all = reduce(self.comm, &mut all);
         let [power, old, inertia] = [all[0], all[1], all[2]];
@@ -387,16 +402,23 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.is_settled = true;
     }
 
+    /// Sum of the squares of the forces of rigid bodies on the points of this rank, N².
+    fn rigid_forces(&self) -> ExactSum {
+        let contact = self.contact.as_ref();
+        contact.map_or(ExactSum::ZERO, |contact| contact.rigid_forces().clone())
+    }
+
     /// Raise the scale to the loads and reactions of the present equilibrium.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
-        let [loads, reactions] = sums(model, fields, |point, _| {
+        let [loads, mut reactions] = sums(model, fields, |point, _| {
             let of = |field: &Option<[Vec<f64>; D]>| {
                 let square = |f: &[Vec<f64>; D]| f.iter().map(|f| f[point].powi(2)).sum::<f64>();
                 model.volume[point].powi(2) * field.as_ref().map_or(0.0, square)
             };
             [of(&fields.external_force), of(&fields.reaction)]
         });
+        reactions.merge(&self.rigid_forces());
         let norms = reduce(self.comm, &mut [loads, reactions]);
         let scale = norms.into_iter().map(f64::sqrt).sum();
         self.load_step.scale = self.load_step.scale.max(scale);
@@ -408,7 +430,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// Names a piece that loads act on and nothing holds, if there is one, else says how near it came.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         let time = self.clock.time();
-        if self.load_step.has_failed {
+        // Contact can hold pieces as well.
+        if self.load_step.has_failed && self.contact.is_none() {
             let failure = self.load_step.failure(time);
             self.check_pieces_are_held(&failure)?;
         }
@@ -448,14 +471,15 @@ fn sums<const D: usize, const N: usize>(
     fields: &Fields<D>,
     terms: impl Fn(usize, f64) -> [f64; N] + Sync,
 ) -> [ExactSum; N] {
-    let density = fields.fictitious_density.as_deref().unwrap_or_default();
+    let density = fields.relaxation_density();
     (0..model.owned().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let mut sums = [const { ExactSum::ZERO }; N];
             for point in chunk * CHUNK..((chunk + 1) * CHUNK).min(model.owned()) {
-                if density[point].is_finite() {
-                    let terms = terms(point, density[point]);
+                let density = density.at(point);
+                if density.is_finite() {
+                    let terms = terms(point, density);
                     sums.iter_mut()
                         .zip(terms)
                         .for_each(|(sum, term)| sum.add(term));

@@ -58,6 +58,16 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
             return Err(Error::input(message).at(&problem.places.horizon));
         }
     }
+    let mut scattered = (problem.bodies.iter())
+        .filter(|body| (body.damage.as_ref()).is_some_and(|damage| damage.weibull.is_some()));
+    if let (Some(_), Some(body)) = (&refinement.trigger, scattered.next()) {
+        let message = format!(
+            "[body.{}] damage: `weibull_modulus` is not available with [refinement.trigger], which gives points new ids; \
+             refine regions from the start",
+            body.name
+        );
+        return Err(Error::input(message).at(&body.span));
+    }
     let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
     let is_by_ids = |set: usize| {
         let selector = &problem.sets[set].selector;

@@ -1,0 +1,115 @@
+//! Scatter of positions and strengths: random numbers that follow from a seed and the id of a point alone, so that they do
+//! not depend on ranks, threads or restarts.
+
+/// What is scattered; each has random numbers of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scattered {
+    /// A component of the position.
+    Position(usize),
+    /// The strength.
+    Strength,
+}
+
+/// A Weibull distribution of strengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weibull {
+    /// The modulus m.
+    pub modulus: f64,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl Weibull {
+    /// The strength of a point over the characteristic strength: (−ln u)^(1/m). It is below x with a probability of
+    /// 1 − exp(−x^m).
+    pub fn strength(self, id: u64) -> f64 {
+        let survival = uniform(self.seed, Scattered::Strength, id);
+        libm::pow(-libm::log(survival), 1.0 / self.modulus)
+    }
+}
+
+/// A random number between 0 and 1, both excluded, evenly distributed.
+pub fn uniform(seed: u64, what: Scattered, id: u64) -> f64 {
+    let stream = match what {
+        Scattered::Position(component) => component as u64,
+        Scattered::Strength => 3,
+    };
+    let hash = mix(mix(mix(seed) ^ stream) ^ id);
+    // The middle of one of 2⁵² equal intervals, which is a float.
+    ((hash >> 12) as f64 + 0.5) * 0.5_f64.powi(52)
+}
+
+/// A step of the generator SplitMix64 (Steele, Lea & Flood 2014): a bijection whose result looks random.
+fn mix(value: u64) -> u64 {
+    let mut mixed = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^ (mixed >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: u64 = 20_000;
+
+    /// The largest difference of an empirical distribution function of so many values from the true one that is exceeded
+    /// once in a million samples (Dvoretzky, Kiefer & Wolfowitz, with Massart's constant).
+    fn bound(count: u64) -> f64 {
+        (libm::log(2e6) / (2.0 * count as f64)).sqrt()
+    }
+
+    /// The largest difference between the empirical distribution function of values and another one.
+    fn difference(mut values: Vec<f64>, distribution: impl Fn(f64) -> f64) -> f64 {
+        values.sort_by(f64::total_cmp);
+        let count = values.len() as f64;
+        let each = values.into_iter().enumerate().map(|(k, value)| {
+            let exact = distribution(value);
+            (exact - k as f64 / count)
+                .abs()
+                .max((exact - (k + 1) as f64 / count).abs())
+        });
+        each.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn numbers_are_evenly_distributed() {
+        for what in [
+            Scattered::Position(0),
+            Scattered::Position(2),
+            Scattered::Strength,
+        ] {
+            for seed in [0, 1, u64::MAX] {
+                let values = (0..COUNT).map(|id| uniform(seed, what, id)).collect();
+                assert!(difference(values, |x| x) < bound(COUNT), "{what:?} {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_of_points_components_and_seeds_are_independent() {
+        let x = |id| uniform(7, Scattered::Position(0), id) - 0.5;
+        let y = |id| uniform(7, Scattered::Position(1), id) - 0.5;
+        let other = |id| uniform(8, Scattered::Position(0), id) - 0.5;
+        let pairs: [&dyn Fn(u64) -> f64; 3] =
+            [&|id| x(id) * x(id + 1), &|id| x(id) * y(id), &|id| {
+                x(id) * other(id)
+            }];
+        for (number, product) in pairs.iter().enumerate() {
+            let mean = (0..COUNT).map(product).sum::<f64>() / COUNT as f64;
+            // Standard deviation (1/12)/√n; five of them are exceeded once in two million samples.
+            let deviation = 1.0 / 12.0 / (COUNT as f64).sqrt();
+            assert!(mean.abs() < 5.0 * deviation, "{number}: {mean}");
+        }
+    }
+
+    #[test]
+    fn strengths_follow_weibull() {
+        for modulus in [1.0, 3.5, 20.0] {
+            let weibull = Weibull { modulus, seed: 42 };
+            let values = (0..COUNT).map(|id| weibull.strength(id)).collect();
+            let distribution = |x: f64| 1.0 - libm::exp(-libm::pow(x, modulus));
+            assert!(difference(values, distribution) < bound(COUNT), "{modulus}");
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Scatter: points moved from the centres of their cells, and strengths that follow Weibull.
+
+use crate::support::simulate;
+
+/// A bar of 20 000 points whose bonds join neighbours alone, which is pulled apart evenly: by a stretch of 0.001 a step.
+fn bar(damage: &str) -> String {
+    format!(
+        "dimension = '1d'
+        grid = {{ spacing = 1, horizon = 1.5, volume_correction = 'none' }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.01, {damage} }}
+        body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [20000] }} }}
+        condition.pull = {{ set = 'all', displacement = ['0.001*t*x'] }}
+        time = {{ end = 20, step = 1 }}
+        "
+    )
+}
+
+#[test]
+fn bonds_break_as_weibull_says() {
+    let (modulus, bonds) = (5.0, 10_000.0);
+    simulate::<1, _>(&bar("weibull_modulus = 5, seed = 7"), |mut simulation| {
+        let mut intermediate = 0;
+        while !simulation.is_over() {
+            simulation.advance();
+            // Every other bond: those that share a point are not independent.
+            let mut broken = 0.0;
+            simulation.forces.for_each_broken(|here, there| {
+                let [here, there] = [here, there].map(|point| simulation.model.ids[point]);
+                if here % 2 == 0 && there == here + 1 {
+                    broken += 1.0;
+                }
+            });
+            let stretch = 1e-3 * simulation.clock.time();
+            // A bond holds as long as both of its ends do.
+            let expected = 1.0 - libm::exp(-2.0 * libm::pow(stretch / 0.01, modulus));
+            // The difference that is exceeded once in a million samples (Dvoretzky, Kiefer & Wolfowitz).
+            let bound = (libm::log(2e6) / (2.0 * bonds)).sqrt();
+            let found = broken / bonds;
+            assert!(
+                (found - expected).abs() < bound,
+                "{stretch}: {found} for {expected}"
+            );
+            intermediate += u32::from((0.1..0.9).contains(&found));
+        }
+        assert!(intermediate >= 3, "{intermediate}");
+    });
+}
+
+#[test]
+fn a_high_modulus_is_no_scatter() {
+    let broken = |damage: &str, stretch: f64| {
+        let deck = bar(damage).replace("0.001*t", &format!("{stretch}*t/20"));
+        simulate::<1, _>(&deck, |mut simulation| {
+            while !simulation.is_over() {
+                simulation.advance();
+            }
+            let mut broken = 0;
+            simulation.forces.for_each_broken(|_, _| broken += 1);
+            broken
+        })
+    };
+    // The weakest of 20 000 points has 20000^(−1/5000) = 0.998 of the strength, the strongest 1.0005.
+    for (stretch, all) in [(0.00995, 0), (0.01005, 2 * 19_999)] {
+        assert_eq!(broken("weibull_modulus = 5000", stretch), all);
+        assert_eq!(broken("alpha = 0", stretch), all);
+    }
+}
+
+#[test]
+fn points_are_moved_by_up_to_the_jitter() {
+    let deck = |grid: &str| {
+        format!(
+            "dimension = '3d'
+            grid = {{ spacing = [1, 2, 1], horizon = 4, volume_correction = 'none', {grid} }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.block = {{ material = 'rubber', shape.box = {{ lower = [0, 0, 0], upper = [10, 20, 10] }} }}
+            time.end = 1
+            "
+        )
+    };
+    // By id.
+    let places = |grid: &str| {
+        simulate::<3, _>(&deck(grid), |simulation| {
+            assert_eq!(simulation.forces.lattice_bonds() > 0, grid.is_empty());
+            let model = &simulation.model;
+            let mut places: Vec<_> = (0..model.owned())
+                .map(|point| (model.ids[point], model.position(point)))
+                .collect();
+            places.sort_by_key(|(id, _)| *id);
+            places
+        })
+    };
+    let centres = places("");
+    for (seed, share) in [(0, 0.25), (3, 0.25), (3, 0.49)] {
+        let moved = places(&format!("jitter = {share}, seed = {seed}"));
+        for d in 0..3 {
+            let largest = share * [1.0, 2.0, 1.0][d];
+            let shifts = centres.iter().zip(&moved).map(|(centre, moved)| {
+                assert_eq!(centre.0, moved.0);
+                moved.1[d] - centre.1[d]
+            });
+            let shifts: Vec<f64> = shifts.collect();
+            let farthest = shifts
+                .iter()
+                .fold(0.0_f64, |most, shift| most.max(shift.abs()));
+            // All 1000 points lie within 0.98 of it with a probability of 0.98¹⁰⁰⁰ = 2e-9.
+            assert!(
+                farthest <= largest && farthest > 0.98 * largest,
+                "{farthest}"
+            );
+            // The mean of 1000 points has a standard deviation of largest/√3000.
+            let mean = shifts.iter().sum::<f64>() / 1000.0;
+            assert!(mean.abs() < 5.0 * largest / 3000.0_f64.sqrt(), "{mean}");
+        }
+        assert_eq!(places(&format!("jitter = {share}, seed = {seed}")), moved);
+    }
+    assert_ne!(
+        places("jitter = 0.25, seed = 3"),
+        places("jitter = 0.25, seed = 4")
+    );
+}
