@@ -77,6 +77,18 @@ impl Dimension {
         )
     }
 
+    /// Strain is 0 across the directions of the setting.
+    pub fn is_confined(self) -> bool {
+        matches!(
+            self,
+            Self::PlaneStrain { .. }
+                | Self::Line {
+                    constraint: Constraint::UniaxialStrain,
+                    ..
+                }
+        )
+    }
+
     /// The name in messages.
     pub fn name(self) -> &'static str {
         use Constraint::{UniaxialStrain, UniaxialStress};

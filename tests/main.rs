@@ -30,6 +30,7 @@ mod laws {
     mod ordinary_history;
     mod plasticity;
     mod slender_bodies;
+    mod thermal;
 }
 
 mod physics {

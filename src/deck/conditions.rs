@@ -69,6 +69,10 @@ pub fn conditions(
                 ("traction", vector(&condition.traction)),
                 ("pressure", condition.pressure.as_ref().map(Spanned::span)),
                 ("force", vector(&condition.force)),
+                (
+                    "temperature",
+                    condition.temperature.as_ref().map(Spanned::span),
+                ),
             ];
             let (quantity, place) = &given[scope.exactly_one(table.span(), &key, &given)?];
             Ok(problem::Condition {
@@ -83,6 +87,31 @@ pub fn conditions(
             })
         })
         .collect()
+}
+
+/// An error at the first temperature if no material expands.
+///
+/// # Errors
+/// As said.
+pub fn temperatures_act<'m>(
+    scope: &Scope,
+    conditions: &[problem::Condition],
+    mut materials: impl Iterator<Item = &'m problem::Material>,
+) -> Result<()> {
+    let is_temperature =
+        |condition: &&problem::Condition| matches!(condition.action, Action::Temperature(_));
+    let Some(condition) = conditions.iter().find(is_temperature) else {
+        return Ok(());
+    };
+    if materials.any(|material| material.expansion.coefficient != 0.0) {
+        return Ok(());
+    }
+    let message = format!(
+        "[condition.{}] temperature: no material has `thermal_expansion`, so the temperature does nothing; give it in \
+         [material.NAME.LAW]",
+        condition.name
+    );
+    Err(scope.error(condition.place.clone(), message))
 }
 
 /// Whether what a condition prescribes is spread over a layer with a depth.
@@ -134,6 +163,11 @@ fn action(
     }
     if let Some(vector) = &condition.force {
         return Ok(Action::Force(expressions(vector, "force")?));
+    }
+    if let Some(value) = &condition.temperature {
+        let key = format!("{key} temperature");
+        let value = scope.expression(value, &key, &POSITION_AND_TIME)?;
+        return Ok(Action::Temperature(value));
     }
     if let Some(vector) = &condition.traction {
         let factor = 1.0 / depth(vector.span())?;

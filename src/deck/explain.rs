@@ -2,7 +2,7 @@
 
 use super::grammar::{
     ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation,
-    VolumeCorrection, common_keys,
+    THERMAL_EXPANSION, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
 use crate::deck::spanned::Spanned;
@@ -140,7 +140,7 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     };
     let default = |name: &str| match name {
         "poisson_ratio" if !has_ratio => Some(default_number(dimension.bond_based_poisson_ratio())),
-        DAMPING => Some(default_number(0.0)),
+        DAMPING | THERMAL_EXPANSION => Some(default_number(0.0)),
         _ => match &law.key(name)?.kind {
             Kind::Number { default, .. } => default.map(default_number),
             Kind::Word(words) => {

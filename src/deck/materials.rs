@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use super::grammar::{self, DAMPING, DENSITY, ELASTIC_CONSTANTS, LawTable, common_keys};
+use super::grammar::{
+    self, DAMPING, DENSITY, ELASTIC_CONSTANTS, LawTable, REFERENCE_TEMPERATURE, THERMAL_EXPANSION,
+    common_keys,
+};
 use super::number::{Number, Written};
 use super::resolve::Scope;
 use crate::deck::spanned::Spanned;
@@ -52,6 +55,7 @@ pub fn material(
                 scope.within(number, &key, 0.0..f64::INFINITY, "at least 0")?
             }
         },
+        expansion: section.expansion()?,
     })
 }
 
@@ -99,6 +103,23 @@ impl Section<'_> {
             _ => format!("only {} have this key", law::names(have(), "and")),
         };
         Err(self.error(Some(name), message))
+    }
+
+    fn expansion(&self) -> Result<problem::ThermalExpansion> {
+        let value = |name: &str| {
+            let number = self.table.get(name);
+            number.map(|number| self.scope.number(number, &self.key_of(name)))
+        };
+        let coefficient = value(THERMAL_EXPANSION).transpose()?;
+        let reference_temperature = value(REFERENCE_TEMPERATURE).transpose()?;
+        if coefficient.is_none() && reference_temperature.is_some() {
+            let message = format!("needs `{THERMAL_EXPANSION}`");
+            return Err(self.error(Some(REFERENCE_TEMPERATURE), message));
+        }
+        Ok(problem::ThermalExpansion {
+            coefficient: coefficient.unwrap_or(0.0),
+            reference_temperature: reference_temperature.unwrap_or(0.0),
+        })
     }
 
     /// The law with the values of its own keys.

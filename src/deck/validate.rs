@@ -43,6 +43,9 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
     let time = time::time(scope, deck)?;
     let stages = time::stages(scope, deck, &time)?;
+    let spacing = single(&deck.grid, spacing);
+    let conditions = conditions::conditions(scope, deck, &sets, spacing)?;
+    conditions::temperatures_act(scope, &conditions, bodies.iter().map(|body| &body.material))?;
     Ok(Problem {
         warnings: Vec::new(),
         title: deck.title.get_ref().clone(),
@@ -62,7 +65,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
         refinement,
         cracks: cracks.into_values().collect(),
         initials: conditions::initials(scope, deck, &sets)?,
-        conditions: conditions::conditions(scope, deck, &sets, single(&deck.grid, spacing))?,
+        conditions,
         stages,
         output: outputs::output(scope, deck, &sets, time.end)?,
         history: history::history(scope, deck, &sets, horizon)?,

@@ -110,6 +110,41 @@ impl Weights {
     }
 }
 
+/// The elastic part of the motion of eight bonds at temperature.
+#[derive(Debug, Clone, Copy)]
+pub struct Elastic<const D: usize> {
+    /// η of Y/(1 + a), m.
+    pub eta: [Lanes; D],
+    /// ∂(Y/(1 + a))/∂Y = 1/(1 + a).
+    pub slope: Lanes,
+}
+
+/// Separate the thermal stretch a of bonds from their motion η (m): laws are given Y/(1 + a) for Y, and forces are
+/// multiplied by the slope 1/(1 + a), so that they stay the derivative of the energy. `stretches` are those of both points; a is
+/// their mean. A bond of length (1 + a)|ξ| is free of force.
+pub struct SeparateThermal<const D: usize> {
+    /// ξ by component, m.
+    pub xi: [Lanes; D],
+    /// η by component, m.
+    pub eta: [Lanes; D],
+    /// Thermal stretch of points i and j.
+    pub stretches: [Lanes; 2],
+}
+
+impl<const D: usize> Task for SeparateThermal<D> {
+    type Output = Elastic<D>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Elastic<D> {
+        let stretch = (self.stretches[0] + self.stretches[1]) * 0.5;
+        let slope = Lanes::splat(1.0) / (Lanes::splat(1.0) + stretch);
+        Elastic {
+            eta: LaneTuple::each(|d| (self.eta[d] - self.xi[d] * stretch) * slope),
+            slope,
+        }
+    }
+}
+
 /// ξ of eight bonds.
 #[derive(Debug, Clone, Copy)]
 pub struct Reference<const D: usize> {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use super::{Calibration, Law, WorkRule};
+use super::{Calibration, Law, ThermalExpansion, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
@@ -43,6 +43,8 @@ pub struct Material {
     pub elastic: Isotropic,
     /// Viscous damping r, 1/s: a force density −r ρ u̇.
     pub damping: f64,
+    /// Thermal expansion; none by default.
+    pub expansion: ThermalExpansion,
 }
 
 /// What volumes near the edge of a family count.

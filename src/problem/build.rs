@@ -4,7 +4,7 @@ use super::{
     Action, Body, CheckpointRule, Condition, Crack, DEFAULT_DAMAGE_THRESHOLD, DEFAULT_FIELDS,
     Damage, DamageRule, FamilyRule, History, Initial, Interface, InterfaceRule, Interval, Law,
     Material, Method, OUTPUTS, Output, Places, PointSource, PreCrack, Problem, Quadrature,
-    Selector, Set, Shape, StepRule, Time, Toughness, VolumeCorrection,
+    Selector, Set, Shape, StepRule, ThermalExpansion, Time, Toughness, VolumeCorrection,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -159,18 +159,20 @@ impl Action {
             Self::Velocity(_) => "velocity",
             Self::BodyForce(..) => "body_force",
             Self::Force(_) => "force",
+            Self::Temperature(_) => "temperature",
         }
     }
 }
 
 impl Material {
-    /// A material without damping; the density is in kg/m³.
+    /// A material without damping and thermal expansion; the density is in kg/m³.
     pub fn new(law: Law, density: f64, elastic: Isotropic) -> Self {
         Self {
             law,
             density,
             elastic,
             damping: 0.0,
+            expansion: ThermalExpansion::default(),
         }
     }
 }

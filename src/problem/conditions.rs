@@ -50,4 +50,6 @@ pub enum Action {
     BodyForce(Vec<Expression>, Vec<f64>),
     /// Adds a total force (N), spread by volume.
     Force(Vec<Expression>),
+    /// Prescribes the temperature.
+    Temperature(Expression),
 }

@@ -15,6 +15,7 @@ mod outputs;
 mod refinement;
 mod rigid;
 pub mod single_body;
+mod thermal;
 mod time;
 
 use std::ops::Range;
@@ -31,6 +32,7 @@ pub use law::Law;
 pub use outputs::*;
 pub use refinement::*;
 pub use rigid::*;
+pub use thermal::ThermalExpansion;
 pub use time::*;
 
 /// Everything that a run needs to know.

@@ -209,6 +209,8 @@ pub enum Field {
     PlasticStrainEquivalent,
     /// 1 where a point has too few bonds left for its law and carries no force, else 0.
     Singular,
+    /// Temperature; the reference temperature of the material where none is prescribed, K.
+    Temperature,
     /// The smallest id of the points that intact bonds connect to the point.
     Fragment,
     /// The rank that owns the point.
@@ -217,7 +219,7 @@ pub enum Field {
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -236,6 +238,7 @@ impl Field {
         Self::NewlyBrokenBonds,
         Self::PlasticStrainEquivalent,
         Self::Singular,
+        Self::Temperature,
         Self::Fragment,
         Self::Rank,
     ];
@@ -261,6 +264,7 @@ impl Field {
             Self::NewlyBrokenBonds => "newly_broken_bonds",
             Self::PlasticStrainEquivalent => "plastic_strain_equivalent",
             Self::Singular => "singular",
+            Self::Temperature => "temperature",
             Self::Fragment => "fragment",
             Self::Rank => "rank",
         }
@@ -286,6 +290,7 @@ impl Field {
             Self::WeightedVolume => "m^5",
             Self::Stress | Self::CauchyStress | Self::VonMisesStress => "Pa",
             Self::StrainEnergyDensity => "J/m^3",
+            Self::Temperature => "K",
         }
     }
 

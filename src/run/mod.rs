@@ -266,7 +266,9 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        let mut energy = (!self.problem.relaxes()).then(|| EnergyWatch::new(simulation));
+        // Energy that changing temperatures put in is not counted.
+        let is_closed = !self.problem.relaxes() && !self.problem.temperature_changes();
+        let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {
             if stepper.is_refinement_due()
                 && let Some(regridded) = stepper.at_full_step().refine()?

@@ -66,8 +66,28 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
             )));
         }
         damage_is_possible(problem, body)?;
+        expansion_is_possible(problem, body)?;
     }
     Ok(())
+}
+
+/// An error if a material expands whose law has no potential, as one that flows, where strain is 0 across the setting:
+/// the stress there changes how it flows, and the law does not know it.
+fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
+    let (material, dimension) = (&body.material, problem.dimension);
+    let law = &material.law;
+    let is_conservative = (law.declaration.invariants)(&law.values).conservative;
+    if is_conservative || !dimension.is_confined() || material.expansion.coefficient == 0.0 {
+        return Ok(());
+    }
+    let message = format!(
+        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: thermal stress across it would change how it \
+         flows; use plane stress, uniaxial stress or 3-D, or an elastic law",
+        body.name,
+        law.declaration.name,
+        dimension.name(),
+    );
+    Err(Error::input(message).at(&body.span))
 }
 
 /// Whether bonds of a body with this damage break by their work. That of bond-based laws follows from the stretch,

@@ -1,7 +1,8 @@
 //! What does not change during a run: the points and their constants.
 
+use crate::dimension::Dimension;
 use crate::partition::Domain;
-use crate::problem::Problem;
+use crate::problem::{Material, Problem};
 
 use super::palette_column::PaletteColumn;
 
@@ -19,12 +20,33 @@ pub struct Model<const D: usize> {
     pub density: Vec<f64>,
     /// Viscous damping r of each block, 1/s.
     pub damping: Vec<f64>,
+    /// Thermal expansion of each block.
+    pub expansion: Vec<Expansion>,
     /// Number of owned points without bonds to ghosts; they come first.
     pub interior: usize,
     /// Number of points over all ranks.
     pub total: u64,
     /// Those of them of level 0; they have the lowest ids.
     pub coarsest: u64,
+}
+
+/// Thermal expansion in the directions of the setting.
+#[derive(Debug, Clone, Copy)]
+pub struct Expansion {
+    /// Free stretch by one kelvin, 1/K.
+    pub stretch_per_kelvin: f64,
+    /// Temperature without thermal stretch.
+    pub reference_temperature: f64,
+}
+
+impl Expansion {
+    fn of(material: &Material, dimension: Dimension) -> Self {
+        let (expansion, ratio) = (material.expansion, material.elastic.poisson_ratio);
+        Self {
+            stretch_per_kelvin: expansion.in_setting(dimension, ratio),
+            reference_temperature: expansion.reference_temperature,
+        }
+    }
 }
 
 impl<const D: usize> Model<D> {
@@ -50,6 +72,10 @@ impl<const D: usize> Model<D> {
                 .blocks()
                 .map(|block| block.body.material.damping)
                 .collect(),
+            expansion: problem
+                .blocks()
+                .map(|block| Expansion::of(&block.body.material, problem.dimension))
+                .collect(),
             interior: domain.interior,
             total: domain.total,
             coarsest,
@@ -65,6 +91,7 @@ impl<const D: usize> Model<D> {
             ids: Vec::new(),
             density: Vec::new(),
             damping: Vec::new(),
+            expansion: Vec::new(),
             interior: 0,
             total: 0,
             coarsest: 0,
@@ -83,6 +110,11 @@ impl<const D: usize> Model<D> {
             position[d] = self.reference[d][point];
         }
         position
+    }
+
+    /// Thermal expansion of an owned point.
+    pub fn expansion_of(&self, point: usize) -> Expansion {
+        self.expansion[usize::from(self.block[point])]
     }
 
     /// Viscous damping r of an owned point, 1/s.

@@ -172,6 +172,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let model = Model::new(problem, &domain, refined.coarsest());
         let blocks = problem.blocks();
         let blocks: Vec<_> = blocks.map(|block| block_laws(problem, &block)).collect();
+        let is_thermal = problem.has_temperature();
         let halo = std::mem::take(&mut domain.halo);
         // The points are known to the model from here on.
         drop(domain);
@@ -179,7 +180,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             .and_then(|all| history_fits::<D>(&all).map(|()| all))
             .map_err(|fault| fault.error(problem));
         let interactions = agree(comm, interactions)?;
-        let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks)?;
+        let mut forces = Forces::new(comm, &model, interactions, grids, halo, blocks, is_thermal)?;
         between()?;
         let family_volume = PaletteColumn::new(forces.intact_families(&model).volume);
         let cut = pre_crack(problem, &model, &mut forces);
@@ -200,6 +201,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let needs = Needs {
             loads: all().any(Conditions::have_loads),
             supports: all().any(Conditions::have_supports),
+            temperature: is_thermal,
             damping: model.damping.iter().any(|rate| *rate > 0.0),
             relaxation: problem.relaxes(),
             damage: problem.bodies.iter().any(|body| body.damage.is_some()),
@@ -331,6 +333,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
         self.clock.advance();
         self.conditions.set_places(self.clock.time(), step);
+        self.conditions.set_temperatures(self.clock.time());
         if let Some(contact) = &mut self.contact {
             contact.drift(self.clock.time(), step);
         }
@@ -344,6 +347,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 here.apply_displacements(part);
                 finite
             };
+            here.apply_temperatures(part);
             part.write_bond_inputs();
             finite
         });
@@ -386,7 +390,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Evaluate the internal forces at the present displacements. Collective.
     pub fn evaluate(&mut self, bond_update: BondUpdate) {
-        self.walk(|part, _| {
+        self.conditions.set_temperatures(self.clock.time());
+        self.walk(|part, here| {
+            here.apply_temperatures(part);
             part.write_bond_inputs();
             true
         });
@@ -398,6 +404,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
+            thermal_stretch: fields.thermal_stretch.as_deref_mut(),
             force: &mut fields.internal_force,
             plastic: plastic_columns(
                 &mut fields.plastic_strain,

@@ -112,6 +112,7 @@ impl<const D: usize> Simulation<'_, D> {
         {
             let others = std::mem::replace(&mut self.conditions, conditions);
             self.waiting[self.stage] = Some(others);
+            self.conditions.reset_temperatures();
         }
         self.stage = stage;
         self.scale_density();

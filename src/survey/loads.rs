@@ -54,7 +54,7 @@ fn warn(condition: &Condition, words: &str, warnings: &mut Vec<Warning>) {
 fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     match &condition.action {
         Action::Displacement(values) | Action::Velocity(values) => Some(values),
-        Action::BodyForce(..) | Action::Force(_) => None,
+        Action::BodyForce(..) | Action::Force(_) | Action::Temperature(_) => None,
     }
 }
 
@@ -112,7 +112,7 @@ fn without_effect<const D: usize>(
             Action::Force(values) => (0..D)
                 .filter(|d| values[*d].as_constant() != Some(0.0))
                 .collect(),
-            Action::Displacement(_) | Action::Velocity(_) => continue,
+            Action::Displacement(_) | Action::Velocity(_) | Action::Temperature(_) => continue,
         };
         if acts.is_empty() {
             warn(condition, "is 0, so it does nothing", warnings);

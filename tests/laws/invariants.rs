@@ -14,13 +14,13 @@ use fissure::solver::observers::{HistoryObserver, Snapshot};
 
 /// A law, and what stands in its table beside density and Young's modulus.
 #[derive(Clone, Copy)]
-struct Case {
-    law: &'static Declaration,
-    example: &'static str,
+pub(super) struct Case {
+    pub(super) law: &'static Declaration,
+    pub(super) example: &'static str,
 }
 
 /// Every law with each of its examples.
-fn cases() -> impl Iterator<Item = Case> {
+pub(super) fn cases() -> impl Iterator<Item = Case> {
     declarations().flat_map(|law| {
         law.examples
             .iter()
@@ -30,7 +30,7 @@ fn cases() -> impl Iterator<Item = Case> {
 
 impl Case {
     /// As the material `rubber`.
-    fn table(self) -> String {
+    pub(super) fn table(self) -> String {
         let Self { law, example } = self;
         let comma = if example.is_empty() { "" } else { ", " };
         let name = law.name;
@@ -38,7 +38,7 @@ impl Case {
     }
 
     /// Whether the law has a 1-D form.
-    fn has_line(self) -> bool {
+    pub(super) fn has_line(self) -> bool {
         let problem = problem(&deck("plane-stress", &self.table(), "none", ""));
         let line = Dimension::Line {
             cross_section: 1.0,
@@ -52,7 +52,7 @@ impl Case {
     }
 
     /// What its bonds can break by, with this α.
-    fn damages(&self, alpha: f64) -> Vec<String> {
+    pub(super) fn damages(&self, alpha: f64) -> Vec<String> {
         let stretch = self.law.critical_stretch.map(|_| damage(alpha));
         // About the energy of a critical stretch of 0.02.
         let energy = |fracture_energy: f64, more| {
@@ -75,7 +75,7 @@ impl Case {
         (self.law.invariants)(&problem.bodies[0].material.law.values)
     }
 
-    fn is_conservative(&self) -> bool {
+    pub(super) fn is_conservative(&self) -> bool {
         self.invariants().conservative
     }
 }
@@ -86,7 +86,7 @@ const CORRECTIONS: [&str; 3] = ["none", "linear", "exact"];
 const PMB: &str = "pmb = { density = 2, youngs_modulus = 5 }";
 
 /// A body of about 400 points with the law given, in each dimension.
-fn deck(dimension: &str, law: &str, correction: &str, extra: &str) -> String {
+pub(super) fn deck(dimension: &str, law: &str, correction: &str, extra: &str) -> String {
     let (upper, thickness) = match dimension {
         "1d" => ("[40]", ""),
         "3d" => ("[8, 7, 6]", ""),
@@ -114,7 +114,7 @@ fn description<const D: usize>(simulation: &Simulation<D>) -> String {
     format!("{dimension:?}, {correction:?}, {material:?}, {damage:?}")
 }
 
-fn damage(alpha: f64) -> String {
+pub(super) fn damage(alpha: f64) -> String {
     format!("damage.brittle.critical_stretch = {{ critical_stretch = 0.05, alpha = {alpha} }}")
 }
 
@@ -305,7 +305,7 @@ fn moments<const D: usize>(simulation: &Simulation<D>) -> [[f64; 2]; 3] {
 }
 
 /// Forces add up to nothing, and do not turn the body where the law says so.
-fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
+pub(super) fn check_momentum<const D: usize>(mut simulation: Simulation<D>) {
     displace(&mut simulation, wave);
     let laws = simulation
         .problem
@@ -393,7 +393,7 @@ fn two_blocks() -> Vec<String> {
 }
 
 /// Strain energy of the whole body, J.
-fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
+pub(super) fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
     simulation.evaluate(BondUpdate::None);
     let stored = simulation.forces.stored(&simulation.model);
     let energy = stored.energy.iter().zip(simulation.model.volume.iter());
@@ -401,7 +401,7 @@ fn strain_energy<const D: usize>(simulation: &mut Simulation<D>) -> f64 {
 }
 
 /// Forces are the slope of the strain energy.
-fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
+pub(super) fn check_slope<const D: usize>(mut simulation: Simulation<D>) {
     displace(&mut simulation, wave);
     let before = forces(&simulation);
     for point in [0, 7, 31] {
@@ -616,7 +616,7 @@ fn the_bits_are_the_same_on_any_ranks_and_after_a_restart() {
     }
 }
 
-fn same_bits<const D: usize>(text: &str) {
+pub(super) fn same_bits<const D: usize>(text: &str) {
     let run = |ranks: usize, text: &str, steps: usize| {
         whole(simulate_on::<D, _>(ranks, text, |mut simulation| {
             (0..steps).for_each(|_| simulation.advance());

@@ -92,6 +92,42 @@ pub struct SweepArguments {
     overwrite: bool,
 }
 
+impl SweepArguments {
+    /// The output folder.
+    fn folder(&self) -> PathBuf {
+        let default = || {
+            let stem = self.deck.file_stem().unwrap_or_default();
+            let mut name = stem.to_os_string();
+            name.push("_sweep");
+            Path::new("out").join(name)
+        };
+        self.output.clone().unwrap_or_else(default)
+    }
+}
+
+/// The runs of all combinations; their decks are valid.
+///
+/// # Errors
+/// If the deck is invalid with the values of a combination, which the message names.
+fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
+    let run = |(row, name): (&Vec<usize>, String)| {
+        let (label, set) = (design.label(row), design.assignments(row));
+        let deck = deck::read(&arguments.deck, &set).and_then(|deck| deck.explain());
+        let deck = deck.map_err(|error| Error {
+            message: format!("{label}: {}", error.message),
+            ..error
+        })?;
+        let folder = folder.join(name);
+        Ok(Run {
+            label,
+            folder,
+            set,
+            deck,
+        })
+    };
+    design.rows.iter().zip(design.folders()).map(run).collect()
+}
+
 /// Run the combinations that are missing, and write the table and pictures of all.
 ///
 /// # Errors
@@ -104,28 +140,8 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
     };
     let references = value::references(&arguments.value, &arguments.reference)?;
     let abscissa = design.abscissa(arguments.x.as_deref())?;
-    let folder = arguments.output.clone().unwrap_or_else(|| {
-        let stem = arguments.deck.file_stem().unwrap_or_default();
-        let mut name = stem.to_os_string();
-        name.push("_sweep");
-        Path::new("out").join(name)
-    });
-    let mut runs = Vec::new();
-    for (row, name) in design.rows.iter().zip(design.folders()) {
-        let set = design.assignments(row);
-        let deck = deck::read(&arguments.deck, &set)
-            .and_then(|deck| deck.explain())
-            .map_err(|error| Error {
-                message: format!("{}: {}", design.label(row), error.message),
-                ..error
-            })?;
-        runs.push(Run {
-            label: design.label(row),
-            folder: folder.join(name),
-            set,
-            deck,
-        });
-    }
+    let folder = arguments.folder();
+    let runs = planned_runs(arguments, &design, &folder)?;
     let program = Program::new(arguments)?;
     let mut table = Table::new(&design, &arguments.value, &references, abscissa);
     let mut due = Vec::new();

@@ -21,7 +21,7 @@ pub struct Initial {
     pub velocity: Option<Vector>,
 }
 
-/// A load or support of a set; exactly one of the quantities. Values are expressions of x, y, z, t,
+/// A load, support or temperature of a set; exactly one of the quantities. Values are expressions of x, y, z, t,
 /// one a component; the string `"free"` leaves a component of a motion free.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -46,6 +46,9 @@ pub struct Condition {
     /// Total force in N, spread over the set in proportion to volume.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Vector>,
+    /// Prescribed temperature, in the unit of the materials' `reference_temperature`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<Number>,
     /// Thickness in m of the layer that carries a traction or pressure; the spacing if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth: Option<Number>,

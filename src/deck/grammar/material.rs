@@ -34,6 +34,12 @@ pub const DENSITY: &str = "density";
 /// Viscous damping r in 1/s, a force density −r ρ u̇; none if not given.
 pub const DAMPING: &str = "damping";
 
+/// Coefficient of thermal expansion α in 1/K; none if not given.
+pub const THERMAL_EXPANSION: &str = "thermal_expansion";
+
+/// Temperature without thermal strain, in the unit of prescribed temperatures; 0 if not given.
+pub const REFERENCE_TEMPERATURE: &str = "reference_temperature";
+
 /// The elastic constants: moduli in Pa, and Poisson's ratio.
 pub const ELASTIC_CONSTANTS: [(&str, Constant); 5] = [
     ("youngs_modulus", Constant::Young),
@@ -46,7 +52,8 @@ pub const ELASTIC_CONSTANTS: [(&str, Constant); 5] = [
 /// The keys of every law's table.
 pub fn common_keys() -> impl Iterator<Item = &'static str> + Clone {
     let constants = ELASTIC_CONSTANTS.into_iter().map(|(name, _)| name);
-    [DENSITY].into_iter().chain(constants).chain([DAMPING])
+    let others = [DAMPING, THERMAL_EXPANSION, REFERENCE_TEMPERATURE];
+    [DENSITY].into_iter().chain(constants).chain(others)
 }
 
 /// As an enumeration of laws would be, whose names are looked at later.
@@ -93,12 +100,25 @@ impl JsonSchema for Material {
     }
 }
 
+/// What a key of every law's table is, for editors.
+fn meaning(key: &str) -> &'static str {
+    match key {
+        DENSITY => "Density in kg/m³.",
+        DAMPING => "Viscous damping in 1/s.",
+        THERMAL_EXPANSION => "Coefficient of thermal expansion in 1/K.",
+        REFERENCE_TEMPERATURE => "Temperature without thermal strain.",
+        "poisson_ratio" => "Poisson's ratio.",
+        _ => "Elastic constant in Pa.",
+    }
+}
+
 /// The schema of a law's table.
 fn law_schema(law: &Declaration) -> Value {
     let number = json!(["number", "string"]);
     let mut properties = serde_json::Map::new();
     for name in common_keys() {
-        properties.insert(name.to_owned(), json!({ "type": number }));
+        let schema = json!({ "type": number, "description": meaning(name) });
+        properties.insert(name.to_owned(), schema);
     }
     let mut required = vec![DENSITY];
     for key in law.keys {

@@ -31,17 +31,22 @@ impl<const D: usize> BondInputs<'_, D> {
         }
     }
 
-    /// Shows the bonds the displacements (m) of all these points.
+    /// Write the displacements (m) of all these points, and their thermal stretches if there are any.
     ///
     /// # Panics
     /// When they are those of more or less points.
-    pub fn write_bond_inputs(&mut self, displacement: [&[f64]; D]) {
+    pub fn write_bond_inputs(
+        &mut self,
+        displacement: [&[f64]; D],
+        thermal_stretch: Option<&[f64]>,
+    ) {
         let count = self.points.len();
-        assert!(displacement.iter().all(|column| column.len() == count));
-        list_points::update(self.nodes, displacement);
+        let mut columns = displacement.into_iter().chain(thermal_stretch);
+        assert!(columns.all(|column| column.len() == count));
+        list_points::update(self.nodes, displacement, thermal_stretch);
         for places in self.places {
             // SAFETY: only this has these points.
-            unsafe { places.take(self.points.start, displacement) };
+            unsafe { places.take(self.points.start, displacement, thermal_stretch) };
         }
     }
 }

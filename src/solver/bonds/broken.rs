@@ -103,7 +103,7 @@ impl<const D: usize> Forces<D> {
         for points in self.ranges(own.iter().copied()) {
             self.find_numbers(points, model, &mut acting, bond_update);
         }
-        let changed = self.send_numbers(comm, model, acting.displacement, own, times);
+        let changed = self.send_numbers(comm, model, own, times);
         for points in self.ranges(changed.into_iter()) {
             self.find_forces(points, acting.force);
         }
@@ -119,22 +119,18 @@ impl<const D: usize> Forces<D> {
         acting: &mut Acting<'_, D>,
         bond_update: BondUpdate,
     ) {
-        let Acting {
-            displacement,
-            force,
-            plastic,
-        } = acting;
+        let Acting { force, plastic, .. } = acting;
         let before = self.held(model, points.clone(), plastic);
         for pass in (0..self.numbers.passes).map(Pass::PointSum) {
             if pass != Pass::PointSum(0) {
-                self.update(HaloContent::OwnedOnly, Which::Owned, model, displacement);
+                self.update(HaloContent::OwnedOnly, Which::Owned);
             }
             self.clear(pass, points.clone());
             self.run(pass, points.clone(), force, BondUpdate::None);
             self.finish(pass, points.clone(), model, bond_update, plastic);
         }
         // Bonds read what lattices show of the points.
-        self.update(HaloContent::OwnedOnly, Which::Owned, model, displacement);
+        self.update(HaloContent::OwnedOnly, Which::Owned);
         let after = self.held(model, points.clone(), plastic);
         for broken in &mut self.broken {
             if points.contains(&broken.point) {
@@ -167,7 +163,6 @@ impl<const D: usize> Forces<D> {
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
-        displacement: &[Vec<f64>; D],
         own: Vec<usize>,
         times: &mut ForceTimes,
     ) -> Vec<usize> {
@@ -183,7 +178,7 @@ impl<const D: usize> Forces<D> {
         halo.update_ghosts(comm, &mut columns.collect::<Vec<_>>());
         self.halo = halo;
         times.halo += start.elapsed();
-        self.update(HaloContent::PointNumbers, Which::All, model, displacement);
+        self.update(HaloContent::PointNumbers, Which::All);
         let mut changed = own.clone();
         for interaction in &self.interactions {
             for point in &own {

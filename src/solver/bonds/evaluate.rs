@@ -31,10 +31,14 @@ const PIECE: usize = 4096;
 /// Columns of [`Forces::changing_columns`] at most.
 const MOST_CHANGING: usize = MOST.point + 4;
 
+/// Columns of [`Forces::halo_columns`], of which some may be empty.
+type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
+
 /// Point data that a pass receives from other ranks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HaloContent {
-    Displacement,
+    /// Displacements, and thermal stretches if there are any.
+    Motion,
     Thresholds,
     PointNumbers,
     /// Nothing is sent; numbers of owned points are copied to the grids.
@@ -62,6 +66,8 @@ impl ForceTimes {
 pub struct Acting<'a, const D: usize> {
     /// Displacements of the local points, m; those of ghosts are brought up to date.
     pub displacement: &'a mut [Vec<f64>; D],
+    /// Thermal stretches of the local points, if there are any; those of ghosts are brought up to date.
+    pub thermal_stretch: Option<&'a mut [f64]>,
     /// Internal force density of the owned points, N/m³; 0 before, for that of bonds is added to it.
     pub force: &'a mut [Vec<f64>; D],
     /// What plastic flow has left at the owned points; changed in a step.
@@ -82,6 +88,7 @@ impl<const D: usize> Forces<D> {
     ) {
         let Acting {
             displacement,
+            mut thermal_stretch,
             force,
             mut plastic,
         } = acting;
@@ -94,14 +101,10 @@ impl<const D: usize> Forces<D> {
             let pass = self.passes[turn];
             let content = self.content(turn);
             let mut halo = std::mem::take(&mut self.halo);
-            match content {
-                HaloContent::Displacement => halo.pack(displacement.iter().map(Vec::as_slice)),
-                HaloContent::Thresholds => halo.pack([&self.limits.thresholds[..]].into_iter()),
-                HaloContent::PointNumbers => {
-                    let (columns, count) = self.changing_columns();
-                    halo.pack(columns[..count].iter().map(|column| &**column));
-                }
-                HaloContent::OwnedOnly | HaloContent::None => {}
+            let (columns, count) =
+                self.halo_columns(content, displacement, thermal_stretch.as_deref_mut());
+            if count > 0 {
+                halo.pack(columns[..count].iter().map(|column| &**column));
             }
             self.clear(pass, 0..owned);
             let mut timed = |work: &mut dyn FnMut()| {
@@ -110,7 +113,7 @@ impl<const D: usize> Forces<D> {
                 in_bonds += start.elapsed();
             };
             let mut interior = |progress: &mut dyn FnMut() -> bool| {
-                timed(&mut || self.update(content, Which::Owned, model, displacement));
+                timed(&mut || self.update(content, Which::Owned));
                 let mut rest = 0..model.interior;
                 // Once all messages have arrived the rest is done in one piece.
                 while rest.len() > piece && progress() {
@@ -121,27 +124,20 @@ impl<const D: usize> Forces<D> {
                 }
                 timed(&mut || self.run(pass, rest.clone(), force, bond_update));
             };
-            if matches!(content, HaloContent::OwnedOnly | HaloContent::None) {
+            if count == 0 {
                 interior(&mut || false);
             } else {
                 halo.exchange(comm, &mut interior);
-            }
-            match content {
-                HaloContent::Displacement => {
-                    halo.unpack(displacement.iter_mut().map(Vec::as_mut_slice));
-                }
-                HaloContent::Thresholds => {
-                    halo.unpack([&mut self.limits.thresholds[..]].into_iter())
-                }
-                HaloContent::PointNumbers => {
-                    let (columns, count) = self.changing_columns();
-                    halo.unpack(columns.into_iter().take(count));
-                }
-                HaloContent::OwnedOnly | HaloContent::None => {}
+                let (columns, count) =
+                    self.halo_columns(content, displacement, thermal_stretch.as_deref_mut());
+                halo.unpack(columns.into_iter().take(count));
             }
             self.halo = halo;
             let start = Instant::now();
-            self.update(content, Which::Ghosts, model, displacement);
+            if content == HaloContent::Motion {
+                self.update_moved_ghosts(model, displacement, thermal_stretch.as_deref());
+            }
+            self.update(content, Which::Ghosts);
             let border = model.interior..owned;
             self.run(pass, border, force, bond_update);
             self.finish(pass, 0..owned, model, bond_update, &mut plastic);
@@ -152,6 +148,7 @@ impl<const D: usize> Forces<D> {
         if bond_update.is_stored() {
             let acting = Acting {
                 displacement,
+                thermal_stretch,
                 force,
                 plastic,
             };
@@ -169,7 +166,7 @@ impl<const D: usize> Forces<D> {
 
     /// The columns of point numbers and rotations that change before each sum of forces and that both ends read, and how
     /// many there are.
-    pub(super) fn changing_columns(&mut self) -> ([&mut [f64]; MOST_CHANGING], usize) {
+    pub(super) fn changing_columns(&mut self) -> HaloColumns<'_> {
         let first = self.numbers.first_changing;
         let changing = first..self.numbers.read.max(first);
         let numbers = self.numbers.columns[changing].iter_mut();
@@ -183,13 +180,39 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
+    /// The columns over the local points that a content consists of, and how many there are: what is sent and what is
+    /// received.
+    fn halo_columns<'a>(
+        &'a mut self,
+        content: HaloContent,
+        displacement: &'a mut [Vec<f64>; D],
+        thermal_stretch: Option<&'a mut [f64]>,
+    ) -> HaloColumns<'a> {
+        let mut all: [&mut [f64]; MOST_CHANGING] = std::array::from_fn(|_| &mut [][..]);
+        let mut count = 0;
+        let mut add = |column: &'a mut [f64]| {
+            all[count] = column;
+            count += 1;
+        };
+        match content {
+            HaloContent::Motion => {
+                let columns = displacement.iter_mut().map(Vec::as_mut_slice);
+                columns.chain(thermal_stretch).for_each(add);
+            }
+            HaloContent::Thresholds => add(&mut self.limits.thresholds),
+            HaloContent::PointNumbers => return self.changing_columns(),
+            HaloContent::OwnedOnly | HaloContent::None => {}
+        }
+        (all, count)
+    }
+
     /// Point data that a pass receives from other ranks.
     fn content(&self, turn: usize) -> HaloContent {
         match (
             turn.checked_sub(1).map(|before| self.passes[before]),
             self.passes[turn],
         ) {
-            (None, _) => HaloContent::Displacement,
+            (None, _) => HaloContent::Motion,
             (Some(Pass::SmallestStretch), _) => HaloContent::Thresholds,
             (Some(Pass::PointSum(_)), Pass::Force) => HaloContent::PointNumbers,
             (Some(Pass::PointSum(_)), _) => HaloContent::OwnedOnly,
@@ -197,20 +220,10 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Copy received data of points to where lattices and lists read it. Displacements of owned points are there already.
-    pub(super) fn update(
-        &mut self,
-        content: HaloContent,
-        which: Which,
-        model: &Model<D>,
-        displacement: &[Vec<f64>; D],
-    ) {
+    /// Copy found or received numbers of points to where lattices read them.
+    pub(super) fn update(&mut self, content: HaloContent, which: Which) {
         for grid in &mut self.grids {
             match content {
-                HaloContent::Displacement if which == Which::Ghosts => {
-                    grid.update_ghosts(displacement)
-                }
-                HaloContent::Displacement => {}
                 HaloContent::Thresholds => grid.update_thresholds(which, &self.limits.thresholds),
                 HaloContent::OwnedOnly if which == Which::Ghosts => {}
                 HaloContent::PointNumbers | HaloContent::OwnedOnly => {
@@ -218,11 +231,23 @@ impl<const D: usize> Forces<D> {
                     grid.update_numbers(which, first, &self.numbers.columns);
                     grid.update_rotations(which, &self.limits.rotations);
                 }
-                HaloContent::None => {}
+                HaloContent::Motion | HaloContent::None => {}
             }
         }
-        if content == HaloContent::Displacement && which == Which::Ghosts && !self.nodes.is_empty()
-        {
+    }
+
+    /// Copy received displacements and thermal stretches of ghosts to where bonds read them. Those of owned points are there
+    /// already.
+    fn update_moved_ghosts(
+        &mut self,
+        model: &Model<D>,
+        displacement: &[Vec<f64>; D],
+        thermal_stretch: Option<&[f64]>,
+    ) {
+        for grid in &mut self.grids {
+            grid.update_ghosts(displacement, thermal_stretch);
+        }
+        if !self.nodes.is_empty() {
             let owned = model.owned();
             let ghosts = self.nodes[owned..].par_chunks_mut(CHUNK).enumerate();
             ghosts.for_each(|(chunk, nodes)| {
@@ -230,6 +255,7 @@ impl<const D: usize> Forces<D> {
                 list_points::update(
                     nodes,
                     displacement.each_ref().map(|column| &column[first..]),
+                    thermal_stretch.map(|column| &column[first..]),
                 );
             });
         }

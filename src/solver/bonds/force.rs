@@ -178,7 +178,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         let total = self.weighted(simd, group, group.weights);
         let work = self.work(simd, group, total);
         group.intact &= !self.breaks(simd, group, work);
-        total.add(simd, &group.bond, group.volume, group.intact, force);
+        total.add(simd, &group.bond, group.force_volume, group.intact, force);
     }
 
     #[inline(always)]
@@ -189,7 +189,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
     #[inline(always)]
     fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, force: &mut [Lanes; D]) {
         let total = self.weighted(simd, group, group.weights);
-        total.add(simd, &group.bond, group.volume, group.intact, force);
+        total.add(simd, &group.bond, group.force_volume, group.intact, force);
     }
 
     #[inline(always)]
@@ -220,6 +220,6 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         counts[0] += simd.keep(Lanes::splat(1.0), broken);
         counts[1] += simd.keep(energy, broken);
         counts[2] += simd.keep(overshoot, broken);
-        total.add(simd, &bond, group.volume, broken, lost);
+        total.add(simd, &bond, group.force_volume, broken, lost);
     }
 }

@@ -8,7 +8,7 @@ use crate::damage::Limits;
 use crate::families::{Grid, Offset, VectorBonds, Which};
 use crate::lanes::lane_tuple::eight;
 use crate::lanes::{Column, LaneTuple, Lanes, Simd};
-use crate::material::bond::{Reference, Weights, deform};
+use crate::material::bond::{Elastic, Reference, SeparateThermal, Weights, deform};
 
 use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits, ReadRotations};
@@ -19,16 +19,21 @@ use super::list_points::load_history;
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
     displacement: [Column; D],
+    /// Empty in runs without temperatures.
+    thermal_stretch: Column,
     /// Those numbers that bonds read.
     numbers: Vec<Column>,
     limits: LimitColumns,
 }
 
 impl<const D: usize> GridValues<D> {
-    /// For a grid at rest, whose bonds read so many numbers of each point and these limits.
-    pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead) -> Self {
+    /// For a grid at rest, whose bonds read so many numbers of each point, these limits, and thermal stretches if
+    /// `is_thermal`.
+    pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();
+        let of_temperature = if is_thermal { count } else { 0 };
         Self {
+            thermal_stretch: Column::new(D + numbers, of_temperature, 0.0),
             displacement: std::array::from_fn(|d| Column::new(d, count, 0.0)),
             numbers: (0..numbers)
                 .map(|k| Column::new(D + k, count, 0.0))
@@ -43,10 +48,14 @@ impl<const D: usize> GridValues<D> {
         Arc::ptr_eq(&self.grid, grid)
     }
 
-    /// Takes the displacements of the ghosts.
-    pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D]) {
+    /// Takes the displacements of the ghosts, and their thermal stretches if there are any.
+    pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D], thermal_stretch: Option<&[f64]>) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
             self.grid.update(Which::Ghosts, values, places);
+        }
+        if let Some(values) = thermal_stretch {
+            self.grid
+                .update(Which::Ghosts, values, &mut self.thermal_stretch);
         }
     }
 
@@ -55,6 +64,8 @@ impl<const D: usize> GridValues<D> {
         OwnedPlaces {
             grid: &self.grid,
             columns: (self.displacement.each_mut()).map(|column| column.as_mut_ptr()),
+            thermal_stretch: (!self.thermal_stretch.is_empty())
+                .then(|| self.thermal_stretch.as_mut_ptr()),
             values: PhantomData,
         }
     }
@@ -89,6 +100,7 @@ impl<const D: usize> GridValues<D> {
     /// Memory, that of the grid included, bytes.
     pub fn bytes(&self) -> usize {
         let columns = self.displacement.iter().chain(&self.numbers);
+        let columns = columns.chain([&self.thermal_stretch]);
         let count: usize = columns.map(|column| column.len()).sum();
         size_of::<f64>() * count + self.limits.bytes() + self.grid.bytes()
     }
@@ -98,6 +110,7 @@ impl<const D: usize> GridValues<D> {
 pub struct OwnedPlaces<'a, const D: usize> {
     grid: &'a Grid,
     columns: [*mut f64; D],
+    thermal_stretch: Option<*mut f64>,
     values: PhantomData<&'a mut f64>,
 }
 
@@ -107,21 +120,33 @@ unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {
-    /// Takes the displacements of owned points from a local index on.
+    /// Takes the displacements of owned points from a local index on, and their thermal stretches if there are any.
     ///
     /// # Safety
     /// No other thread does so for any of these points at the same time.
-    pub unsafe fn take(&self, first: usize, displacement: [&[f64]; D]) {
+    pub unsafe fn take(
+        &self,
+        first: usize,
+        displacement: [&[f64]; D],
+        thermal_stretch: Option<&[f64]>,
+    ) {
         let count = displacement[0].len();
+        let thermal = self.thermal_stretch.zip(thermal_stretch);
         for (place, points) in self.grid.slots_of(first..first + count) {
-            for d in 0..D {
-                let values = &displacement[d][points.start - first..points.end - first];
+            let copy = |entries: *mut f64, values: &[f64]| {
+                let values = &values[points.start - first..points.end - first];
                 // SAFETY: these are places of the grid, for each of which a column has an entry, and no other
                 // points have them.
                 unsafe {
-                    let entries = self.columns[d].add(place);
+                    let entries = entries.add(place);
                     entries.copy_from_nonoverlapping(values.as_ptr(), values.len());
                 }
+            };
+            for d in 0..D {
+                copy(self.columns[d], displacement[d]);
+            }
+            if let Some((entries, values)) = thermal {
+                copy(entries, values);
             }
         }
     }
@@ -130,6 +155,8 @@ impl<const D: usize> OwnedPlaces<'_, D> {
 /// The points of a grid as a kernel reads them.
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
+    /// Of points with bonds whose thermal stretch the kernel must not see.
+    thermal_stretch: Option<&'a [f64]>,
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
     rotations: ReadRotations<'a, K::Rotation>,
@@ -151,6 +178,7 @@ impl<K: Kernel<D>, const D: usize> Copy for GridPoints<'_, K, D> {}
 #[derive(Clone, Copy)]
 pub struct PointI<P, R, const D: usize> {
     displacement: [Lanes; D],
+    thermal_stretch: Lanes,
     numbers: P,
     limits: Limits,
     rotation: R,
@@ -166,10 +194,13 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         let slots = values.grid.slots();
         assert!(
             (values.displacement.iter()).all(|column| column.len() >= slots)
+                && (values.thermal_stretch.is_empty() || values.thermal_stretch.len() >= slots)
                 && K::Point::covers(&numbers, slots),
             "an array is too short for the grid"
         );
+        let is_thermal = kernel.is_elastic() && !values.thermal_stretch.is_empty();
         Self {
+            thermal_stretch: is_thermal.then_some(&values.thermal_stretch[..]),
             displacement: values.displacement.each_ref().map(|column| &column[..]),
             numbers,
             limits: ReadLimits::new(kernel.criterion(), &values.limits, slots),
@@ -186,6 +217,23 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     unsafe fn numbers(&self, place: usize) -> K::Point {
         // SAFETY: `new` has checked the length.
         K::Point::load(&self.numbers, |column| unsafe { eight(column, place) })
+    }
+
+    /// Whether bonds have a thermal stretch that the kernel must not see.
+    #[inline(always)]
+    pub fn is_thermal(&self) -> bool {
+        self.thermal_stretch.is_some()
+    }
+
+    /// # Safety
+    /// As for [`Self::numbers`].
+    #[inline(always)]
+    unsafe fn thermal_stretch(&self, place: usize) -> Lanes {
+        match self.thermal_stretch {
+            // SAFETY: `new` has checked the length.
+            Some(column) => unsafe { eight(column, place) },
+            None => Lanes::splat(0.0),
+        }
     }
 
     /// # Safety
@@ -232,6 +280,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         unsafe {
             PointI {
                 displacement: LaneTuple::each(|d| eight(self.displacement[d], place)),
+                thermal_stretch: self.thermal_stretch(place),
                 numbers: self.numbers(place),
                 limits: self.limits::<false>(place),
                 rotation: self.rotations::<false>(place),
@@ -265,9 +314,20 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
                 self.rotations::<FAST_PATH>(far),
             )
         };
-        let eta = LaneTuple::each(|d: usize| displacement[d] - here.displacement[d]);
+        let mut eta: [Lanes; D] =
+            LaneTuple::each(|d: usize| displacement[d] - here.displacement[d]);
+        let xi = LaneTuple::each(|d| Lanes::splat(offset.reference[d]));
+        let mut force_volume = self.volumes[1];
+        if !FAST_PATH && self.is_thermal() {
+            // SAFETY: as above.
+            let stretch_j = unsafe { self.thermal_stretch(vector.far(offset)) };
+            let stretches = [here.thermal_stretch, stretch_j];
+            let elastic: Elastic<D> = simd.aside(SeparateThermal { xi, eta, stretches });
+            eta = elastic.eta;
+            force_volume = force_volume * elastic.slope;
+        }
         let reference = Reference {
-            xi: LaneTuple::each(|d| Lanes::splat(offset.reference[d])),
+            xi,
             length: Lanes::splat(offset.length),
             inverse: Lanes::splat(offset.inverse),
             inverse_square: Lanes::splat(offset.inverse_square),
@@ -284,6 +344,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
             ),
             own_volume: self.volumes[0],
             volume: self.volumes[1],
+            force_volume,
             weights: match vector.weighted {
                 [false, _] => Weights::One,
                 [true, false] => Weights::Same(Lanes::splat(offset.weights[0])),

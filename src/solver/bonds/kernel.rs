@@ -16,6 +16,9 @@ pub struct Group<'a, K: Kernel<D>, const D: usize> {
     pub own_volume: Lanes,
     /// Volumes of points j, m³.
     pub volume: Lanes,
+    /// By what force states are multiplied in the force density: the volume of points j, m³, over 1 + a of a bond with the
+    /// thermal stretch a.
+    pub force_volume: Lanes,
     /// Influence or volume share of the bonds at each end.
     pub weights: Weights,
     /// Numbers of points i.
@@ -139,6 +142,12 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     #[inline(always)]
     fn is_undeformed(&self) -> bool {
         false
+    }
+
+    /// Bonds are given to the law without their thermal stretch.
+    #[inline(always)]
+    fn is_elastic(&self) -> bool {
+        true
     }
 
     /// The bits of broken bonds are needed; asked only with [`Self::READS_BROKEN`].

@@ -5,13 +5,13 @@ use crate::damage::Limits;
 use crate::families::{Groups, Row};
 use crate::lanes::lane_tuple::gather;
 use crate::lanes::{Column, LaneTuple, Lanes, Simd, WIDTH};
-use crate::material::bond::{Reference, Weights, deform};
+use crate::material::bond::{Elastic, Reference, SeparateThermal, Weights, deform};
 use crate::solver::model::Model;
 
 use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, ReadLimits, ReadRotations};
 
-/// Reference position (m), displacement (m) and volume (m³) of a point, three components each.
+/// Reference position (m) and displacement (m) of a point, three components each, its volume (m³) and its thermal stretch.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Node([f64; 8]);
@@ -22,6 +22,9 @@ const DISPLACEMENT: usize = 3;
 /// Entry of a node's volume.
 const VOLUME: usize = 6;
 
+/// Entry of a node's thermal stretch.
+const THERMAL_STRETCH: usize = 7;
+
 /// The nodes of the local points, at rest.
 pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
     let node = |point: usize| {
@@ -31,11 +34,20 @@ pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
     (0..model.volume.len()).map(node).collect()
 }
 
-/// Copy displacements into the nodes.
-pub fn update<const D: usize>(nodes: &mut [Node], displacement: [&[f64]; D]) {
+/// Copy displacements into the nodes, and thermal stretches if there are any.
+pub fn update<const D: usize>(
+    nodes: &mut [Node],
+    displacement: [&[f64]; D],
+    thermal_stretch: Option<&[f64]>,
+) {
     for (k, node) in nodes.iter_mut().enumerate() {
         for d in 0..D {
             node.0[DISPLACEMENT + d] = displacement[d][k];
+        }
+    }
+    if let Some(stretch) = thermal_stretch {
+        for (node, stretch) in nodes.iter_mut().zip(stretch) {
+            node.0[THERMAL_STRETCH] = *stretch;
         }
     }
 }
@@ -48,6 +60,8 @@ pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     rotations: ReadRotations<'a, K::Rotation>,
     limit: f64,
     is_linear: bool,
+    /// Some bonds have a thermal stretch that the kernel must not see.
+    is_thermal: bool,
 }
 
 impl<K: Kernel<D>, const D: usize> Clone for ListPoints<'_, K, D> {
@@ -64,6 +78,7 @@ pub struct PointI<P, R, const D: usize> {
     reference: [Lanes; D],
     displacement: [Lanes; D],
     volume: Lanes,
+    thermal_stretch: Lanes,
     numbers: P,
     limits: Limits,
     rotation: R,
@@ -80,6 +95,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         nodes: &'a [Node],
         numbers: &'a [Column],
         limits: &'a LimitColumns,
+        is_thermal: bool,
     ) -> Self {
         let numbers = K::Point::columns(numbers);
         assert!(
@@ -93,6 +109,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             rotations: ReadRotations::new::<D>(kernel.criterion(), limits, reach),
             limit: kernel.criterion().limit(),
             is_linear: kernel.is_linear(),
+            is_thermal: is_thermal && kernel.is_elastic(),
         }
     }
 
@@ -153,6 +170,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
             reference: LaneTuple::each(|d| Lanes::splat(node[d])),
             displacement: LaneTuple::each(|d| Lanes::splat(node[DISPLACEMENT + d])),
             volume: Lanes::splat(node[VOLUME]),
+            thermal_stretch: Lanes::splat(node[THERMAL_STRETCH]),
             numbers,
             limits,
             rotation,
@@ -199,6 +217,14 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         // SAFETY: as above.
         let (limits, rotation) = unsafe { (self.limits(&indices), self.rotations(&indices)) };
         let intact = row.groups.intact[group];
+        let (mut eta, volume) = (eta, columns[VOLUME]);
+        let mut force_volume = volume;
+        if self.is_thermal {
+            let stretches = [here.thermal_stretch, columns[THERMAL_STRETCH]];
+            let elastic: Elastic<D> = simd.aside(SeparateThermal { xi, eta, stretches });
+            eta = elastic.eta;
+            force_volume = volume * elastic.slope;
+        }
         Group {
             bond: deform::<_, false, D>(
                 simd,
@@ -209,7 +235,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
                 K::wanted(self.is_linear),
             ),
             own_volume: here.volume,
-            volume: columns[VOLUME],
+            volume,
+            force_volume,
             weights: match row.weights {
                 [None, _] => Weights::One,
                 [Some(weights), None] => Weights::Same(weights[group]),

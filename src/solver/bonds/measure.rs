@@ -125,7 +125,7 @@ impl<const D: usize> Forces<D> {
         model: &Model<D>,
         plastic: impl Fn(usize) -> PlasticState,
     ) -> Vec<Option<f64>> {
-        let gradients = self.deformation_gradient(model);
+        let gradients = self.elastic_gradient(model);
         let columns = self.measure(model.owned(), 1, |interaction, sums, source| {
             let [law, _] = interaction.laws.laws();
             if law.has_bond_stress_across::<D>() {
@@ -163,13 +163,18 @@ impl<const D: usize> Forces<D> {
     /// The deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
     /// displacements of the last [evaluation](Self::evaluate); I where too few are left.
     pub fn deformation_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
+        self.gradient(model, false)
+    }
+
+    /// As [`Self::deformation_gradient`], of bonds without their thermal stretch.
+    pub fn elastic_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
+        self.gradient(model, true)
+    }
+
+    fn gradient(&mut self, model: &Model<D>, is_elastic: bool) -> Vec<SMatrix<f64, D, D>> {
+        let kernel = measures::FamilyTensors { is_elastic };
         let columns = self.measure(model.owned(), 2 * D + D * D, |interaction, sums, source| {
-            sweep_all(
-                &mut interaction.bonds,
-                sums,
-                &measures::FamilyTensors,
-                source,
-            );
+            sweep_all(&mut interaction.bonds, sums, &kernel, source);
         });
         let gradient = |point: usize| {
             let entry = |k: usize| columns[k][point];

@@ -223,7 +223,10 @@ impl<const D: usize> Kernel<D> for StressAcross {
 /// Sums the tensors of the intact bonds of a point: the shape tensor Σ ω ξ⊗ξ Ṽ by diagonal and mixed
 /// entries, and Σ ω η⊗ξ Ṽ row by row, m⁵.
 #[derive(Clone, Copy)]
-pub struct FamilyTensors;
+pub struct FamilyTensors {
+    /// Leave thermal stretches out.
+    pub is_elastic: bool,
+}
 
 impl<const D: usize> Kernel<D> for FamilyTensors {
     type Sums = FamilyShare<D>;
@@ -232,6 +235,10 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
     const WANTED: Wanted = wanted(true);
+
+    fn is_elastic(&self) -> bool {
+        self.is_elastic
+    }
 
     #[inline(always)]
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
@@ -264,6 +271,10 @@ impl<const D: usize> Kernel<D> for Dilatation {
 
     fn is_linear(&self) -> bool {
         self.is_linear
+    }
+
+    fn is_elastic(&self) -> bool {
+        false
     }
 
     #[inline(always)]

@@ -107,13 +107,15 @@ pub struct Forces<const D: usize> {
     has_history: bool,
     /// Whether any bonds can break; the same on all ranks.
     breaks: bool,
+    /// Whether points have thermal stretches; the same on all ranks.
+    is_thermal: bool,
     /// What came of bonds that broke in the last evaluation.
     broken: Vec<Broken<D>>,
 }
 
 impl<const D: usize> Forces<D> {
-    /// Puts together the bonds, the halo plan and the blocks' laws. The constants of the points are still to be
-    /// [found](Self::find_constants). Collective.
+    /// Puts together the bonds, the halo plan and the blocks' laws; `is_thermal` if points have thermal stretches. The
+    /// constants of the points are still to be [found](Self::find_constants). Collective.
     ///
     /// # Errors
     /// When the wish for [instructions](Instructions::of_all) is none; the same on all ranks.
@@ -124,6 +126,7 @@ impl<const D: usize> Forces<D> {
         grids: Vec<Arc<Grid>>,
         halo: Halo,
         blocks: Vec<BlockLaws>,
+        is_thermal: bool,
     ) -> Result<Self> {
         let instructions = Instructions::of_all(comm)?;
         let numbers = PointNumbers::new(&blocks, model);
@@ -151,7 +154,7 @@ impl<const D: usize> Forces<D> {
             },
             grids: grids
                 .into_iter()
-                .map(|grid| GridValues::new(grid, numbers.read, read))
+                .map(|grid| GridValues::new(grid, numbers.read, read, is_thermal))
                 .collect(),
             limits,
             interactions,
@@ -162,6 +165,7 @@ impl<const D: usize> Forces<D> {
             instructions,
             has_history,
             breaks,
+            is_thermal,
             broken: Vec::new(),
         })
     }
@@ -216,6 +220,7 @@ impl<const D: usize> Forces<D> {
             numbers: &self.numbers.columns[..self.numbers.read],
             limits: &self.limits,
             grids: &self.grids,
+            is_thermal: self.is_thermal,
             instructions: self.instructions,
         };
         for interaction in &mut self.interactions {

@@ -38,6 +38,8 @@ pub struct PointData<'a, const D: usize> {
     pub limits: &'a LimitColumns,
     /// All of these for lattices, by grid.
     pub grids: &'a [GridValues<D>],
+    /// Points have thermal stretches.
+    pub is_thermal: bool,
     /// Instruction set.
     pub instructions: Instructions,
 }
@@ -140,11 +142,12 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
                 nodes,
                 numbers,
                 limits,
+                is_thermal,
                 ..
             } = source;
             let rows = list.rows_below(points.start)..list.rows_below(points.end);
             let leaf = leaf(LEAF, list.groups_a_row());
-            let points = ListPoints::new(kernel, list.reach(), nodes, numbers, limits);
+            let points = ListPoints::new(kernel, list.reach(), nodes, numbers, limits, is_thermal);
             let runner = OverRows { kernel, points };
             split(list.rows(rows), base, results, &runner, leaf, instructions)
         }
@@ -356,9 +359,9 @@ struct FastPathGate {
 }
 
 impl FastPathGate {
-    fn new<K: Kernel<D>, const D: usize>(kernel: &K) -> Self {
+    fn new<K: Kernel<D>, const D: usize>(kernel: &K, points: &GridPoints<'_, K, D>) -> Self {
         Self {
-            is_allowed: kernel.may_skip_criterion(),
+            is_allowed: kernel.may_skip_criterion() && !points.is_thermal(),
             skipped: 0,
         }
     }
@@ -597,7 +600,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         let mut broken_sums = Vec::new();
         // Copies, which the loop can keep in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
-        let mut gate = FastPathGate::new(&kernel);
+        let mut gate = FastPathGate::new(&kernel, &points);
         let is_undeformed = kernel.is_undeformed();
         let mut known = Known(FxHashMap::default());
         for k in 0..vectors.len() {

@@ -11,8 +11,8 @@ use crate::solver::model::Model;
 
 use super::members;
 
-/// Names of the components.
-const AXES: [&str; 3] = ["x", "y", "z"];
+/// Subjects of messages on vectors.
+const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
 /// An error if a condition has no finite value at one of its points at a time (s), or at the start an
 /// initial value. Collective.
@@ -40,7 +40,7 @@ pub fn are_finite<const D: usize>(
                 if let Some((values, place)) = values {
                     let key = format!("[initial.{}] {quantity}", initial.name);
                     let values = values.iter().map(Some).zip([1.0; D]);
-                    looker.look(&key, place, initial.set, values)?;
+                    looker.look(&key, &COMPONENTS, place, initial.set, values)?;
                 }
             }
         }
@@ -55,15 +55,19 @@ pub fn are_finite<const D: usize>(
         match &condition.action {
             Action::Displacement(values) | Action::Velocity(values) => {
                 let values = values.iter().map(Option::as_ref).zip([1.0; D]);
-                looker.look(&key, place, set, values)?;
+                looker.look(&key, &COMPONENTS, place, set, values)?;
             }
             Action::BodyForce(values, factors) => {
                 let values = values.iter().map(Some).zip(factors.iter().copied());
-                looker.look(&key, place, set, values)?;
+                looker.look(&key, &COMPONENTS, place, set, values)?;
             }
             Action::Force(values) => {
                 let values = values.iter().map(Some).zip([1.0; D]);
-                looker.look(&key, place, set, values)?;
+                looker.look(&key, &COMPONENTS, place, set, values)?;
+            }
+            Action::Temperature(value) => {
+                let values = std::iter::once((Some(value), 1.0));
+                looker.look(&key, &["is"], place, set, values)?;
             }
         }
     }
@@ -79,10 +83,11 @@ struct FiniteCheck<'a, const D: usize> {
 }
 
 impl<const D: usize> FiniteCheck<'_, D> {
-    /// An error if a component, times its factor, is not finite at a point of a set.
+    /// An error if a component, times its factor, is not finite at a point of a set. `names` begin the message for each.
     fn look<'e>(
         &self,
         key: &str,
+        names: &[&str],
         place: &Range<usize>,
         set: usize,
         components: impl Iterator<Item = (Option<&'e Expression>, f64)>,
@@ -126,8 +131,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
             return Ok(());
         };
         let message = format!(
-            "{key}: component {} is {value} at t = {} s at point {id}, {:?} m",
-            AXES[component as usize],
+            "{key}: {} {value} at t = {} s at point {id}, {:?} m",
+            names[component as usize],
             format_number(self.time),
             &position[..D]
         );

@@ -1,9 +1,10 @@
-//! Loads, supports and initial values on this rank's points.
+//! Loads, supports, temperatures and initial values on this rank's points.
 
 mod finite;
 mod initial;
 mod loads;
 mod supports;
+mod temperatures;
 mod values;
 
 use crate::comm::sum::{ExactSum, reduce};
@@ -21,12 +22,14 @@ pub use finite::are_finite;
 pub use initial::apply_initials;
 use loads::{Load, Loaded};
 use supports::{Motion, Support, Supported};
+use temperatures::{Heated, Temperatures};
 
 /// Loads and supports, and this rank's points that they act on.
 #[derive(Default)]
 pub struct Conditions<const D: usize> {
     loads: Vec<Load<D>>,
     supports: Vec<Support>,
+    temperatures: Temperatures,
     /// By part of the points.
     on_parts: Vec<OnPart<D>>,
 }
@@ -36,6 +39,7 @@ pub struct Conditions<const D: usize> {
 pub struct OnPart<const D: usize> {
     loads: Vec<Loaded<D>>,
     supports: Vec<Supported>,
+    heated: Vec<Heated>,
 }
 
 /// Work of loads and supports from a state 0, which they remember, to the present state.
@@ -65,6 +69,7 @@ pub struct Here<'a, const D: usize> {
 pub struct All<'a, const D: usize> {
     loads: &'a [Load<D>],
     supports: &'a [Support],
+    temperatures: &'a Temperatures,
 }
 
 /// Local indices of the owned points of a set, by index.
@@ -197,6 +202,14 @@ impl<const D: usize> Conditions<D> {
                     let load = Load::new(values, [1.0 / volume; D]);
                     conditions.add_load(model, load, points);
                 }
+                Action::Temperature(value) => {
+                    let temperature = conditions.temperatures.add(value);
+                    for points in points.chunk_by(|a, b| part_of(*a) == part_of(*b)) {
+                        let (numbers, positions) = numbers_in_part(model, points);
+                        let heated = Heated::new(temperature, numbers, positions);
+                        conditions.on_parts[part_of(points[0])].heated.push(heated);
+                    }
+                }
             }
         }
         for (support, points) in supported.iter().enumerate() {
@@ -263,11 +276,22 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
+    /// Prepare the temperatures of a time (s).
+    pub fn set_temperatures(&mut self, time: f64) {
+        self.temperatures.set_time(time);
+    }
+
+    /// Have all temperatures set anew by the next [`Here::apply_temperatures`].
+    pub fn reset_temperatures(&mut self) {
+        self.temperatures.reset();
+    }
+
     /// What all parts share, and what each has.
     pub fn by_part(&mut self) -> (All<'_, D>, &mut [OnPart<D>]) {
         let all = All {
             loads: &self.loads,
             supports: &self.supports,
+            temperatures: &self.temperatures,
         };
         (all, &mut self.on_parts)
     }
@@ -354,7 +378,12 @@ impl<'a, const D: usize> Here<'a, D> {
         Self { all, on }
     }
 
-    /// Whether none acts on this part.
+    /// Set temperature and thermal stretch of the points, if they have changed.
+    pub fn apply_temperatures(&self, part: &mut Part<'_, D>) {
+        self.all.temperatures.apply(&self.on.heated, part);
+    }
+
+    /// Whether no load and no support acts on this part.
     pub fn is_empty(&self) -> bool {
         self.on.loads.is_empty() && self.on.supports.is_empty()
     }

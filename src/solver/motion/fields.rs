@@ -137,6 +137,26 @@ fields! {
         output: Some(Field::Displacement),
         ..STATE
     };
+    /// Temperature; none without prescribed temperatures.
+    temperature: Option<Vec<f64>> = Description {
+        name: "temperature",
+        unit: "K",
+        state: false,
+        undone: false,
+        birth: Birth::FoundAnew,
+        output: Some(Field::Temperature),
+        ..STATE
+    };
+    /// Thermal stretch in the directions of the setting; owned points, then ghosts; none without prescribed temperatures.
+    thermal_stretch: Option<Vec<f64>> = Description {
+        name: "thermal_stretch",
+        unit: "1",
+        exchanged: true,
+        state: false,
+        undone: false,
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
     /// u̇, m/s, at full steps but between the steps of a [`Stepper`](crate::solver::Stepper).
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
@@ -313,6 +333,8 @@ pub struct Needs {
     pub loads: bool,
     /// Whether there are supports.
     pub supports: bool,
+    /// Whether there are prescribed temperatures.
+    pub temperature: bool,
     /// Whether there is viscous damping.
     pub damping: bool,
     /// Whether there is relaxation.
@@ -378,6 +400,8 @@ impl<const D: usize> Fields<D> {
         let scalar = || vec![0.0; owned];
         Self {
             displacement: vector(local),
+            temperature: needs.temperature.then(scalar),
+            thermal_stretch: needs.temperature.then(|| vec![0.0; local]),
             velocity: vector(owned),
             internal_force: vector(owned),
             external_force: needs.loads.then(|| vector(owned)),

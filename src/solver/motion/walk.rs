@@ -24,6 +24,10 @@ pub struct Part<'a, const D: usize> {
     pub first: usize,
     /// As [`Fields::displacement`].
     pub displacement: Columns<'a, D>,
+    /// As [`Fields::temperature`].
+    pub temperature: Option<Columns<'a, 1>>,
+    /// As [`Fields::thermal_stretch`].
+    pub thermal_stretch: Option<Columns<'a, 1>>,
     /// As [`Fields::velocity`].
     pub velocity: Columns<'a, D>,
     /// As [`Fields::internal_force`].
@@ -68,6 +72,8 @@ impl<'a, const D: usize> Part<'a, D> {
             model,
             first: 0,
             displacement: (fields.displacement.each_mut()).map(|column| &mut column[..owned]),
+            temperature: fields.temperature.as_mut().map(|column| [&mut column[..]]),
+            thermal_stretch: (fields.thermal_stretch.as_mut()).map(|column| [&mut column[..owned]]),
             velocity: vector(&mut fields.velocity),
             internal_force: vector(&mut fields.internal_force),
             external_force: fields.external_force.as_mut().map(vector),
@@ -123,10 +129,13 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Shows the bonds the displacements, and begins the sums of their forces with 0.
+    /// Write displacements and thermal stretches to where bonds read them, and zero the sums of their forces.
     pub fn write_bond_inputs(&mut self) {
-        self.bond_inputs
-            .write_bond_inputs(self.displacement.each_ref().map(|column| &**column));
+        let thermal_stretch = self.thermal_stretch.as_ref();
+        self.bond_inputs.write_bond_inputs(
+            self.displacement.each_ref().map(|column| &**column),
+            thermal_stretch.map(|[column]| &**column),
+        );
         for component in &mut self.internal_force {
             component.fill(0.0);
         }
@@ -140,6 +149,11 @@ impl<'a, const D: usize> Part<'a, D> {
             model: self.model,
             first,
             displacement: cut(&mut self.displacement, count),
+            temperature: self.temperature.as_mut().map(|column| cut(column, count)),
+            thermal_stretch: self
+                .thermal_stretch
+                .as_mut()
+                .map(|column| cut(column, count)),
             velocity: cut(&mut self.velocity, count),
             internal_force: cut(&mut self.internal_force, count),
             external_force: self.external_force.as_mut().map(|force| cut(force, count)),

@@ -84,7 +84,7 @@ impl Snapshot {
             Field::Dilatation => {
                 let [_, mut dilatation] = simulation.forces.dilatation(model);
                 for (point, value) in dilatation.iter_mut().enumerate() {
-                    *value *= trace_share(simulation, point);
+                    *value = trace(simulation, point, *value);
                 }
                 dilatation
             }
@@ -118,6 +118,11 @@ impl Snapshot {
                     .collect()
             }
             Field::Singular => simulation.forces.singular(model),
+            // Where none is prescribed.
+            Field::Temperature => {
+                let point = |point| model.expansion_of(point).reference_temperature;
+                (0..count).map(point).collect()
+            }
             Field::Fragment => simulation.fragment_ids(),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
             // Where nothing touches, no bonds can break, and no points flow.
@@ -142,12 +147,15 @@ fn cauchy_stress<const D: usize>(
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        let in_plane = determinant(gradient);
+        // Expansion by temperature is the same in all directions.
+        let thermal = 1.0 + free_stretch(simulation, point);
+        let gradient = gradient / thermal;
+        let in_plane = determinant(&gradient);
         let growth = match simulation.problem.dimension {
             Dimension::PlaneStress { .. } => {
                 let plastic = plastic_state(&simulation.fields, point);
                 let (forces, model) = (&simulation.forces, &simulation.model);
-                match forces.stretch_across(model, point, gradient, &plastic) {
+                match forces.stretch_across(model, point, &gradient, &plastic) {
                     Some(stretch) => in_plane * stretch,
                     None => libm::pow(in_plane, (1.0 - 2.0 * ratio) / (1.0 - ratio)),
                 }
@@ -158,6 +166,7 @@ fn cauchy_stress<const D: usize>(
             } => libm::pow(in_plane, 1.0 - 2.0 * ratio),
             _ => in_plane,
         };
+        let growth = growth * thermal.powi(3);
         // A body turned inside out has no volume to speak of.
         let growth = if growth > 0.0 { growth } else { 1.0 };
         stress.iter_mut().for_each(|entry| *entry /= growth);
@@ -180,10 +189,10 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
     simulation.problem.block(block).body.material.elastic
 }
 
-/// The trace of the strain in space by that in the setting's directions: without stress across a plate, it
-/// thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar by ε_yy = ε_zz = −ν ε_xx.
-fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
-    match simulation.problem.dimension {
+/// The trace of the strain in space of an owned point from that in the setting's directions: without stress across a
+/// plate, it thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar by ε_yy = ε_zz = −ν ε_xx, beside what temperature does.
+fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_setting: f64) -> f64 {
+    let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
             let ratio = elastic(simulation, point).poisson_ratio;
             (1.0 - 2.0 * ratio) / (1.0 - ratio)
@@ -192,8 +201,32 @@ fn trace_share<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> 
             constraint: Constraint::UniaxialStress,
             ..
         } => 1.0 - 2.0 * elastic(simulation, point).poisson_ratio,
-        Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => 1.0,
+        Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => {
+            return in_setting;
+        }
+    };
+    let free = free_stretch(simulation, point);
+    share * (in_setting - D as f64 * free) + 3.0 * free
+}
+
+/// The stretch of an owned point by temperature in settings that leave it free across their directions, else 0: there, the
+/// determinant of F is that of space.
+fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    match &simulation.fields.thermal_stretch {
+        Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],
+        _ => 0.0,
     }
+}
+
+/// The stress −E α (T − T₀) of an owned point whose strain across the setting is 0, Pa.
+fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
+    let Some(temperature) = &simulation.fields.temperature else {
+        return 0.0;
+    };
+    let block = usize::from(simulation.model.block[point]);
+    let material = &simulation.problem.block(block).body.material;
+    let change = temperature[point] - material.expansion.reference_temperature;
+    -material.elastic.youngs_modulus * material.expansion.coefficient * change
 }
 
 /// The plastic strain of an owned point; 0 where no points flow.
@@ -208,7 +241,7 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
 }
 
 /// Find the stress across the directions of the setting where there is no strain: zz by the law in plane strain,
-/// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx under uniaxial strain.
+/// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx under uniaxial strain. Temperature adds −E α ΔT, and −E α ΔT/(1 − ν).
 fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
     let by_law = match simulation.problem.dimension {
@@ -224,13 +257,14 @@ fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<
         match simulation.problem.dimension {
             Dimension::PlaneStrain { .. } => {
                 let linear = ratio * (xx[point] + yy[point]);
-                zz[point] = by_law[point].unwrap_or(linear);
+                zz[point] = by_law[point].unwrap_or(linear) + thermal_stress(simulation, point);
             }
             Dimension::Line {
                 constraint: Constraint::UniaxialStrain,
                 ..
             } => {
-                zz[point] = ratio / (1.0 - ratio) * xx[point];
+                let thermal = thermal_stress(simulation, point) / (1.0 - ratio);
+                zz[point] = ratio / (1.0 - ratio) * xx[point] + thermal;
                 yy[point] = zz[point];
             }
             Dimension::PlaneStress { .. } | Dimension::Line { .. } | Dimension::Space => {}

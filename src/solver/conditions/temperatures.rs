@@ -1,0 +1,96 @@
+//! Prescribed temperatures, and the thermal stretches that follow.
+
+use crate::expression::Expression;
+use crate::solver::motion::walk::Part;
+
+use super::values::{At, Values};
+
+/// A prescribed temperature.
+pub struct Temperature {
+    values: Values,
+    now: At,
+}
+
+/// The points of a part whose temperature is prescribed.
+pub struct Heated {
+    /// By which condition.
+    temperature: usize,
+    /// Their numbers in the part.
+    points: Vec<u16>,
+    positions: Vec<[f64; 3]>,
+}
+
+/// All prescribed temperatures of a stage.
+#[derive(Default)]
+pub struct Temperatures {
+    each: Vec<Temperature>,
+    /// The time (s) of the last [`Self::set_time`].
+    time: Option<f64>,
+    /// The points must be given their temperatures.
+    is_due: bool,
+}
+
+impl Temperatures {
+    /// Adds one; returns its number.
+    pub fn add(&mut self, value: &Expression) -> usize {
+        let values = Values::new(value);
+        self.each.push(Temperature {
+            now: values.at(0.0),
+            values,
+        });
+        self.each.len() - 1
+    }
+
+    /// Prepare the temperatures of a time (s). Points are due at the first time, and whenever a temperature changes.
+    pub fn set_time(&mut self, time: f64) {
+        let is_new = self.time != Some(time);
+        let changes = self.each.iter().any(|one| one.values.changes);
+        self.is_due = self.time.is_none() || (is_new && changes);
+        self.time = Some(time);
+        for one in &mut self.each {
+            one.now = one.values.at(time);
+        }
+    }
+
+    /// Forget what the points have been given.
+    pub fn reset(&mut self) {
+        self.time = None;
+    }
+
+    /// Set temperature and thermal stretch of the points of a part, if they are due: the reference temperature of the material
+    /// where no condition acts, else that of the last condition.
+    pub fn apply<const D: usize>(&self, heated: &[Heated], part: &mut Part<'_, D>) {
+        let (model, first) = (part.model, part.first);
+        let (Some([temperature]), Some([stretch]), true) = (
+            &mut part.temperature,
+            &mut part.thermal_stretch,
+            self.is_due,
+        ) else {
+            return;
+        };
+        for (k, value) in temperature.iter_mut().enumerate() {
+            *value = model.expansion_of(first + k).reference_temperature;
+        }
+        for heated in heated {
+            let Temperature { values, now } = &self.each[heated.temperature];
+            for (point, position) in heated.points.iter().zip(&heated.positions) {
+                temperature[usize::from(*point)] = values.of(now, *position);
+            }
+        }
+        for (k, (stretch, value)) in stretch.iter_mut().zip(temperature.iter()).enumerate() {
+            let expansion = model.expansion_of(first + k);
+            *stretch = expansion.stretch_per_kelvin * (value - expansion.reference_temperature);
+        }
+    }
+}
+
+impl Heated {
+    /// By the condition with this number, the points with these numbers in the part.
+    pub fn new(temperature: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
+        Self {
+            temperature,
+            points,
+            positions,
+        }
+    }
+}
