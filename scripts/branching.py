@@ -16,7 +16,7 @@ import re
 import subprocess
 import time
 
-import h5py
+import fissure
 import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -167,12 +167,11 @@ def main():
     print("grid                   points at start, end    time, s   fracture, mJ   length, mm   branches   from fine    from same places")
     for name, text, references in cases(arguments):
         out, seconds = run(arguments, name, text)
-        with h5py.File(out / "result.vtkhdf") as file:
-            table = file["history"]
-            history = dict(zip(table.attrs["columns"].split(","), table[-1]))
-            counts = file["VTKHDF/NumberOfPoints"][:]
-            energy = 1e3 * history["fracture_energy"]
-            length = 1e3 * history["crack_notch_length"]
+        with fissure.open(out) as result:
+            history = result.history
+            counts = [len(result.points_at(k)) for k in (0, -1)]
+        energy = 1e3 * numpy.array(history["fracture_energy"])[-1]
+        length = 1e3 * numpy.array(history["crack_notch_length"])[-1]
         branches = lines(out)
         found[name] = branches
         pairs = [(branches, found[other]) for other in references]

@@ -7,13 +7,12 @@ lattice: in the bulk, and in a tile of this thickness with free faces.
 """
 
 import argparse
-import csv
 import json
 import pathlib
-import re
 import subprocess
 import sys
 
+import fissure
 import matplotlib
 import numpy
 
@@ -210,10 +209,8 @@ def run(options, limit, law, dx, ratio):
 
 
 def columns(history):
-    with open(history) as file:
-        rows = list(csv.reader(file))
-    names = [re.sub(r" \[.*", "", name) for name in rows[0]]
-    return dict(zip(names, numpy.array(rows[1:], dtype=float).T))
+    table = fissure.read_history(history)
+    return {name: numpy.array(table[name]) for name in table}
 
 
 def evaluate(history, limit, law, dx, ratio):

@@ -9,9 +9,8 @@ wave reaches afterwards.
 import argparse
 import pathlib
 import re
-import subprocess
 
-import h5py
+import fissure
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -67,26 +66,22 @@ def deck(rule, levels, factor, bonds, seen, end):
 
 
 def run(arguments, name, text):
-    """The result file of a deck."""
+    """The result of a deck."""
     folder = arguments.folder / name
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "deck.toml"
     path.write_text(text)
-    command = [str(arguments.fissure), "run", str(path), "--output", str(folder / "out"), "--overwrite", "--quiet"]
-    subprocess.run(command, check=True)
-    return h5py.File(folder / "out" / "result.vtkhdf")
+    return fissure.run(path, output=folder / "out", overwrite=True, binary=arguments.fissure)
 
 
 class Energy:
     """Total energy density (J/m³) of the second output by position, the positions, and the time."""
 
-    def __init__(self, file):
-        self.places = file["VTKHDF/Points"][:, :2]
-        rows = slice(len(self.places), 2 * len(self.places))
-        data = file["VTKHDF/PointData"]
-        kinetic = 0.5 * (data["velocity"][rows] ** 2).sum(axis=1)
-        self.density = data["strain_energy_density"][rows] + kinetic
-        self.time = file["VTKHDF/Steps/Values"][1]
+    def __init__(self, result):
+        self.places = result.points[:, :2]
+        kinetic = 0.5 * (result.field("velocity", 1) ** 2).sum(axis=1)
+        self.density = result.field("strain_energy_density", 1) + kinetic
+        self.time = result.times[1]
 
     def profile(self):
         """The density along the row of nodes through the patch; all other rows are equal."""
@@ -95,11 +90,10 @@ class Energy:
         return self.places[row, 0][order], self.density[row][order]
 
 
-def columns(file, *names):
+def columns(result, *names):
     """Columns of the history of a result."""
-    table = file["history"]
-    found = dict(zip(table.attrs["columns"].split(","), table[:].T))
-    return [found[name] for name in names]
+    history = result.history
+    return [np.array(history[name]) for name in names]
 
 
 def main():
@@ -123,14 +117,14 @@ def main():
     cases += [("delta", level, 1.0, "own") for level in (1, 2, 3)]
     for rule, level, factor, bonds in cases:
         name = f"{rule}_{level}_{factor}_{bonds}"
-        file = run(arguments, name, deck(rule, level, factor, bonds, seen, after))
-        energy = Energy(file)
+        result = run(arguments, name, deck(rule, level, factor, bonds, seen, after))
+        energy = Energy(result)
         # Time steps differ, and with them the times of the outputs.
         shift = SPEED * (energy.time - uniform.time)
         wanted = np.interp(energy.places[:, 0] - shift, at, density)
         near = np.abs(energy.places - CENTRE).max(axis=1) < 5 * DX
         change = 100 * (energy.density[near] / wanted[near] - 1)
-        found = np.interp(times, *columns(file, "time", "probe_reflected_displacement_x"))
+        found = np.interp(times, *columns(result, "time", "probe_reflected_displacement_x"))
         late = times > (CENTRE[0] - 0.1) / SPEED + 0.09
         reflected = 100 * np.abs(found - before)[late].max() / AMPLITUDE
         loss, gain, coming_back = PAPER[rule, level]

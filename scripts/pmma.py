@@ -15,7 +15,7 @@ import re
 import subprocess
 import sys
 
-import h5py
+import fissure
 import matplotlib
 import numpy
 
@@ -197,10 +197,8 @@ def run(options, law):
 
 
 def history(folder):
-    with open(folder / "history.csv") as file:
-        rows = list(csv.reader(file))
-    names = [re.sub(r" \[.*", "", name) for name in rows[0]]
-    return dict(zip(names, numpy.array(rows[1:], dtype=float).T))
+    table = fissure.read_history(folder)
+    return {name: numpy.array(table[name]) for name in table}
 
 
 def branches(folder):
@@ -225,12 +223,8 @@ def deviation(path):
 
 def damage(folder):
     """Positions (m), damage at each output, times (s) and horizon (m)."""
-    with h5py.File(folder / "result.vtkhdf") as file:
-        places = file["VTKHDF/Points"][:]
-        times = file["VTKHDF/Steps/Values"][:]
-        rows = len(times) * len(places)
-        values = file["VTKHDF/PointData/damage"][:rows].reshape(len(times), len(places))
-    return places, values, times
+    with fissure.open(folder) as result:
+        return result.points, result["damage"], result.times
 
 
 def evaluate(folder, law, dx):

@@ -22,6 +22,7 @@ import threading
 import time
 import tomllib
 
+import fissure
 import matplotlib
 import numpy
 
@@ -439,15 +440,11 @@ def submit(study, options, rows):
 def history(folder):
     """The columns of a run's history by name; None without a history."""
     try:
-        with open(folder / "history.csv") as file:
-            rows = list(csv.reader(file))
-    except OSError:
+        table = fissure.read_history(folder)
+    except (OSError, ValueError):
         return None
-    names = [re.sub(r" \[.*", "", name) for name in rows[0]] if rows else []
-    whole = [row for row in rows[1:] if len(row) == len(names)]
-    if not whole:
-        return None
-    return dict(zip(names, numpy.array(whole, dtype=float).T))
+    columns = {name: numpy.array(table[name]) for name in table}
+    return columns if len(next(iter(columns.values()))) else None
 
 
 def value_of(study, name, output, columns):

@@ -13,9 +13,11 @@ mod command {
     mod commands;
     mod compare;
     mod failures;
+    mod generate;
     mod library;
     mod pictures;
     mod readers;
+    mod sweep;
 }
 
 mod laws {

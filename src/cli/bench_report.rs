@@ -7,6 +7,7 @@ use crate::cli::outln;
 use super::bench::{Family, Law};
 use super::format::{bytes, count, si};
 use fissure::lanes::Instructions;
+use serde_json::{Map, Value, json};
 
 /// Time of a phase of the time loop, s.
 pub struct Phase {
@@ -216,25 +217,16 @@ impl Figures {
 
     /// One JSON object; names include the unit.
     fn json(&self) -> String {
-        let [x, y, z] = self.edges;
-        let mut entries = vec![
-            ("law".to_owned(), format!("\"{}\"", self.law_name())),
-            ("family".to_owned(), format!("\"{}\"", self.family.name())),
-            (
-                "instructions".to_owned(),
-                format!("\"{}\"", self.instructions.name()),
-            ),
-            ("failure".to_owned(), self.failure.to_string()),
-            ("edges".to_owned(), format!("[{x}, {y}, {z}]")),
-        ];
-        let mut number = |name: &str, value: f64| {
-            let text = if value.is_finite() {
-                format!("{value:?}")
-            } else {
-                "null".to_owned()
-            };
-            entries.push((name.replace(['-', ' '], "_"), text));
-        };
+        let mut entries = Map::new();
+        let mut add =
+            |name: &str, value: Value| entries.insert(name.replace(['-', ' '], "_"), value);
+        add("law", json!(self.law_name()));
+        add("family", json!(self.family.name()));
+        add("instructions", json!(self.instructions.name()));
+        add("failure", json!(self.failure));
+        add("edges", json!(self.edges));
+        // Numbers that are not finite become null.
+        let mut number = |name: &str, value: f64| add(name, json!(value));
         number("points", self.points);
         number("directed_bonds", self.bonds);
         number("ranks", self.ranks as f64);
@@ -275,9 +267,6 @@ impl Figures {
             number("multiply_add_operations_per_second", limits.arithmetic);
             number("operations_per_second", limits.done);
         }
-        let entries = entries
-            .iter()
-            .map(|(name, value)| format!("\"{name}\": {value}"));
-        format!("{{{}}}", entries.collect::<Vec<_>>().join(", "))
+        Value::Object(entries).to_string()
     }
 }

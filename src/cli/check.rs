@@ -11,6 +11,7 @@ use fissure::solver::size::is_feasible;
 use fissure::solver::steps::{choose_steps, even_clock};
 use fissure::survey::{Cost, Interior, Size, dry_run, interior, size};
 
+use super::check_json;
 use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
@@ -33,6 +34,15 @@ pub fn check(arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
 }
 
 fn check_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
+    let checked = report_one(path, arguments, verbosity);
+    if let (Err(error), true) = (&checked, arguments.json) {
+        let report = check_json::invalid(&path.to_string_lossy(), &error.message);
+        print(&format!("{report}\n"))?;
+    }
+    checked
+}
+
+fn report_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
     let deck = deck::read(path, &arguments.set)?;
     let request = Request {
         path,
@@ -40,25 +50,37 @@ fn check_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> R
         ranks: arguments.ranks,
         // With --quiet, nothing is printed.
         measure: verbosity != Verbosity::Quiet,
+        json: arguments.json,
     };
     let report = report(&request).map_err(|error| deck.locate(error))?;
-    if verbosity == Verbosity::Quiet {
+    if verbosity == Verbosity::Quiet && !arguments.json {
         return Ok(());
     }
-    print(&report.text)
+    print(&report)
 }
 
 /// The deck and the options of a check.
-struct Request<'a> {
-    path: &'a Path,
-    deck: &'a Deck,
-    ranks: u32,
+pub struct Request<'a> {
+    pub path: &'a Path,
+    pub deck: &'a Deck,
+    pub ranks: u32,
     /// Measure the time per step and the separation energies.
     measure: bool,
+    /// Report as a line of JSON.
+    json: bool,
+}
+
+/// Steps and cost of a run that is too large for a dry run.
+pub struct TimeEstimate {
+    /// Stable step, s.
+    pub stable_step: f64,
+    /// For each stage: first step (s) and number of steps.
+    pub steps: Vec<(f64, f64)>,
+    pub cost: Cost,
 }
 
 /// The report on a deck; errors name places in it by spans.
-fn report(request: &Request) -> Result<Report> {
+fn report(request: &Request) -> Result<String> {
     let problem = request.deck.problem()?;
     let ranks = request.ranks as usize;
     is_feasible(&problem, &cutoffs(&problem), ranks)?;
@@ -82,10 +104,14 @@ fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
 }
 
 /// Report a dry run.
-fn simulate(problem: &Problem, request: &Request) -> Result<Report> {
+fn simulate(problem: &Problem, request: &Request) -> Result<String> {
     let run = dry_run(problem, request.ranks, request.measure)?;
     let (survey, dimension) = (&run.survey, problem.dimension.count());
     let interiors = interiors(problem);
+    if request.json {
+        let report = check_json::simulated(problem, request, &run, &interiors);
+        return Ok(format!("{report}\n"));
+    }
     let mut report = Report::default();
     section::heading(&mut report, problem, request.path);
     for (index, body) in problem.bodies.iter().enumerate() {
@@ -114,12 +140,33 @@ fn simulate(problem: &Problem, request: &Request) -> Result<Report> {
         section::run_time(&mut report, problem, &run.steps, seconds, request.ranks);
     }
     section::warnings(&mut report, request.deck, &survey.warnings);
-    Ok(report)
+    Ok(report.text)
 }
 
 /// Report estimates for a run that is too large for a dry run.
-fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<Report> {
+fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<String> {
     let interiors = interiors(problem);
+    let stable = interiors
+        .iter()
+        .flatten()
+        .map(|interior| interior.stable_step)
+        .fold(f64::INFINITY, f64::min);
+    // Without a lattice body, the stable step is unknown.
+    let time = if stable.is_finite() {
+        let steps = choose_steps(problem, stable)?;
+        let clock = even_clock(problem, &steps);
+        Some(TimeEstimate {
+            stable_step: stable,
+            cost: Cost::estimate(problem, size, &clock),
+            steps,
+        })
+    } else {
+        None
+    };
+    if request.json {
+        let report = check_json::estimated(problem, request, size, &interiors, time.as_ref());
+        return Ok(format!("{report}\n"));
+    }
     let mut report = Report::default();
     section::heading(&mut report, problem, request.path);
     for (index, body) in problem.bodies.iter().enumerate() {
@@ -130,21 +177,12 @@ fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<Report>
     report.heading("size, estimated: too large to build here");
     report.line("points", format_args!("{:.3e}", size.all_points()));
     report.line("bonds", format_args!("{:.3e}", 0.5 * size.directed_bonds()));
-    let stable = interiors
-        .iter()
-        .flatten()
-        .map(|interior| interior.stable_step)
-        .fold(f64::INFINITY, f64::min);
-    // Without a lattice body, the stable step is unknown.
-    if stable.is_finite() {
-        let steps = choose_steps(problem, stable)?;
-        let clock = even_clock(problem, &steps);
-        let cost = Cost::estimate(problem, size, &clock);
-        section::cost(&mut report, &cost, request.ranks, 0.0);
-        section::time(&mut report, problem, stable);
-        section::steps(&mut report, problem, &steps);
+    if let Some(time) = time {
+        section::cost(&mut report, &time.cost, request.ranks, 0.0);
+        section::time(&mut report, problem, time.stable_step);
+        section::steps(&mut report, problem, &time.steps);
     }
     report.heading("sets, cracks and probes are not checked");
     section::warnings(&mut report, request.deck, &problem.warnings);
-    Ok(report)
+    Ok(report.text)
 }

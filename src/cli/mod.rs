@@ -3,10 +3,12 @@
 mod bench;
 mod bench_report;
 mod check;
+mod check_json;
 mod check_report;
 mod compare;
 mod explain;
 mod format;
+mod generate;
 mod init;
 mod launch;
 mod machine_limits;
@@ -16,6 +18,7 @@ mod progress;
 mod report;
 mod run;
 mod summary;
+mod sweep;
 mod version;
 mod wall_time;
 
@@ -63,7 +66,9 @@ Examples:
   fissure plot out/plate --y kinetic_energy     a curve of the history
   fissure movie out/plate                       the damage over time
   fissure compare out/plate out/before          the differences between two results
+  fissure sweep plate.toml --set dx=2e-3,1e-3   the deck for several values
   fissure bench                                 how fast this machine is at it
+  fissure slurm hybrid > job.sbatch             a job script
 
 Exit codes: 0 done, 1 the run failed or the compared results differ, 2 the deck or the arguments are
 wrong, 75 the run was stopped by a signal or the wall-clock limit and can be continued with --restart.")]
@@ -87,9 +92,14 @@ enum Command {
     Plot(plot::PlotArguments),
     Movie(movie::MovieArguments),
     Compare(compare::CompareArguments),
+    Sweep(sweep::SweepArguments),
     Explain(DeckArguments),
     Init(init::InitArguments),
     Bench(BenchArguments),
+    Schema(generate::SchemaArguments),
+    Completions(generate::CompletionsArguments),
+    Man(generate::ManArguments),
+    Slurm(generate::SlurmArguments),
 }
 
 /// Run a deck, alone or under mpirun.
@@ -164,7 +174,8 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
 Examples:
   fissure check plate.toml
   fissure check plate.toml --ranks 256          memory estimated for 256 ranks
-  fissure check -q *.toml                       whether decks are right")]
+  fissure check -q *.toml                       whether decks are right
+  fissure check --json plate.toml | jq .points  figures for scripts")]
 struct CheckArguments {
     /// One or more decks; all are checked.
     #[arg(required = true, value_name = "DECK")]
@@ -177,6 +188,10 @@ struct CheckArguments {
     /// Estimate the memory for this many ranks.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
+
+    /// Print the figures in SI units as JSON, one line a deck; of a wrong deck its error.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Print a deck with every default filled in.
@@ -294,8 +309,13 @@ pub fn main() -> ExitCode {
         Command::Plot(arguments) => plot::plot(&arguments, verbosity),
         Command::Movie(arguments) => movie::movie(&arguments, verbosity),
         Command::Compare(arguments) => compare::run(&arguments, verbosity),
+        Command::Sweep(arguments) => sweep::sweep(&arguments, verbosity),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Init(arguments) => init::init(&arguments, verbosity),
+        Command::Schema(_) => generate::schema(),
+        Command::Completions(arguments) => generate::completions(&arguments),
+        Command::Man(arguments) => generate::man(&arguments, verbosity),
+        Command::Slurm(arguments) => generate::slurm(&arguments),
     };
     finish(outcome, true)
 }

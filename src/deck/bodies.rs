@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use indexmap::IndexMap;
-use serde_spanned::Spanned;
 
 use super::grammar::{self, Deck};
 use super::group_name::GroupName;
 use super::resolve::{Scope, resolve_each};
 use super::shapes;
 use super::validate;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::mesh::{Format, GroupKey};
 use crate::message::format_number;

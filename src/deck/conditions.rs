@@ -1,11 +1,10 @@
 //! Initial values, loads and supports of a deck, validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Deck};
 use super::number::Vector;
 use super::resolve::Scope;
 use super::sets::find_set;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{Expression, POSITION, POSITION_AND_TIME};
 use crate::problem::{self, Action};

@@ -1,10 +1,9 @@
 //! Contact, validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, ContactName, Deck};
 use super::number::Number;
 use super::resolve::{Scope, find};
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, ContactModel, ContactRule};
 

@@ -1,11 +1,10 @@
 //! Damage laws of decks.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Text};
 use super::number::Number;
 use super::resolve::Scope;
 use super::sets::find_sets;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, Calibration, DamageRule, Sense, Toughness, WorkMeasure, WorkRule};
 use crate::scatter::Weibull;

@@ -1,6 +1,5 @@
 //! Whether two decks describe the same physics: what a restart must not change.
 
-use serde_spanned::Spanned;
 use toml::{Table, Value};
 
 use super::Deck;
@@ -8,6 +7,7 @@ use super::grammar::{Restart, Section};
 use super::number::Written;
 use super::resolve::Scope;
 use super::source::Source;
+use crate::deck::spanned::Spanned;
 use crate::error::{Error, Result};
 use crate::expression::{Expression, POSITION_AND_TIME};
 

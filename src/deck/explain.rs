@@ -5,11 +5,11 @@ use super::grammar::{
     THERMAL_EXPANSION, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
+use crate::deck::spanned::Spanned;
 use crate::dimension::{Constraint, Dimension};
 use crate::error::{Error, Result};
 use crate::material::{Kind, declarations};
 use crate::problem::{self, CheckpointRule, HorizonRule, Interval, Problem};
-use serde_spanned::Spanned;
 
 /// The deck as TOML with every default written out.
 ///

@@ -1,7 +1,9 @@
 //! Names of groups of a mesh as written: a name, or a whole number.
 
+use std::borrow::Cow;
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -32,6 +34,20 @@ impl<'de> Deserialize<'de> for GroupName {
         }
 
         deserializer.deserialize_any(NameVisitor)
+    }
+}
+
+impl JsonSchema for GroupName {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "GroupName".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": ["integer", "string"] })
     }
 }
 

@@ -1,12 +1,11 @@
 //! What a deck writes to the history, and how often; validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Deck, Text};
 use super::names::suits_a_column;
 use super::number::{Number, Vector};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::find_set;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, Field, Interval};
 

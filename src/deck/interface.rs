@@ -1,9 +1,8 @@
 //! The bonds between the bodies of a deck, validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Deck, Rule};
 use super::resolve::{Scope, find};
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem;
 

@@ -2,14 +2,13 @@
 
 use std::ops::Range;
 
-use serde_spanned::Spanned;
-
 use super::grammar::{
     self, DAMPING, DENSITY, ELASTIC_CONSTANTS, LawTable, REFERENCE_TEMPERATURE, THERMAL_EXPANSION,
     common_keys,
 };
 use super::number::{Number, Written};
 use super::resolve::Scope;
+use crate::deck::spanned::Spanned;
 use crate::dimension::Dimension;
 use crate::elastic::{Constant, Isotropic};
 use crate::error::Result;

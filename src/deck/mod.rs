@@ -20,9 +20,11 @@ mod parameters;
 mod refinement;
 mod resolve;
 mod rigid;
+mod schema;
 mod sets;
 mod shapes;
 pub mod source;
+pub mod spanned;
 mod time;
 mod toml_error;
 mod validate;
@@ -30,6 +32,7 @@ mod validate;
 use std::path::Path;
 
 pub use difference::{differences, history_differences};
+pub use schema::schema;
 pub use source::Source;
 
 use crate::error::{Error, Result, Warning};

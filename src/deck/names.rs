@@ -1,9 +1,8 @@
 //! The names that a deck gives to its tables: they become those of columns, and stand in messages.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{Deck, NamedTable};
 use super::resolve::Scope;
+use crate::deck::spanned::Spanned;
 use crate::error::{Result, excerpt};
 
 /// The most characters of a name.

@@ -1,10 +1,13 @@
 //! Numbers of a deck as written: an integer, a float, or an expression in a string.
 
+use std::borrow::Cow;
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_spanned::Spanned;
+
+use crate::deck::spanned::Spanned;
 
 /// What was written for a number.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +103,38 @@ impl<'de> Deserialize<'de> for Edges {
         }
 
         deserializer.deserialize_any(EdgesVisitor)
+    }
+}
+
+impl JsonSchema for Written {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Number".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": ["number", "string"] })
+    }
+}
+
+impl JsonSchema for Edges {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Edges".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let number = ["number", "string"];
+        json_schema!({
+            "type": ["number", "string", "array"],
+            "items": { "type": number },
+        })
     }
 }
 

@@ -1,10 +1,9 @@
 //! What a deck writes to the result, and how often; validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Balance, Deck};
 use super::resolve::{Scope, find};
 use super::sets::find_set;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem;
 

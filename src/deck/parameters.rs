@@ -1,12 +1,12 @@
 //! The named numbers of a deck, which may build on one another in any order.
 
 use indexmap::IndexMap;
-use serde_spanned::Spanned;
 
 use super::grammar::Text;
 use super::number::{Number, Written};
 use super::resolve::Scope;
 use super::source::Source;
+use crate::deck::spanned::Spanned;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::message::suggestion;

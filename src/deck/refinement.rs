@@ -1,10 +1,9 @@
 //! Refinement of a deck, validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Deck, HorizonRule, LevelBonds};
 use super::number::Number;
 use super::resolve::Scope;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{POSITION, POSITION_AND_TIME};
 use crate::message::format_number;

@@ -5,12 +5,12 @@ use std::ops::{Range, RangeInclusive};
 
 use indexmap::{IndexMap, IndexSet};
 use nalgebra::Vector3;
-use serde_spanned::Spanned;
 
 use super::grammar::{Deck, DimensionName, Tables, Text};
 use super::number::{Number, Vector, Written};
 use super::parameters;
 use super::source::Source;
+use crate::deck::spanned::Spanned;
 use crate::error::{Error, Result};
 use crate::expression::{Expression, POSITION_AND_TIME, Variable};
 use crate::message::format_number;

@@ -1,12 +1,11 @@
 //! Rigid bodies, validated.
 
-use serde_spanned::Spanned;
-
 use super::contact::{self, Keys};
 use super::grammar::{self, ContactName, Deck};
 use super::number::Vector;
 use super::resolve::Scope;
 use super::shapes;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{Expression, Variable};
 use crate::problem::{self, RigidMotion, RigidShape, Shape};

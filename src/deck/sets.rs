@@ -1,10 +1,9 @@
 //! Sets of a deck, validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Deck, Text};
 use super::resolve::Scope;
 use super::shapes;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::POSITION;
 use crate::problem;

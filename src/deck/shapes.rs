@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use nalgebra::Vector3;
-use serde_spanned::Spanned;
 
 use super::grammar;
 use super::number::{Number, Vector};
 use super::resolve::Scope;
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::message::format_number;
 use crate::points::Polygon;

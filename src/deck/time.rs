@@ -1,10 +1,9 @@
 //! The time axis of a deck and the stages of its run, validated.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{self, Deck, Text};
 use super::number::Number;
 use super::resolve::{Scope, find};
+use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{self, Method, StepRule};

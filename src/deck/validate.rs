@@ -1,7 +1,5 @@
 //! From the grammar to the problem: every value checked, every name resolved.
 
-use serde_spanned::Spanned;
-
 use super::grammar::{
     ConstraintName, Deck, DimensionName, Family, Grid, Quadrature, VolumeCorrection,
 };
@@ -11,6 +9,7 @@ use super::{
     bodies, conditions, contact, damage, history, interface, materials, names, outputs, refinement,
     rigid, sets, shapes, time,
 };
+use crate::deck::spanned::Spanned;
 use crate::dimension::{Constraint, Dimension};
 use crate::error::Result;
 use crate::message::format_number;

@@ -36,8 +36,8 @@ pub struct Declaration {
     /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break by
     /// their stretch.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
-    /// Whether bonds break at thresholds that the law scales by point, so that these cannot scatter as well.
-    pub scales_thresholds: bool,
+    /// Whether the law scales the critical stretch of each bond itself, with these values of its keys.
+    pub scales_thresholds: fn(&Values) -> bool,
     /// Makes the law.
     pub build: fn(&Given) -> Built,
     /// What the tests try it with: keys beside density and Young's modulus.
@@ -60,7 +60,7 @@ impl Declaration {
             elastic: None,
             breaks_by_energy: false,
             critical_stretch: None,
-            scales_thresholds: false,
+            scales_thresholds: |_| false,
             build,
             examples: &[""],
         }

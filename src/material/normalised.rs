@@ -46,7 +46,7 @@ impl Declared for Normalised {
         keys: &[FORM],
         breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
-        scales_thresholds: true,
+        scales_thresholds: |_| true,
         examples: &["", "form = 'diehl2016'"],
         ..Declaration::new(
             "normalised_pmb",

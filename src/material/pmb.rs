@@ -80,6 +80,7 @@ impl Declared for Pmb {
             keys: &[SURFACE_CORRECTION],
             breaks_by_energy: true,
             critical_stretch: Some(bond_based_critical_stretch),
+            scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",
             examples: &[
                 "",
                 "surface_correction = 'energy'",

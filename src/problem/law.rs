@@ -110,7 +110,7 @@ impl Law {
                 (|law| law.breaks_by_energy, "by their energy")
             }
         };
-        if damage.weibull.is_some() && self.declaration.scales_thresholds {
+        if damage.weibull.is_some() && (self.declaration.scales_thresholds)(&self.values) {
             return Some(format!(
                 "`weibull_modulus` is not available for `{}`, which scales the critical stretch of each bond itself",
                 self.declaration.name

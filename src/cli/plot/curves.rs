@@ -176,7 +176,10 @@ impl Table {
 }
 
 /// Read a CSV file whose first row has names like `time [s]`.
-fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
+///
+/// # Errors
+/// If it cannot be read, or a row has other than one number a column.
+pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| Error::input(format!("cannot read {}: {error}", path.display())))?;
     let mut rows = text.lines().enumerate();

@@ -1,6 +1,6 @@
 //! `fissure plot`: a picture of a field, or curves of the history.
 
-mod curves;
+pub mod curves;
 mod paths;
 pub mod picture;
 mod quantity;

@@ -1,14 +1,15 @@
 //! Bodies, and what is told of their points by place: sets and cracks.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::Text;
 use crate::deck::group_name::GroupName;
 use crate::deck::number::{Edges, Number, Vector};
+use crate::deck::spanned::Spanned;
 
 /// A body: a shape filled with lattice points, or a file of points.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Name of the material.
@@ -32,7 +33,7 @@ pub struct Body {
 
 /// Points from a file with rows `x y [z] volume block`, separated by commas or spaces, or from the elements of a
 /// mesh; exactly one of `file` and `mesh`.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {
     /// Path of the file, relative to the deck.
@@ -50,7 +51,7 @@ pub struct Points {
 }
 
 /// A region of space.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
     /// A box (interval, rectangle) between two corners, in m.
@@ -104,7 +105,7 @@ pub enum Shape {
 }
 
 /// A set of points; exactly one of the keys.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Set {
     /// A condition on the reference position, such as `"x < 2*dx && y > 0"`.
@@ -122,7 +123,7 @@ pub struct Set {
 }
 
 /// A surface that cuts bonds.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Crack {
     /// A straight cut (plane problems).

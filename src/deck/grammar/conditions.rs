@@ -1,12 +1,13 @@
 //! Initial values, loads and supports.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Text;
 use crate::deck::number::{Number, Vector};
 
 /// Initial values of a set; expressions of x, y, z, one a component.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
     /// The set; all points if not given.
@@ -22,7 +23,7 @@ pub struct Initial {
 
 /// A load, support or temperature of a set; exactly one of the quantities. Values are expressions of x, y, z, t,
 /// one a component; the string `"free"` leaves a component of a motion free.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
     /// The set that it acts on.

@@ -1,14 +1,15 @@
 //! Contact between points that no bond joins.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::{Tables, Text};
 use crate::deck::number::Number;
+use crate::deck::spanned::Spanned;
 
 /// Contact between points that no bond joins: of different bodies, and of one body, such as the faces of a crack. Bodies do
 /// not bond to one another then, unless `[interface]` says so.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
     /// `"penalty"` (if not given): as a layer of material between the points, as thick as the horizon. `"short-range"`: short-range forces, as Silling
@@ -38,7 +39,7 @@ pub struct Contact {
 }
 
 /// Contact between two bodies, or of a body with itself.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactPair {
     /// Names of the two bodies, in any order; the same one twice for a body with itself.
@@ -64,7 +65,7 @@ pub struct ContactPair {
 }
 
 /// A model of contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ContactName {
     /// No contact.

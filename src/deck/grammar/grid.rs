@@ -1,13 +1,14 @@
 //! The grid, and the bonds between bodies.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::{Tables, Text};
 use crate::deck::number::{Edges, Number, Vector};
+use crate::deck::spanned::Spanned;
 
 /// The lattice and the range of the bonds.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Edge of a lattice cell in m, or a list with one a dimension; for bodies given as shapes.
@@ -45,7 +46,7 @@ fn automatic() -> Spanned<Family> {
 }
 
 /// How bonds are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
     /// As lattices where bodies have them, else in lists.
@@ -57,7 +58,7 @@ pub enum Family {
 }
 
 /// How volumes near the edge of a family are corrected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VolumeCorrection {
     /// Points within the horizon count whole.
@@ -71,7 +72,7 @@ pub enum VolumeCorrection {
 }
 
 /// The points of a lattice cell.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Quadrature {
     /// One at the centre.
@@ -82,7 +83,7 @@ pub enum Quadrature {
 }
 
 /// The bonds between blocks.
-#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interface {
     /// What constants they have: `"own"`, `"average"` or `"minimum"`. With `"own"` each end exerts its
@@ -96,7 +97,7 @@ pub struct Interface {
 }
 
 /// The bonds between two bodies.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pair {
     /// Names of the two bodies, in any order.
@@ -106,7 +107,7 @@ pub struct Pair {
 }
 
 /// What constants bonds between blocks have, if there are any.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
     /// No bonds.

@@ -1,15 +1,19 @@
 //! Materials and damage laws.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use indexmap::IndexMap;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{EnumAccess, VariantAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_spanned::Spanned;
+use serde_json::{Value, json};
 
 use super::Text;
 use crate::deck::number::{Number, default_number};
+use crate::deck::spanned::Spanned;
 use crate::elastic::Constant;
+use crate::material::{Declaration, Kind, declarations};
 
 /// A material: its law, and the table of the law.
 #[derive(Debug, Clone)]
@@ -75,6 +79,77 @@ impl<'de> Deserialize<'de> for Material {
     }
 }
 
+/// One of the laws, with the keys that it declares.
+impl JsonSchema for Material {
+    fn schema_name() -> Cow<'static, str> {
+        "Material".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let laws = declarations().map(|law| (law.name.to_owned(), law_schema(law)));
+        let laws: serde_json::Map<String, Value> = laws.collect();
+        let one = json!({
+            "type": "object",
+            "description": "A material, by its law.",
+            "properties": laws,
+            "additionalProperties": false,
+            "minProperties": 1,
+            "maxProperties": 1,
+        });
+        one.try_into().unwrap_or_default()
+    }
+}
+
+/// What a key of every law's table is, for editors.
+fn meaning(key: &str) -> &'static str {
+    match key {
+        DENSITY => "Density in kg/m³.",
+        DAMPING => "Viscous damping in 1/s.",
+        THERMAL_EXPANSION => "Coefficient of thermal expansion in 1/K.",
+        REFERENCE_TEMPERATURE => "Temperature without thermal strain.",
+        "poisson_ratio" => "Poisson's ratio.",
+        _ => "Elastic constant in Pa.",
+    }
+}
+
+/// The schema of a law's table.
+fn law_schema(law: &Declaration) -> Value {
+    let number = json!(["number", "string"]);
+    let mut properties = serde_json::Map::new();
+    for name in common_keys() {
+        let schema = json!({ "type": number, "description": meaning(name) });
+        properties.insert(name.to_owned(), schema);
+    }
+    let mut required = vec![DENSITY];
+    for key in law.keys {
+        let mut schema = match &key.kind {
+            Kind::Number { default, .. } => {
+                if default.is_none() {
+                    required.push(key.name);
+                }
+                json!({ "type": number, "default": default })
+            }
+            Kind::Optional { .. } | Kind::OfLength => json!({ "type": number }),
+            Kind::Word(words) => {
+                let words: Vec<&str> = words.iter().map(|word| word.word).collect();
+                json!({ "enum": words, "default": words.first() })
+            }
+        };
+        if let Some(entries) = schema.as_object_mut() {
+            entries.retain(|_, value| !value.is_null());
+            entries.insert("description".to_owned(), key.meaning.into());
+        }
+        properties.insert(key.name.to_owned(), schema);
+    }
+    json!({
+        "type": "object",
+        "description": law.force,
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false,
+    })
+}
+
 impl Serialize for Material {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map([(&self.law, &self.table)])
@@ -82,7 +157,7 @@ impl Serialize for Material {
 }
 
 /// A damage law.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Damage {
     /// A bond breaks for good at a critical stretch.
@@ -92,7 +167,7 @@ pub enum Damage {
 }
 
 /// Critical stretch, from one of three measures of toughness.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CriticalStretch {
     /// Fracture energy G0 in J/m².
@@ -119,7 +194,7 @@ pub struct CriticalStretch {
 }
 
 /// The work of bonds, from one of two measures of toughness.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BondEnergy {
     /// Fracture energy G0 in J/m².
@@ -157,7 +232,7 @@ pub struct BondEnergy {
 }
 
 /// How the critical work of bonds follows from the fracture energy.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Calibration {
     /// From the energy of all bonds across an area.

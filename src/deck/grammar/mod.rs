@@ -17,10 +17,11 @@ mod sections;
 mod time;
 
 use indexmap::IndexMap;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use crate::deck::number::Number;
+use crate::deck::spanned::Spanned;
 pub use bodies::*;
 pub use conditions::*;
 pub use contact::*;
@@ -40,11 +41,11 @@ pub type Text = Spanned<String>;
 pub type Tables<T> = IndexMap<String, Spanned<T>>;
 
 /// A whole deck.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deck {
     /// One line for summaries and pictures.
-    #[serde(default = "nowhere")]
+    #[serde(default)]
     pub title: Text,
     /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
     pub dimension: Spanned<DimensionName>,
@@ -99,25 +100,21 @@ pub struct Deck {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stage: Vec<Spanned<Stage>>,
     /// What is written to the result, and how often.
-    #[serde(default = "nowhere")]
+    #[serde(default)]
     pub output: Spanned<Output>,
     /// What is written to the history, and how often.
-    #[serde(default = "nowhere")]
+    #[serde(default)]
     pub history: Spanned<History>,
     /// How often the run can be continued from.
-    #[serde(default = "nowhere")]
+    #[serde(default)]
     pub checkpoint: Spanned<Checkpoint>,
     /// When points are dealt out anew to the ranks; never if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balance: Option<Spanned<Balance>>,
 }
 
-fn nowhere<T: Default>() -> Spanned<T> {
-    Spanned::new(0..0, T::default())
-}
-
 /// The setting of the problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum DimensionName {
     /// A bar.
     #[serde(rename = "1d")]
@@ -134,7 +131,7 @@ pub enum DimensionName {
 }
 
 /// Condition across a bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 pub enum ConstraintName {
     /// No stress across the bar.
     #[serde(rename = "uniaxial-stress")]

@@ -1,13 +1,14 @@
 //! What is written: the result, the history, checkpoints.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::{Count, Tables, Text};
 use crate::deck::number::{Number, Vector, default_number};
+use crate::deck::spanned::Spanned;
 
 /// The result file.
-#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// Simulated time between outputs in s; a fiftieth of the run if neither is given.
@@ -28,7 +29,7 @@ pub struct Output {
 }
 
 /// How long the numbers of a result are.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
     /// 8 bytes: every bit.
@@ -39,7 +40,7 @@ pub enum Precision {
 }
 
 /// The history: sums and probes over time.
-#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct History {
     /// Simulated time between rows in s. If neither is given, a five-hundredth of the run, and 20 steps where
@@ -76,7 +77,7 @@ pub struct History {
 }
 
 /// Checkpoints; at most one of the keys.
-#[derive(Debug, Clone, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
     /// Wall-clock time between checkpoints, such as `"10 min"`, `"90 s"` or `"2 h"`; 10 minutes if
@@ -93,7 +94,7 @@ pub struct Checkpoint {
 
 /// Points are dealt out anew to the ranks when these have become unequal: their times in the loops over
 /// bonds are compared now and then. Results do not depend on it.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Balance {
     /// Steps between looks at the times; 500 if not given.
@@ -114,7 +115,7 @@ fn default_imbalance() -> Number {
 }
 
 /// The force of the supports on a set along a direction.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SupportForce {
     /// The set.
@@ -125,7 +126,7 @@ pub struct SupportForce {
 
 /// A crack: the lines through the middle of the damage that hangs together from a place on, each
 /// branch by itself.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
     /// Where the crack starts, m; damage within one horizon of it belongs to the crack.
@@ -139,7 +140,7 @@ pub struct CrackPath {
 }
 
 /// A place to watch.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
     /// The place in m; the nearest point is followed.
@@ -149,7 +150,7 @@ pub struct Probe {
 /// A front: how far a field has come along a line. Of the points near the line, the farthest one above
 /// the threshold; from there to the next point ahead, linear interpolation to where the threshold is
 /// crossed.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {
     /// Where the line starts, m.
@@ -174,7 +175,7 @@ pub struct Front {
 
 /// A crack tip: the farthest point of a set, in one direction, with more damage than a threshold; from
 /// there on as for a [`Front`].
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {
     /// Where the length of the crack is counted from, m.

@@ -1,14 +1,15 @@
 //! Finer grids in parts of the bodies.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::{Count, Tables};
 use crate::deck::number::Number;
+use crate::deck::spanned::Spanned;
 
 /// Refinement: points of bodies given as shapes get new ones around them at half the spacing, level by
 /// level; neighbours differ by one level at most.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
     /// The finest level: the spacing there is that of the grid divided by 2^levels.
@@ -37,7 +38,7 @@ pub struct Refinement {
 
 /// Points that make all within their horizon be refined, one level at a time; at least one of `energy`,
 /// `damage` and `where`, any of which is enough.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trigger {
     /// Steps between looks; 20 if not given.
@@ -66,7 +67,7 @@ fn default_look() -> Spanned<Count> {
 }
 
 /// How the horizon goes with the spacing from level to level.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HorizonRule {
     /// δ/dx stays.
@@ -77,7 +78,7 @@ pub enum HorizonRule {
 }
 
 /// Which horizons the bonds between levels have.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelBonds {
     /// Each end its own.
@@ -88,7 +89,7 @@ pub enum LevelBonds {
 }
 
 /// Points that are refined from the start.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RefinedRegion {
     /// A condition on the reference position.

@@ -1,14 +1,15 @@
 //! Rigid bodies that points can touch.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::Shape;
 use crate::deck::number::{Number, Vector};
+use crate::deck::spanned::Spanned;
 
 /// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Points touch it where half the edge of their cell
 /// reaches its surface, or as near as they began.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
     /// `box`, `sphere`, `cylinder`, or `disc` in the plane; or a `half_space`.
@@ -48,7 +49,7 @@ pub struct Rigid {
 }
 
 /// All that lies behind a plane, in the plane behind a line.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {
     /// A point of its surface, m.

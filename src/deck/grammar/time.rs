@@ -1,13 +1,14 @@
 //! The time axis, stages, and how points come to move.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_spanned::Spanned;
 
 use super::{Count, Text};
 use crate::deck::number::{Number, default_number};
+use crate::deck::spanned::Spanned;
 
 /// The time axis.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
     /// End time in s.
@@ -43,7 +44,7 @@ fn default_safety() -> Number {
 }
 
 /// A stage of the run. What it does not say is as in `[time]`.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
     /// When it ends, s; the last stage ends with the run.
@@ -80,7 +81,7 @@ fn explicit() -> Spanned<Method> {
 }
 
 /// How the points come to move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Velocity Verlet.
@@ -90,7 +91,7 @@ pub enum Method {
 }
 
 /// A step that follows the number of bonds that break in it.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
     /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
@@ -137,7 +138,7 @@ fn default_raise() -> Number {
 }
 
 /// How equilibria are found.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Relaxation {
     /// Number of load steps.

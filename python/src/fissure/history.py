@@ -1,0 +1,49 @@
+"""Tables of a history."""
+
+import csv
+import os
+import pathlib
+
+import numpy
+
+try:
+    import pandas
+except ImportError:
+    pandas = None
+
+
+class History(dict):
+    """Columns of a history by name, as arrays. Used where pandas is not installed."""
+
+
+def read_history(path):
+    """Read a history.csv, or the one in a folder: a pandas.DataFrame, or without pandas a History.
+
+    An incomplete last row, as a killed run leaves it, is skipped. Units are in `table.attrs["units"]` of a DataFrame and
+    in `table.units` of a History.
+    """
+    path = pathlib.Path(path)
+    if path.is_dir():
+        path = path / "history.csv"
+    with path.open(newline="") as file:
+        text = file.read()
+    lines = text[: text.rfind("\n") + 1].splitlines()
+    if not lines:
+        raise ValueError(f"{os.fspath(path)}: there is no header")
+    header, *rows = csv.reader(lines)
+    names = [cell.split("[")[0].strip() for cell in header]
+    units = [cell.partition("[")[2].rstrip("] ") for cell in header]
+    values = numpy.array(rows, dtype=float).reshape(len(rows), len(names))
+    return table_of(names, units, values)
+
+
+def table_of(names, units, values):
+    """Make a table of the columns of a matrix."""
+    by_name = dict(zip(names, units))
+    if pandas is not None:
+        table = pandas.DataFrame(values, columns=names)
+        table.attrs["units"] = by_name
+        return table
+    table = History(zip(names, values.T))
+    table.units = by_name
+    return table

@@ -1,0 +1,160 @@
+//! Files for other programs: the schema of decks, completions of shells, man pages, job scripts.
+
+use std::path::PathBuf;
+
+use clap::{Args, CommandFactory, ValueEnum};
+use clap_complete::Shell;
+use fissure::deck;
+use fissure::error::Result;
+
+use super::{CommandLine, Verbosity, file_error, outln, print};
+
+/// Print the JSON Schema of decks, with which editors complete keys and mark mistakes.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  fissure schema > fissure.schema.json
+
+A first line `#:schema ./fissure.schema.json` in a deck makes editors with taplo (VS Code: Even Better
+TOML) use it.")]
+pub struct SchemaArguments {}
+
+/// Print the completions of a shell.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure completions bash > ~/.local/share/bash-completion/completions/fissure
+  fissure completions zsh > ~/.zfunc/_fissure
+  fissure completions fish > ~/.config/fish/completions/fissure.fish")]
+pub struct CompletionsArguments {
+    /// The shell.
+    shell: Shell,
+}
+
+/// Write man pages, one for each command, into a folder.
+#[derive(Args)]
+#[command(after_help = "\
+Example:
+  fissure man ~/.local/share/man/man1 && man fissure-run")]
+pub struct ManArguments {
+    /// The folder; it is created if it is missing.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+/// Print a job script for Slurm.
+///
+/// Edit the lines between the marks `edit`: partition, account, modules.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure slurm hybrid > job.sbatch && sbatch --nodes=4 job.sbatch plate.toml
+  fissure slurm chain > chain.sbatch && sbatch chain.sbatch plate.toml /scratch/plate
+  fissure slurm array > array.sbatch && sbatch --array=1-12 array.sbatch plate.toml loads.txt /scratch/loads")]
+pub struct SlurmArguments {
+    /// Which script.
+    script: Script,
+}
+
+/// A job script.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Script {
+    /// One run on nodes × ranks × cores per rank.
+    Hybrid,
+    /// A run longer than the time limit: requeues itself and continues.
+    Chain,
+    /// A deck over a table of parameters, one row a task.
+    Array,
+}
+
+/// Print the JSON Schema of decks.
+///
+/// # Errors
+/// If the output cannot be written.
+pub fn schema() -> Result<()> {
+    print(&format!("{:#}\n", deck::schema()))
+}
+
+/// Print the completions of a shell.
+///
+/// # Errors
+/// If the output cannot be written.
+pub fn completions(arguments: &CompletionsArguments) -> Result<()> {
+    let mut text = Vec::new();
+    clap_complete::generate(
+        arguments.shell,
+        &mut CommandLine::command(),
+        "fissure",
+        &mut text,
+    );
+    print(&String::from_utf8_lossy(&text))
+}
+
+/// Write the man pages.
+///
+/// # Errors
+/// If the folder or a page cannot be written.
+pub fn man(arguments: &ManArguments, verbosity: Verbosity) -> Result<()> {
+    let folder = &arguments.folder;
+    let written = std::fs::create_dir_all(folder)
+        .and_then(|()| clap_mangen::generate_to(CommandLine::command(), folder));
+    written.map_err(|error| file_error(folder, "write the man pages to", &error))?;
+    if verbosity > Verbosity::Quiet {
+        outln!(
+            "wrote fissure.1 and a page of each command to {}",
+            folder.display()
+        );
+    }
+    Ok(())
+}
+
+/// Print a job script.
+///
+/// # Errors
+/// If the output cannot be written.
+pub fn slurm(arguments: &SlurmArguments) -> Result<()> {
+    print(&arguments.script.text())
+}
+
+impl Script {
+    /// The script of slurm/, such that it needs no other file of the repository.
+    fn text(self) -> String {
+        let (name, script) = match self {
+            Self::Hybrid => ("hybrid", include_str!("../../slurm/hybrid.sbatch")),
+            Self::Chain => ("chain", include_str!("../../slurm/chain.sbatch")),
+            Self::Array => ("array", include_str!("../../slurm/array.sbatch")),
+        };
+        let launch = include_str!("../../slurm/launch");
+        script
+            .replace("# Submit from the repository's folder.\n", "")
+            .replace("FISSURE:-$PWD/target/release/fissure", "FISSURE:-fissure")
+            .replace("slurm/launch explains them", "explained below")
+            .replace("# shellcheck source=slurm/launch\n. slurm/launch\n", launch)
+            .replace(
+                "# shellcheck shell=bash\n# Sourced by the job scripts: what",
+                "# What",
+            )
+            .replace(&format!("slurm/{name}.sbatch"), &format!("{name}.sbatch"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn job_scripts_need_no_other_file() {
+        for script in Script::value_variants() {
+            let text = script.text();
+            for words in ["slurm/", "target/", "repository", "Sourced"] {
+                assert!(!text.contains(words), "{script:?}: {words}");
+            }
+            assert!(text.starts_with("#!/usr/bin/env bash\n#"), "{script:?}");
+            assert!(
+                text.contains("\nwords=$(launch \"$SLURM_NTASKS\" \"$cores\")\n"),
+                "{script:?}"
+            );
+            assert!(text.contains("FISSURE=${FISSURE:-fissure}\n"), "{script:?}");
+        }
+    }
+}

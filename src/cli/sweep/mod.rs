@@ -1,0 +1,205 @@
+//! `fissure sweep`: a deck for several values of its parameters and keys.
+
+mod convergence;
+mod design;
+mod runs;
+mod table;
+mod value;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use fissure::deck;
+use fissure::error::{Error, Result};
+
+use super::{Verbosity, errln, outln};
+use design::{Axis, Design};
+use runs::{Program, Run, State};
+use table::Table;
+use value::{Column, Reference};
+
+/// Run a deck for several values of its parameters and keys.
+///
+/// Each combination of the values is a run of its own, in a process of its own. Runs that are complete are
+/// not repeated; interrupted ones continue from their checkpoints. Writes a table of chosen values of the
+/// histories, sweep.csv, and a picture of each value over a parameter into the output folder.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure sweep plate.toml --set tension=18e6,20e6,22e6 --value max:fracture_energy
+  fissure sweep plate.toml --set dx=2e-3,1e-3,0.5e-3 --value last:strain_energy --reference 1.25e-3
+  fissure sweep plate.toml --set dx=2e-3,1e-3 --set m=3,4 --jobs 4 --threads 1      four runs
+  fissure sweep plate.toml --set dx=2e-3,1e-3 --set m=3,6 --zip                     two runs
+  fissure sweep plate.toml --set dx=2e-3,1e-3 --launcher 'mpirun -n 4 --bind-to none'
+  fissure sweep plate.toml --set dx=2e-3,1e-3 --rows $SLURM_ARRAY_TASK_ID           in a job array
+
+A value with commas, such as [1, 2] or max(a, b), is one value.
+
+With a reference, the error of a value f is (f - reference)/|reference|, and its rate p over a parameter h
+that of |f - reference| ~ h^p from two successive runs. Without one, the rate is that of f - f0 ~ h^p from
+three runs, with any f0.
+
+Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 stopped by a signal; the same
+command continues.")]
+pub struct SweepArguments {
+    /// The deck.
+    deck: PathBuf,
+
+    /// Values of a parameter or of a key, named with its section; may be repeated.
+    #[arg(long, required = true, value_name = "NAME=VALUE,…", value_parser = design::axis)]
+    set: Vec<Axis>,
+
+    /// Take the first values together, then the second ones and so on, instead of all combinations.
+    #[arg(long)]
+    zip: bool,
+
+    /// Folder of the runs and the table [default: out/ and the deck's name with _sweep].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    /// A column of the history and what is taken of it: last (if not given), first, max or min; may be
+    /// repeated.
+    #[arg(long, value_name = "[PICK:]COLUMN", value_parser = value::column)]
+    value: Vec<Column>,
+
+    /// What a value should be; named as in --value if there are several values.
+    #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
+    reference: Vec<Reference>,
+
+    /// The parameter of rates and of the pictures' horizontal axis [default: the first one with several
+    /// values, all numbers].
+    #[arg(long, value_name = "NAME")]
+    x: Option<String>,
+
+    /// Runs at a time.
+    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: u16,
+
+    /// Threads of each rank [default: the cores of the rank].
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+
+    /// Words that start the ranks of each run, such as 'mpirun -n 4'.
+    #[arg(long, value_name = "WORDS")]
+    launcher: Option<String>,
+
+    /// Run only these combinations, counted from 1, such as 1-4,7.
+    #[arg(long, value_name = "LIST")]
+    rows: Option<String>,
+
+    /// Replace complete runs and those of another deck.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl SweepArguments {
+    /// The output folder.
+    fn folder(&self) -> PathBuf {
+        let default = || {
+            let stem = self.deck.file_stem().unwrap_or_default();
+            let mut name = stem.to_os_string();
+            name.push("_sweep");
+            Path::new("out").join(name)
+        };
+        self.output.clone().unwrap_or_else(default)
+    }
+}
+
+/// The runs of all combinations; their decks are valid.
+///
+/// # Errors
+/// If the deck is invalid with the values of a combination, which the message names.
+fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
+    let run = |(row, name): (&Vec<usize>, String)| {
+        let (label, set) = (design.label(row), design.assignments(row));
+        let deck = deck::read(&arguments.deck, &set).and_then(|deck| deck.explain());
+        let deck = deck.map_err(|error| Error {
+            message: format!("{label}: {}", error.message),
+            ..error
+        })?;
+        let folder = folder.join(name);
+        Ok(Run {
+            label,
+            folder,
+            set,
+            deck,
+        })
+    };
+    design.rows.iter().zip(design.folders()).map(run).collect()
+}
+
+/// Run the combinations that are missing, and write the table and pictures of all.
+///
+/// # Errors
+/// If the deck or an argument is wrong, a run fails, or a file cannot be written.
+pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
+    let design = Design::new(&arguments.set, arguments.zip)?;
+    let chosen = match &arguments.rows {
+        Some(list) => design::rows(list, design.rows.len())?,
+        None => (0..design.rows.len()).collect(),
+    };
+    let references = value::references(&arguments.value, &arguments.reference)?;
+    let abscissa = design.abscissa(arguments.x.as_deref())?;
+    let folder = arguments.folder();
+    let runs = planned_runs(arguments, &design, &folder)?;
+    let program = Program::new(arguments)?;
+    let mut table = Table::new(&design, &arguments.value, &references, abscissa);
+    let mut due = Vec::new();
+    for (number, run) in runs.iter().enumerate() {
+        let is_chosen = chosen.contains(&number);
+        if is_chosen {
+            run.check(arguments.overwrite)?;
+        }
+        if run.is_complete() && !(is_chosen && arguments.overwrite) {
+            table.read(number, &run.folder)?;
+        } else if is_chosen {
+            due.push(number);
+        }
+    }
+    let prints = verbosity > Verbosity::Quiet;
+    if prints && due.len() < runs.len() {
+        let complete = table.complete();
+        outln!(
+            "{complete} of {} runs are complete, {} to do",
+            runs.len(),
+            due.len()
+        );
+    }
+    let (mut failed, mut ended) = (Vec::new(), 0);
+    let stopped = program.run_all(&runs, &due, |number, state, seconds| {
+        let run = &runs[number];
+        ended += 1;
+        match state {
+            State::Complete => {
+                if prints {
+                    let time = super::format::duration(seconds);
+                    outln!(
+                        "{}: complete after {time}, {ended} of {}",
+                        run.label,
+                        due.len()
+                    );
+                }
+                table.read(number, &run.folder)?;
+            }
+            State::Failed(how) => {
+                errln!("{}: {how}: {}", run.label, run.last_words());
+                failed.push(run);
+            }
+        }
+        Ok(())
+    })?;
+    table.write(&folder, prints)?;
+    if stopped {
+        let message = "the sweep was stopped by a signal; the same command continues it";
+        return Err(Error::stopped(message));
+    }
+    match &failed[..] {
+        [] => Ok(()),
+        [first, ..] => Err(Error::run(format!(
+            "{} of {} runs failed; what they printed is in log.txt of their folders, such as {}",
+            failed.len(),
+            due.len(),
+            first.folder.join(runs::LOG).display()
+        ))),
+    }
+}

@@ -1,0 +1,290 @@
+//! The table of a sweep, and its pictures.
+
+use std::path::Path;
+
+use fissure::error::Result;
+use fissure::picture::chart::{Chart, Label, Series};
+
+use super::convergence::rates;
+use super::design::Design;
+use super::value::{self, Column};
+use crate::cli::{file_error, outln};
+
+/// Width of the pictures in pixels.
+const WIDTH: u32 = 900;
+
+/// Values by run, with what follows from them.
+pub struct Table<'a> {
+    design: &'a Design,
+    columns: &'a [Column],
+    references: &'a [Option<f64>],
+    abscissa: Option<usize>,
+    /// Values by run and column; `None` for runs that are not complete.
+    values: Vec<Option<Vec<Option<f64>>>>,
+    units: Vec<String>,
+}
+
+/// A column of the printed and of the written table.
+struct Cells {
+    /// Printed and written heading.
+    heading: [String; 2],
+    unit: String,
+    /// Printed and written text of each run.
+    texts: Vec<[String; 2]>,
+}
+
+impl<'a> Table<'a> {
+    /// A table without values.
+    pub fn new(
+        design: &'a Design,
+        columns: &'a [Column],
+        references: &'a [Option<f64>],
+        abscissa: Option<usize>,
+    ) -> Self {
+        Self {
+            design,
+            columns,
+            references,
+            abscissa,
+            values: vec![None; design.rows.len()],
+            units: vec![String::new(); columns.len()],
+        }
+    }
+
+    /// Read the values of a complete run.
+    ///
+    /// # Errors
+    /// If its history cannot be read or lacks a column.
+    pub fn read(&mut self, number: usize, folder: &Path) -> Result<()> {
+        let found = value::read(folder, self.columns)?;
+        let (values, units): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        self.values[number] = Some(values);
+        self.units = units;
+        Ok(())
+    }
+
+    /// Number of complete runs.
+    pub fn complete(&self) -> usize {
+        self.values.iter().flatten().count()
+    }
+
+    /// Write sweep.csv and the pictures, and print the table.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, folder: &Path, prints: bool) -> Result<()> {
+        std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
+        let cells = self.cells();
+        if prints {
+            outln!("{}", printed(&cells));
+        }
+        // Tasks of a job array may write the same table.
+        let path = folder.join("sweep.csv");
+        let part = folder.join(format!("sweep.csv.{}", std::process::id()));
+        std::fs::write(&part, csv(&cells))
+            .and_then(|()| std::fs::rename(&part, &path))
+            .map_err(|error| file_error(&path, "write", &error))?;
+        if prints {
+            outln!("table    {}", path.display());
+        }
+        for index in 0..self.columns.len() {
+            let path = folder.join(format!("{}.png", self.columns[index].key()));
+            if self.draw(index, &path)? && prints {
+                outln!("picture  {}", path.display());
+            }
+        }
+        Ok(())
+    }
+
+    fn value(&self, row: usize, column: usize) -> Option<f64> {
+        self.values[row].as_ref()?[column]
+    }
+
+    /// The columns: folder, values of the axes, state, and values with errors and rates.
+    fn cells(&self) -> Vec<Cells> {
+        let rows = 0..self.design.rows.len();
+        let alike = |text: String| [text.clone(), text];
+        let mut cells = Vec::new();
+        for (axis, description) in self.design.axes.iter().enumerate() {
+            let text = |row: &Vec<usize>| alike(self.design.value(row, axis).to_owned());
+            cells.push(Cells {
+                heading: alike(description.name.clone()),
+                unit: String::new(),
+                texts: self.design.rows.iter().map(text).collect(),
+            });
+        }
+        let state = |row: usize| match self.values[row] {
+            Some(_) => alike("complete".to_owned()),
+            None => alike("missing".to_owned()),
+        };
+        cells.push(Cells {
+            heading: alike("state".to_owned()),
+            unit: String::new(),
+            texts: rows.clone().map(state).collect(),
+        });
+        for (index, column) in self.columns.iter().enumerate() {
+            let number = |value: Option<f64>, print: fn(f64) -> String| match value {
+                Some(value) => [print(value), format!("{value:?}")],
+                None => [String::new(), String::new()],
+            };
+            let value = |row: usize| number(self.value(row, index), |value| format!("{value:.6e}"));
+            cells.push(Cells {
+                heading: [column.title(), column.key()],
+                unit: self.units[index].clone(),
+                texts: rows.clone().map(value).collect(),
+            });
+            if let Some(exact) = self.references[index] {
+                let error = |row: usize| {
+                    let error = self
+                        .value(row, index)
+                        .map(|value| (value - exact) / exact.abs());
+                    number(error, |error| format!("{:+.3} %", 100.0 * error))
+                };
+                cells.push(Cells {
+                    heading: ["error".to_owned(), format!("{}_error", column.key())],
+                    unit: String::new(),
+                    texts: rows.clone().map(error).collect(),
+                });
+            }
+            let rates = self.rates(index);
+            if rates.iter().any(Option::is_some) {
+                let rate = |rate: &Option<f64>| number(*rate, |rate| format!("{rate:.2}"));
+                cells.push(Cells {
+                    heading: ["rate".to_owned(), format!("{}_rate", column.key())],
+                    unit: String::new(),
+                    texts: rates.iter().map(rate).collect(),
+                });
+            }
+        }
+        cells
+    }
+
+    /// The observed rate of convergence of each row.
+    fn rates(&self, column: usize) -> Vec<Option<f64>> {
+        let mut found = vec![None; self.design.rows.len()];
+        let Some(abscissa) = self.abscissa else {
+            return found;
+        };
+        for (_, rows) in self.design.groups(abscissa) {
+            let series = self.series(&rows, abscissa, column);
+            for (row, rate) in rows.iter().zip(rates(&series, self.references[column])) {
+                found[*row] = rate;
+            }
+        }
+        found
+    }
+
+    fn series(&self, rows: &[usize], abscissa: usize, column: usize) -> Vec<(f64, Option<f64>)> {
+        let number = |row: usize| self.design.number(&self.design.rows[row], abscissa);
+        let pair = |row: &usize| (number(*row).unwrap_or(f64::NAN), self.value(*row, column));
+        rows.iter().map(pair).collect()
+    }
+
+    /// Draw a value over the abscissa, one curve for each combination of the other names. Return whether there is
+    /// anything to draw.
+    fn draw(&self, column: usize, path: &Path) -> Result<bool> {
+        let Some(abscissa) = self.abscissa else {
+            return Ok(false);
+        };
+        let (mut series, mut runs) = (Vec::new(), 0);
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for (name, rows) in self.design.groups(abscissa) {
+            let mut points = self.series(&rows, abscissa, column);
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let points = points
+                .into_iter()
+                .filter_map(|(h, value)| Some([h, value?]));
+            let points: Vec<[f64; 2]> = points.collect();
+            for [h, _] in &points {
+                range = [range[0].min(*h), range[1].max(*h)];
+            }
+            runs += points.len();
+            // The curve, then each run alone: isolated points are drawn as markers.
+            let gap = [f64::NAN; 2];
+            let markers: Vec<[f64; 2]> = points.iter().flat_map(|point| [gap, *point]).collect();
+            let points = [points, markers].concat();
+            series.push(Series { name, points });
+        }
+        if runs < 2 {
+            return Ok(false);
+        }
+        if let Some(exact) = self.references[column] {
+            series.push(Series {
+                name: "reference".to_owned(),
+                points: range.map(|h| [h, exact]).to_vec(),
+            });
+            if let [only, _] = &mut series[..] {
+                only.name = "runs".to_owned();
+            }
+        }
+        let title = self.columns[column].title();
+        let chart = Chart {
+            title: "",
+            x: Label {
+                name: &self.design.axes[abscissa].name,
+                unit: "",
+            },
+            y: Label {
+                name: &title,
+                unit: &self.units[column],
+            },
+            series: &series,
+            width: WIDTH,
+        };
+        let written = chart.image().write_png(path);
+        written.map_err(|error| file_error(path, "write", &error))?;
+        Ok(true)
+    }
+}
+
+/// The table with aligned columns.
+fn printed(cells: &[Cells]) -> String {
+    let headings = cells.iter().map(|column| match column.unit.as_str() {
+        "" => column.heading[0].clone(),
+        unit => format!("{} ({unit})", column.heading[0]),
+    });
+    let headings: Vec<String> = headings.collect();
+    let width = |(column, heading): (&Cells, &String)| {
+        let texts = column
+            .texts
+            .iter()
+            .map(|[printed, _]| printed.chars().count());
+        texts.chain([heading.chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = cells.iter().zip(&headings).map(width).collect();
+    let line = |texts: Vec<&String>| {
+        let padded = texts
+            .iter()
+            .zip(&widths)
+            .map(|(text, width)| format!("{text:<width$}"));
+        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    let rows = cells.first().map_or(0, |column| column.texts.len());
+    let mut lines = vec![line(headings.iter().collect())];
+    lines.extend(
+        (0..rows).map(|row| line(cells.iter().map(|column| &column.texts[row][0]).collect())),
+    );
+    lines.join("\n")
+}
+
+/// The table as CSV, with headings as in history.csv.
+fn csv(cells: &[Cells]) -> String {
+    let quoted = |text: &str| {
+        if text.contains([',', '"', '\n']) {
+            format!("\"{}\"", text.replace('"', "\"\""))
+        } else {
+            text.to_owned()
+        }
+    };
+    let heading = |column: &Cells| match column.unit.as_str() {
+        "" => quoted(&column.heading[1]),
+        unit => quoted(&format!("{} [{unit}]", column.heading[1])),
+    };
+    let rows = cells.first().map_or(0, |column| column.texts.len());
+    let mut lines = vec![cells.iter().map(heading).collect::<Vec<_>>().join(",")];
+    for row in 0..rows {
+        let texts = cells.iter().map(|column| quoted(&column.texts[row][1]));
+        lines.push(texts.collect::<Vec<_>>().join(","));
+    }
+    lines.join("\n") + "\n"
+}
