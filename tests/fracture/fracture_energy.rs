@@ -430,19 +430,19 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
 }
 
 /// The energy per area that opening costs at a height in two bodies that meet at y = 7, as a share of G0; the upper one has
-/// half the horizon and half the spacing of the lower one.
-fn cost_at(height: f64, law: &str, rule: &str) -> f64 {
+/// half the horizon and half the spacing of the lower one, which is given.
+fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
     let (rule, more) = rule.split_once(' ').unwrap_or((rule, ""));
     let text = format!(
         "dimension = 'plane-strain'
-        grid = {{ spacing = 1, horizon = 3 }}
+        grid = {{ spacing = {spacing}, horizon = 3 }}
         material.rubber.{law}
         damage.brittle.{rule} = {{ fracture_energy = {FRACTURE_ENERGY}, {more} }}
         body.coarse = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [24, 7] }} }}
         [body.fine]
         material = 'rubber'
         damage = 'brittle'
-        spacing = 0.5
+        spacing = '{spacing}/2'
         horizon = 1.5
         shape.box = {{ lower = [0, 7], upper = [24, 14] }}
         [time]
@@ -477,7 +477,7 @@ fn between_bodies_of_different_horizons_by_energy() {
         ("correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }".to_owned(), "energy"),
         ("bond_associated_correspondence = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3 }".to_owned(), "energy"),
     ] {
-        let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule));
+        let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule, 1.0));
         let inside = 0.5 * (coarse + fine);
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         assert!((0.8..1.2).contains(&inside), "{case}");
@@ -497,12 +497,14 @@ fn between_bodies_of_different_horizons_by_stretch() {
         (tensor.to_owned(), "critical_stretch"),
         (ordinary(0.3, "constant"), "critical_stretch"),
     ] {
-        let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule));
+        let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule, 0.5));
         let inside = 0.5 * (coarse + fine);
         let case = format!("{law} {rule}: {coarse} {border} {fine}");
         println!("{case}");
         assert!((0.8..1.2).contains(&inside), "{case}");
-        assert!((border / inside - 1.0).abs() < 0.12, "{case}");
+        // With spacings of 1 and 0.5 the border costs 12 % more than the inside: the coarse body is a poor quadrature for the
+        // small horizon.
+        assert!((border / inside - 1.0).abs() < 0.06, "{case}");
     }
 }
 
