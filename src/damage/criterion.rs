@@ -15,6 +15,10 @@ pub enum Criterion {
     /// At the smaller of the threshold stretches of the two points; the critical stretches of their
     /// blocks are the part of it that a law may scale, 0 where a block has none.
     Thresholds([f64; 2]),
+    /// As [`Self::Stretch`], between points whose critical stretches belong to different horizons; ∞ where a block has none.
+    StretchBetween([f64; 2], StretchConversion),
+    /// As [`Self::Thresholds`], between points whose critical stretches belong to different horizons.
+    ThresholdsBetween([f64; 2], StretchConversion),
     /// When the work of the acting force states reaches the sum of what each of them takes, J/m⁶.
     Work([f64; 2], WorkRule),
     /// As [`Self::Work`], from the work thresholds of the two points.
@@ -24,6 +28,40 @@ pub enum Criterion {
 /// Factors that convert the work threshold of a point to the horizon of an end of the bond: entry `[e][k]` takes that of
 /// point k to end e; all are 1 between equal horizons.
 pub type HorizonRatios = [[f64; 2]; 2];
+
+/// Critical stretch of a bond between points whose own critical stretches belong to different horizons.
+///
+/// An end e of the bond takes ½ k_e s² |ξ| of its energy, with the stiffness k_e of its point, if it acts there: if the bond
+/// is within the horizon of e. A fracture energy lets it take as much as at m_e = min_k t_k √(δ_k/δ_e), with the critical
+/// stretch t_k of point k and its horizon δ_k. The bond breaks where its acting ends have taken theirs together:
+/// s² = Σ k_e m_e²/Σ k_e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StretchConversion {
+    /// Entry `[e][k]` is √(δ_k/δ_e).
+    pub ratios: HorizonRatios,
+    /// k_e, in any unit.
+    pub stiffness: [f64; 2],
+}
+
+impl StretchConversion {
+    /// The critical stretch of each bond, from those of points i and j.
+    #[inline(always)]
+    fn convert<S: Simd>(self, simd: S, [i, j]: [Lanes; 2], acting: [u8; 2]) -> Lanes {
+        let [[ii, ij], [ji, jj]] = self.ratios;
+        let takes_i = (i * ii).min(j * ij);
+        let takes_j = (i * ji).min(j * jj);
+        let k_i = simd.keep(Lanes::splat(self.stiffness[0]), acting[0]);
+        let k_j = simd.keep(Lanes::splat(self.stiffness[1]), acting[1]);
+        ((takes_i * takes_i * k_i + takes_j * takes_j * k_j) / (k_i + k_j)).sqrt()
+    }
+
+    /// A stretch below which none of the bonds breaks.
+    #[inline(always)]
+    fn smallest(self, [i, j]: [f64; 2]) -> f64 {
+        let of_end = |[from_i, from_j]: [f64; 2]| (i * from_i).min(j * from_j);
+        of_end(self.ratios[0]).min(of_end(self.ratios[1]))
+    }
+}
 
 /// How the work of bonds is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +130,10 @@ impl Criterion {
     /// Whether it depends on the thresholds of the ends.
     #[inline(always)]
     pub fn reads_thresholds(self) -> bool {
-        matches!(self, Self::Thresholds(_) | Self::WorkThresholds(..))
+        matches!(
+            self,
+            Self::Thresholds(_) | Self::ThresholdsBetween(..) | Self::WorkThresholds(..)
+        )
     }
 
     /// It reads the truncation factors of the points.
@@ -100,7 +141,7 @@ impl Criterion {
     pub fn reads_truncation_factors(self) -> bool {
         match self {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => rule.corrects(),
-            Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
+            _ => false,
         }
     }
 
@@ -111,7 +152,7 @@ impl Criterion {
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
                 rule.measure == WorkMeasure::Objective
             }
-            Self::Never | Self::Stretch(_) | Self::Thresholds(_) => false,
+            _ => false,
         }
     }
 
@@ -127,6 +168,11 @@ impl Criterion {
         match self {
             // What equals the limit is not beyond it.
             Self::Stretch(critical) => NEAR.min(relative_square_extension_of(critical).next_down()),
+            // The bound is rounded otherwise than the threshold of a bond.
+            Self::StretchBetween(critical, conversion) => {
+                let smallest = conversion.smallest(critical) * (1.0 - 1e-12);
+                NEAR.min(relative_square_extension_of(smallest))
+            }
             _ => NEAR,
         }
     }
@@ -136,8 +182,8 @@ impl Criterion {
     pub fn marks_all(self, scaled: bool) -> bool {
         match self {
             Self::Never => true,
-            Self::Stretch(_) => !scaled,
-            Self::Thresholds(_) | Self::Work(..) | Self::WorkThresholds(..) => false,
+            Self::Stretch(_) | Self::StretchBetween(..) => !scaled,
+            _ => false,
         }
     }
 
@@ -160,14 +206,18 @@ impl Criterion {
             ),
             Self::Work(_, rule) | Self::WorkThresholds(_, rule) => {
                 let [i, j] = ends.weights.acting();
-                let spent = simd.at_least(work, self.threshold(simd, ends)) & (i | j);
+                let spent = simd.at_least(work, self.threshold(simd, bond, ends)) & (i | j);
                 match rule.sense {
                     Sense::Pulled => spent & bond.relative_square_extension.above(0.0),
                     Sense::Either => spent,
                 }
             }
-            Self::Stretch(_) | Self::Thresholds(_) => {
-                let threshold = self.threshold(simd, ends);
+            Self::StretchBetween(..) if !L::SCALED && bond.beyond_series == 0 => 0,
+            Self::Stretch(_)
+            | Self::Thresholds(_)
+            | Self::StretchBetween(..)
+            | Self::ThresholdsBetween(..) => {
+                let threshold = self.threshold(simd, bond, ends);
                 let threshold = threshold * (Lanes::splat(2.0) + threshold);
                 simd.at_least(bond.relative_square_extension, threshold)
             }
@@ -179,12 +229,10 @@ impl Criterion {
     fn threshold<S: Simd, L: Law<D>, const D: usize>(
         self,
         simd: S,
+        bond: &Bond<D>,
         ends: Ends<'_, L, L::Point>,
     ) -> Lanes {
-        let scale = || {
-            let [here, there] = ends.points;
-            ends.laws[0].toughness_scale(here, &ends.laws[1], there)
-        };
+        let scale = || ends.laws[0].toughness_scale(bond, ends.points, &ends.laws[1]);
         match self {
             Self::Never => Lanes::splat(f64::INFINITY),
             Self::Stretch(critical) if L::SCALED => Lanes::splat(critical) * scale(),
@@ -192,14 +240,28 @@ impl Criterion {
             Self::Work([i, j], rule) => {
                 rule.sum_of_acting(simd, [Lanes::splat(i), Lanes::splat(j)], ends)
             }
-            Self::Thresholds(critical) => {
+            Self::StretchBetween(critical, conversion) => {
+                let both = [Lanes::splat(critical[0]), Lanes::splat(critical[1])];
+                let threshold = conversion.convert(simd, both, ends.weights.acting());
+                if L::SCALED {
+                    threshold * scale()
+                } else {
+                    threshold
+                }
+            }
+            Self::Thresholds(critical) | Self::ThresholdsBetween(critical, _) => {
                 let (mut here, mut there) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
                 if L::SCALED {
                     let growth = scale() - Lanes::splat(1.0);
                     here += growth * critical[0];
                     there += growth * critical[1];
                 }
-                here.min(there)
+                match self {
+                    Self::ThresholdsBetween(_, conversion) => {
+                        conversion.convert(simd, [here, there], ends.weights.acting())
+                    }
+                    _ => here.min(there),
+                }
             }
             Self::WorkThresholds([[ii, ij], [ji, jj]], rule) => {
                 let (i, j) = (ends.limits[0].thresholds, ends.limits[1].thresholds);
@@ -220,7 +282,7 @@ impl Criterion {
         ends: Ends<'_, L, L::Point>,
         work: Lanes,
     ) -> Lanes {
-        let threshold = self.threshold(simd, ends);
+        let threshold = self.threshold(simd, bond, ends);
         let ratio = if self.reads_work() {
             threshold / work
         } else {

@@ -6,7 +6,9 @@ mod critical_stretch;
 mod pull_apart;
 
 pub use bond_energy::{BondEnergy, Calibration};
-pub use criterion::{Criterion, Ends, HorizonRatios, Limits, Sense, WorkMeasure, WorkRule};
+pub use criterion::{
+    Criterion, Ends, HorizonRatios, Limits, Sense, StretchConversion, WorkMeasure, WorkRule,
+};
 pub use critical_stretch::CriticalStretch;
 
 /// The damage law of a block.

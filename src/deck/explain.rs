@@ -45,6 +45,7 @@ fn fill(deck: &mut Deck, problem: &Problem) {
     let correction = match problem.volume_correction {
         problem::VolumeCorrection::None => VolumeCorrection::None,
         problem::VolumeCorrection::Linear => VolumeCorrection::Linear,
+        problem::VolumeCorrection::LinearInside => VolumeCorrection::LinearInside,
         problem::VolumeCorrection::Exact => VolumeCorrection::Exact,
     };
     grid.volume_correction

@@ -167,6 +167,7 @@ fn volume_correction(
     let correction = match given.map(|given| given.get_ref()) {
         Some(VolumeCorrection::None) => return Ok(problem::VolumeCorrection::None),
         Some(VolumeCorrection::Linear) => problem::VolumeCorrection::Linear,
+        Some(VolumeCorrection::LinearInside) => problem::VolumeCorrection::LinearInside,
         Some(VolumeCorrection::Exact) | None => problem::VolumeCorrection::Exact,
     };
     let gauss = grid.quadrature == Quadrature::Gauss;

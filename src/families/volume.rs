@@ -80,7 +80,7 @@ impl CellShare {
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {
-            VolumeCorrection::None => cutoff(self.horizon),
+            VolumeCorrection::None | VolumeCorrection::LinearInside => cutoff(self.horizon),
             VolumeCorrection::Linear => inside(self.horizon + half),
             VolumeCorrection::Exact => inside(self.horizon + half * (self.dimension as f64).sqrt()),
         }
@@ -89,9 +89,11 @@ impl CellShare {
     /// The factor at an offset ξ (m); equal at ξ and −ξ.
     pub fn at(&self, offset: [f64; 3]) -> f64 {
         let squared = offset.iter().map(|x| x * x).sum::<f64>();
+        let is_inside = squared <= cutoff(self.horizon).powi(2);
         match self.correction {
-            VolumeCorrection::None => f64::from(squared <= cutoff(self.horizon).powi(2)),
-            VolumeCorrection::Linear => {
+            VolumeCorrection::None => f64::from(is_inside),
+            VolumeCorrection::LinearInside if !is_inside => 0.0,
+            VolumeCorrection::Linear | VolumeCorrection::LinearInside => {
                 ((self.horizon - squared.sqrt()) / self.edge + 0.5).clamp(0.0, 1.0)
             }
             VolumeCorrection::Exact if squared > self.reach_squared => 0.0,
@@ -282,5 +284,10 @@ mod tests {
         assert_eq!(share.at([3.0, 0.0, 0.0]), 0.5);
         assert_eq!(share.at([0.0, -2.0, 0.0]), 1.0);
         assert_eq!(share.at([2.0, 3.0, 0.0]), 0.0);
+        assert!(share.at([3.1, 0.0, 0.0]) > 0.0);
+        let inside = CellShare::new(VolumeCorrection::LinearInside, 3.0, 1.0, 2);
+        assert_eq!(inside.at([3.0, 0.0, 0.0]), 0.5);
+        assert_eq!(inside.at([2.0, 2.0, 0.0]), share.at([2.0, 2.0, 0.0]));
+        assert_eq!(inside.at([3.1, 0.0, 0.0]), 0.0);
     }
 }

@@ -7,8 +7,9 @@
 
 use std::sync::Arc;
 
-use super::pmb::SURFACE_CORRECTION;
-use super::{Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb};
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb, Word,
+};
 use crate::lanes::{IsaSet, Lanes};
 
 /// The law with its constants.
@@ -25,6 +26,12 @@ const LAMBDA: Key = Key {
     name: "lambda",
     meaning: "λ in N/m⁹, an expression of the bond's length `r` in m; c/r³ if not given",
     kind: Kind::OfLength,
+};
+
+const SURFACE_CORRECTION: Key = Key {
+    name: "surface_correction",
+    meaning: "whether the strain energy of each point's own family corrects its micromodulus",
+    kind: Kind::Word(&[Word::new("none"), Word::new("energy")]),
 };
 
 impl Declared for LinearMicroelastic {

@@ -22,6 +22,8 @@ mod plastic_state;
 mod pmb;
 mod registration;
 pub mod rotation;
+mod symmetric;
+mod tensor_pmb;
 
 pub use any::{AnyHistory, AnyPoint, Counts, MOST};
 pub use bond::Bond;
@@ -41,6 +43,7 @@ registration::register! {
     pmb::Pmb,
     elastic_plastic_pmb::ElasticPlasticPmb,
     normalised::Normalised,
+    tensor_pmb::TensorPmb,
     linear_microelastic::LinearMicroelastic,
     ordinary::Ordinary,
     ordinary_plastic::OrdinaryPlastic,
@@ -291,9 +294,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         1.0
     }
 
-    /// What the critical stretch of a bond is multiplied by; the same from both ends.
+    /// What the critical stretch of a bond is multiplied by, from the numbers of points i and j and the law of point j; the
+    /// same from both ends.
     #[inline(always)]
-    fn toughness_scale(&self, _here: &Self::Point, _other: &Self, _there: &Self::Point) -> Lanes {
+    fn toughness_scale(&self, _bond: &Bond<D>, _points: [&Self::Point; 2], _other: &Self) -> Lanes {
         Lanes::splat(1.0)
     }
 }

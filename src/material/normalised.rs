@@ -153,7 +153,7 @@ impl<const D: usize> Law<D> for Normalised {
     }
 
     #[inline(always)]
-    fn toughness_scale(&self, here: &[Lanes; 1], other: &Self, there: &[Lanes; 1]) -> Lanes {
+    fn toughness_scale(&self, _: &Bond<D>, [here, there]: [&[Lanes; 1]; 2], other: &Self) -> Lanes {
         let (Some(reference), Some(other_reference)) = (self.reference, other.reference) else {
             return Lanes::splat(1.0);
         };

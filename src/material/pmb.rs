@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised, Word,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised,
+    TensorPmb, Word,
 };
 use crate::dimension::{Constraint, Dimension};
 use crate::lanes::{Lanes, Simd};
@@ -67,11 +68,10 @@ impl Pmb {
     }
 }
 
-/// What corrects the micromodulus near surfaces.
-pub(super) const SURFACE_CORRECTION: Key = Key {
+const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
-    meaning: "whether the strain energy of each point's own family corrects its micromodulus",
-    kind: Kind::Word(&[Word::new("none"), Word::new("energy")]),
+    meaning: "what each point's own family corrects in its micromodulus: nothing, its strain energy, or its elastic tensor",
+    kind: Kind::Word(&[Word::new("none"), Word::new("energy"), Word::new("tensor")]),
 };
 
 impl Declared for Pmb {
@@ -80,7 +80,11 @@ impl Declared for Pmb {
             keys: &[SURFACE_CORRECTION],
             breaks_by_energy: true,
             critical_stretch: Some(bond_based_critical_stretch),
-            examples: &["", "surface_correction = 'energy'"],
+            examples: &[
+                "",
+                "surface_correction = 'energy'",
+                "surface_correction = 'tensor'",
+            ],
             ..Declaration::new("pmb", "prototype microelastic, f = c s e", build)
         },
         Declaration {
@@ -91,10 +95,10 @@ impl Declared for Pmb {
 }
 
 fn build(given: &Given) -> Built {
-    if given.values.word(SURFACE_CORRECTION.name) == "energy" {
-        Built::plain(Normalised::classical(given))
-    } else {
-        Built::plain(Pmb::of(given))
+    match given.values.word(SURFACE_CORRECTION.name) {
+        "energy" => Built::plain(Normalised::classical(given)),
+        "tensor" => Built::plain(TensorPmb::of(given)),
+        _ => Built::plain(Pmb::of(given)),
     }
 }
 

@@ -52,8 +52,10 @@ pub struct Material {
 pub enum VolumeCorrection {
     /// Whole or not at all.
     None,
-    /// A share that falls linearly with the distance.
+    /// A share that falls linearly with the distance, from 1 at δ − dx/2 to 0 at δ + dx/2.
     Linear,
+    /// The same up to δ, where it falls from 1/2 to 0.
+    LinearInside,
     /// The share of the cell that lies within the horizon.
     Exact,
 }

@@ -1,6 +1,9 @@
 //! From the problem to the law, the failure rule and the weights of every family.
 
-use crate::damage::{BondEnergy, Criterion, CriticalStretch, DamageLaw, WorkRule};
+use crate::damage::{
+    BondEnergy, Criterion, CriticalStretch, DamageLaw, StretchConversion, WorkRule,
+};
+use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::error::{Error, Result};
 use crate::families::{BlockBonds, CellShare, Fault};
@@ -45,6 +48,12 @@ fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
         InterfaceRule::Average => combine(|own, other| 0.5 * (own + other)),
         InterfaceRule::Minimum => combine(f64::min),
     }
+}
+
+/// Stiffness of a bond per stretch and volume at an end with these constants, in any unit: micromoduli go with E/δ^(d+1).
+fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
+    let Constants { elastic, horizon } = constants;
+    elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
 }
 
 /// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not
@@ -250,12 +259,12 @@ fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<Damage
 }
 
 /// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
-/// without damage has none. `horizons` (m) are those of the ends of the bonds.
+/// without damage has none. The horizons (m) and stiffnesses are those of the ends of the bonds.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
     ends: [usize; 2],
-    horizons: [f64; 2],
+    (horizons, stiffness): ([f64; 2], [f64; 2]),
     per_point: bool,
 ) -> Criterion {
     let laws = ends.map(|block| blocks[block].damage);
@@ -271,6 +280,14 @@ fn criterion(
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
+    let of_blocks = ends.map(|block| problem.block(block).horizon);
+    let conversion = horizons
+        .iter()
+        .any(|horizon| of_blocks.iter().any(|of_block| of_block != horizon))
+        .then(|| StretchConversion {
+            ratios: horizons.map(|horizon| of_blocks.map(|of_block| (of_block / horizon).sqrt())),
+            stiffness,
+        });
     match (rules.reduce(WorkRule::of_both), per_point) {
         (Some(rule), true) => Criterion::WorkThresholds(ratios, rule),
         (Some(rule), false) => {
@@ -281,8 +298,20 @@ fn criterion(
             });
             Criterion::Work(takes, rule)
         }
-        (None, true) => Criterion::Thresholds(critical.map(|critical| critical.unwrap_or(0.0))),
-        (None, false) => Criterion::Stretch(smallest),
+        (None, true) => {
+            let critical = critical.map(|critical| critical.unwrap_or(0.0));
+            match conversion {
+                None => Criterion::Thresholds(critical),
+                Some(conversion) => Criterion::ThresholdsBetween(critical, conversion),
+            }
+        }
+        (None, false) => match conversion {
+            None => Criterion::Stretch(smallest),
+            Some(conversion) => {
+                let critical = critical.map(|critical| critical.unwrap_or(f64::INFINITY));
+                Criterion::StretchBetween(critical, conversion)
+            }
+        },
     }
 }
 
@@ -306,6 +335,7 @@ pub fn assign<const D: usize>(
             let constants = constants(problem, &block, &other);
             let horizon = constants.horizon;
             End {
+                stiffness: bond_stiffness(&constants, problem.dimension),
                 built: build(problem, block.body, constants),
                 horizon,
                 share: cell_share(problem, &other, horizon),
@@ -313,7 +343,8 @@ pub fn assign<const D: usize>(
         });
         weigh(problem, model, &mut bonds, &ends)?;
         let horizons = ends.each_ref().map(|end| end.horizon);
-        let criterion = criterion(problem, blocks, indices, horizons, per_point);
+        let stiffness = ends.each_ref().map(|end| end.stiffness);
+        let criterion = criterion(problem, blocks, indices, (horizons, stiffness), per_point);
         let [own, far] = ends.map(|end| end.built.law);
         Ok(Interaction {
             bonds,
@@ -328,6 +359,8 @@ pub fn assign<const D: usize>(
 /// An end of the bonds between two blocks.
 struct End {
     built: Built,
+    /// As [`bond_stiffness`].
+    stiffness: f64,
     /// m.
     horizon: f64,
     /// The share of the other body's cells in its families.

@@ -487,6 +487,25 @@ fn between_bodies_of_different_horizons_by_energy() {
     }
 }
 
+#[test]
+fn between_bodies_of_different_horizons_by_stretch() {
+    let tensor = "pmb = { density = 1, youngs_modulus = 3e3, surface_correction = 'tensor' }";
+    let pmb = "pmb = { density = 1, youngs_modulus = 3e3 }";
+    for (law, rule) in [
+        (pmb.to_owned(), "critical_stretch"),
+        (pmb.to_owned(), "critical_stretch alpha = 0.25"),
+        (tensor.to_owned(), "critical_stretch"),
+        (ordinary(0.3, "constant"), "critical_stretch"),
+    ] {
+        let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule));
+        let inside = 0.5 * (coarse + fine);
+        let case = format!("{law} {rule}: {coarse} {border} {fine}");
+        println!("{case}");
+        assert!((0.8..1.2).contains(&inside), "{case}");
+        assert!((border / inside - 1.0).abs() < 0.12, "{case}");
+    }
+}
+
 /// The work ¼ |(T_i − T_j)·η| (J/m⁶) in the last step before a bond of length 1 breaks. Steps are 0.1 % of its extension, so
 /// the work is up to 0.2 % below the threshold. Horizon 1.5, thickness 0.5 in the plane.
 fn work_at_breaking<const D: usize>(dimension: &str, calibration: &str) -> f64 {

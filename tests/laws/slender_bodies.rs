@@ -1,4 +1,4 @@
-//! Bars that are few points thick, in bending and in torsion: their stiffness against that of the beam.
+//! Bars that are few points thick, under tension, in bending and in torsion: their stiffness against that of the beam.
 
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
@@ -15,37 +15,40 @@ const SHEAR: f64 = YOUNG / (2.0 * (1.0 + RATIO));
 enum Load {
     Torsion,
     Bending,
+    Tension,
 }
 
 impl Load {
-    /// The displacement of both ends at a curvature or twist k, 1/m, with the deflections across of a beam.
+    /// The displacement of both ends at a curvature or twist k, 1/m, or strain k, with the deflections across of a beam.
     fn displacement(self) -> &'static str {
         match self {
             Self::Torsion => "['free', '-k*x*z', 'k*x*y']",
             Self::Bending => "['-k*x*y', 'k*(x^2 + 0.25*(y^2 - z^2))/2', 'k*0.25*y*z']",
+            Self::Tension => "['k*x', '-k*0.25*y', '-k*0.25*z']",
         }
     }
 
-    /// The stiffness of a beam (N m²) of a square section with this edge: G J and E I.
+    /// The stiffness of a beam of a square section with this edge: G J and E I (N m²), E A (N).
     fn stiffness(self, edge: f64) -> f64 {
         match self {
             Self::Torsion => 0.140577 * SHEAR * edge.powi(4),
             Self::Bending => YOUNG * edge.powi(4) / 12.0,
+            Self::Tension => YOUNG * edge.powi(2),
         }
     }
 }
 
 /// Stiffness over that of the beam, of the middle of a square bar with this many points of unit spacing across: from the
 /// strain energies of two lengths, so that the ends have no part in it.
-fn stiffness(control: &str, across: u32, load: Load) -> f64 {
+fn stiffness((law, correction): (&str, &str), across: u32, load: Load) -> f64 {
     let curvature = 1e-4 / f64::from(across);
     let energy = |length: u32| {
         let (half_length, half) = (f64::from(length) / 2.0, f64::from(across) / 2.0);
         let text = format!(
             "dimension = '3d'
             parameters.k = {curvature}
-            grid = {{ spacing = 1, horizon = 3.015, volume_correction = 'none', origin = [-{half_length}, -{half}, -{half}] }}
-            material.solid.correspondence = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, {control} }}
+            grid = {{ spacing = 1, horizon = 3.015, volume_correction = '{correction}', origin = [-{half_length}, -{half}, -{half}] }}
+            material.solid.{law}
             body.bar = {{ material = 'solid', shape.box = {{ lower = [-{half_length}, -{half}, -{half}], upper = [{half_length}, {half}, {half}] }} }}
             set.ends.where = 'abs(x) > {half_length} - 4'
             condition.ends = {{ set = 'ends', displacement = {} }}
@@ -68,11 +71,14 @@ fn stiffness(control: &str, across: u32, load: Load) -> f64 {
     by_length / (0.5 * load.stiffness(f64::from(across)) * curvature * curvature)
 }
 
-/// Rows of docs/state_based.md: torsion and bending of bars with this many points across, by control.
+/// Torsion and bending of correspondence bars with this many points across, by control.
 fn check(across: u32, rows: &[(&str, [f64; 2])]) {
     for (control, wanted) in rows {
+        let law = format!(
+            "correspondence = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, {control} }}"
+        );
         for (load, wanted) in [Load::Torsion, Load::Bending].into_iter().zip(wanted) {
-            let found = stiffness(control, across, load);
+            let found = stiffness((&law, "none"), across, load);
             println!("{across} {control} {load:?}: {found:.3}");
             assert!(
                 (found - wanted).abs() < 0.011,
@@ -105,4 +111,27 @@ fn bars_of_six_and_ten_points() {
         ],
     );
     check(10, &[("zero_energy = 'dispersion'", [1.00, 0.93])]);
+}
+
+/// Values of the section problem of an infinite bar, solved by a program of its own with m = 3.
+#[test]
+fn surface_corrections_of_bars() {
+    for (correction, across, wanted) in [
+        ("none", 4, [0.71, 0.50]),
+        ("energy", 4, [1.45, 1.12]),
+        ("tensor", 4, [1.01, 0.80]),
+        ("tensor", 6, [1.02, 0.90]),
+    ] {
+        let law = format!(
+            "pmb = {{ density = 1000, youngs_modulus = {YOUNG}, surface_correction = '{correction}' }}"
+        );
+        for (load, wanted) in [Load::Tension, Load::Bending].into_iter().zip(wanted) {
+            let found = stiffness((&law, "exact"), across, load);
+            println!("{across} {correction} {load:?}: {found:.3}");
+            assert!(
+                (found - wanted).abs() < 0.011,
+                "{across} {correction} {load:?}: {found}"
+            );
+        }
+    }
 }

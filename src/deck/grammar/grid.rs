@@ -52,13 +52,14 @@ pub enum Family {
 
 /// How volumes near the edge of a family are corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum VolumeCorrection {
     /// Points within the horizon count whole.
     None,
-    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too (PA-HHB); LAMMPS ends
-    /// this taper at δ, Peridigm has none.
+    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too (PA-HHB).
     Linear,
+    /// As `linear`, without points beyond the horizon (LAMMPS; Dipasquale et al. 2014, eq. 1 with eq. 10).
+    LinearInside,
     /// Points count the share of their cell within the horizon.
     Exact,
 }

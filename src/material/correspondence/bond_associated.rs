@@ -22,13 +22,13 @@
 
 use nalgebra::SMatrix;
 
+use super::super::symmetric::{from_entries, to_entries};
 use super::super::{
     Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Law, PlasticState,
     Rotation,
 };
 use super::family::{
-    FamilyShare, ShapeTensor, family_rotation, family_share, from_entries, from_rows, shape_share,
-    to_entries, to_rows,
+    FamilyShare, ShapeTensor, family_rotation, family_share, from_rows, shape_share, to_rows,
 };
 use super::hooke::{self, Hooke};
 use super::stress::{OfBonds, Stress};

@@ -1,7 +1,8 @@
-//! Tensors of a family: the shape tensor, and how symmetric tensors are kept.
+//! Tensors of a family: the shape tensor and what follows from it.
 
 use nalgebra::{Matrix3, SMatrix};
 
+use super::super::symmetric::{from_entries, mixed};
 use super::super::{Bond, Rotation, rotation};
 use crate::lanes::{LaneTuple, Lanes};
 
@@ -12,33 +13,6 @@ const SINGULAR: f64 = 1e-2;
 /// What is left of a family carries no force where it is so many times as stiff as the whole family: the time
 /// step is that of whole families. Torn plates ran away without a bound, and not with one of 16.
 const STIFFEST: f64 = 8.0;
-
-/// The mixed entries of a symmetric tensor in the order in which they are kept: yz, xz, xy in space and
-/// xy in the plane.
-#[inline(always)]
-pub fn mixed<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
-    const SPACE: [(usize, usize); 3] = [(1, 2), (0, 2), (0, 1)];
-    let skipped = match D {
-        3 => 0,
-        2 => 2,
-        _ => 3,
-    };
-    SPACE.into_iter().skip(skipped)
-}
-
-/// An entry of a symmetric tensor that is kept by diagonal and mixed entries.
-#[inline(always)]
-pub fn symmetric<const D: usize>(
-    (diagonal, others): &([Lanes; D], [Lanes; D]),
-    a: usize,
-    b: usize,
-) -> Lanes {
-    if a == b {
-        return diagonal[a];
-    }
-    // In space the mixed entry of two directions has the place of the third.
-    if D == 3 { others[3 - a - b] } else { others[0] }
-}
 
 /// What a bond adds to the shape tensor, by diagonal and mixed entries, and to Σ ω η⊗ξ Ṽ, row by row.
 pub type FamilyShare<const D: usize> = (([Lanes; D], [Lanes; D]), [[Lanes; D]; D]);
@@ -59,29 +33,6 @@ pub fn shape_share<const D: usize>(xi: &[Lanes; D]) -> ([Lanes; D], [Lanes; D]) 
         others[k] = xi[a] * xi[b];
     }
     (LaneTuple::each(|d| xi[d] * xi[d]), others)
-}
-
-/// A symmetric tensor from its diagonal and mixed entries.
-pub fn from_entries<const D: usize>(entries: &[f64]) -> SMatrix<f64, D, D> {
-    let mut tensor = SMatrix::zeros();
-    for a in 0..D {
-        tensor[(a, a)] = entries[a];
-    }
-    for (k, (a, b)) in mixed::<D>().enumerate() {
-        tensor[(a, b)] = entries[D + k];
-        tensor[(b, a)] = entries[D + k];
-    }
-    tensor
-}
-
-/// Writes the diagonal and mixed entries of a symmetric tensor.
-pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f64]) {
-    for a in 0..D {
-        entries[a] = tensor[(a, a)];
-    }
-    for (k, (a, b)) in mixed::<D>().enumerate() {
-        entries[D + k] = tensor[(a, b)];
-    }
 }
 
 /// A tensor from its entries, row by row.

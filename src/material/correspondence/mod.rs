@@ -24,6 +24,7 @@ mod tensor;
 use nalgebra::SMatrix;
 
 use super::bond::Weights;
+use super::symmetric::{symmetric, to_entries};
 use super::{
     Bond, Built, Declaration, Declared, Described, ForceState, Given, Influence, Invariants, Key,
     Kind, Law, PlasticState, Rotation, Values, Word,
@@ -32,7 +33,7 @@ use crate::lanes::{LaneTuple, Lanes, Simd};
 pub use bond_associated::BondAssociated;
 use control::Control;
 pub use family::{FamilyShare, ShapeTensor, determinant, family_share};
-use family::{extremes, family_rotation, from_rows, shape_share, symmetric, to_entries, to_rows};
+use family::{extremes, family_rotation, from_rows, shape_share, to_rows};
 use hooke::Hooke;
 use plastic::Plastic;
 use stress::Stress;

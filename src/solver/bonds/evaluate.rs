@@ -159,7 +159,7 @@ impl<const D: usize> Forces<D> {
     /// The first point from one on that is not worked on together with the one before it. A vector of a
     /// lattice that were cut would add to its last points before their earlier interactions do: their sums
     /// would be rounded otherwise, as messages arrive.
-    fn border(&self, from: usize) -> usize {
+    pub(super) fn border(&self, from: usize) -> usize {
         let end = self.lane_group(from - 1).end;
         if end == from { from } else { self.border(end) }
     }

@@ -237,7 +237,7 @@ impl<const D: usize> Forces<D> {
 }
 
 /// Runs a kernel over all bonds between two blocks.
-pub(super) fn sweep_all<K: Kernel<D>, const D: usize>(
+fn sweep_all<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     sums: &mut [Vec<f64>],
     kernel: &K,

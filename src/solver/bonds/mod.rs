@@ -30,18 +30,18 @@ use std::sync::Arc;
 use crate::comm::{Communicator, Halo};
 use crate::error::Result;
 use crate::families::{BlockBonds, Fault, Grid, Which};
-use crate::lanes::Instructions;
-use crate::material::Law;
+use crate::lanes::{Instructions, LaneTuple};
+use crate::material::{Law, MOST};
 use crate::memory::check_room;
 
 use super::model::Model;
 use grid_points::GridValues;
+use kernel::Kernel;
 use limit_columns::{LimitColumns, LimitsRead};
 use list_points::Node;
-use measure::sweep_all;
 use point_numbers::PointNumbers;
 use point_sums::FamilySum;
-use sweep::PointData;
+use sweep::{PointData, sweep_from};
 
 pub use bond_inputs::BondInputs;
 pub use broken::Broken;
@@ -51,6 +51,9 @@ pub use interaction::{BlockLaws, Interaction};
 pub use measure::Stored;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
+
+/// Points whose sums over the undeformed family are held at once.
+const FAMILY_SUMS: usize = 1 << 16;
 
 /// One sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,25 +180,23 @@ impl<const D: usize> Forces<D> {
         if !self.numbers.with_constants && !read.truncation_factors {
             return;
         }
-        let mut sums = vec![vec![0.0; model.owned()]; crate::material::MOST.reference_sum];
-        self.for_each_interaction(|interaction, source| {
-            let [law, _] = interaction.laws.laws();
-            if law.counts::<D>().reference_sum > 0 {
-                sweep_all(
-                    &mut interaction.bonds,
-                    &mut sums,
-                    &FamilySum::<D> { law },
-                    source,
-                );
-            }
-        });
+        let mut points = 0..0;
+        while points.end < model.owned() {
+            let end = points.end + FAMILY_SUMS;
+            let end = if end < model.owned() {
+                self.border(end)
+            } else {
+                model.owned()
+            };
+            points = points.end..end;
+            self.find_constants_of(points.clone(), model);
+        }
         let Self {
             numbers,
             limits,
             halo,
             ..
         } = self;
-        numbers.set_constants(model, &self.blocks, &sums, &mut limits.truncation_factors);
         let columns = numbers.columns[..numbers.read].iter_mut();
         let truncation_factors = read
             .truncation_factors
@@ -210,6 +211,23 @@ impl<const D: usize> Forces<D> {
                 grid.update_truncation_factors(&self.limits.truncation_factors);
             }
         }
+    }
+
+    /// Finds the constants of some points: no part of those whose bonds are worked on together.
+    fn find_constants_of(&mut self, points: Range<usize>, model: &Model<D>) {
+        let mut sums = vec![vec![0.0; points.len()]; MOST.reference_sum];
+        self.for_each_interaction(|interaction, source| {
+            let [law, _] = interaction.laws.laws();
+            let count = law.counts::<D>().reference_sum;
+            if count > 0 {
+                let kernel = FamilySum::<D> { law, count };
+                let results = <FamilySum<D> as Kernel<D>>::Sums::columns_mut(&mut sums);
+                let (bonds, base) = (&mut interaction.bonds, points.start);
+                sweep_from(bonds, points.clone(), base, results, &kernel, source);
+            }
+        });
+        let truncation_factors = &mut self.limits.truncation_factors;
+        (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
     }
 
     /// Calls `work` for all bonds between two blocks after one another.

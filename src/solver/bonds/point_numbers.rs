@@ -63,21 +63,22 @@ impl PointNumbers {
         }
     }
 
-    /// Finds the constants of the owned points from sums over their whole families, by column, and their
-    /// [truncation_factors](Law::truncation_factor), unless that column is empty.
+    /// Finds the constants of some owned points from sums over their whole families, by column, and their
+    /// [truncation factors](Law::truncation_factor), unless that column over all points is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
+        points: Range<usize>,
         model: &Model<D>,
         blocks: &[BlockLaws],
         sums: &[Vec<f64>],
         truncation_factors: &mut [f64],
     ) {
-        for point in 0..model.owned() {
+        for (k, point) in points.enumerate() {
             let law = blocks[usize::from(model.block[point])].law;
             let count = law.counts::<D>();
             let mut own = [0.0; MOST.reference_sum];
             for (own, column) in own.iter_mut().zip(sums) {
-                *own = column[point];
+                *own = column[k];
             }
             if let Some(truncation_factor) = truncation_factors.get_mut(point) {
                 *truncation_factor = Law::<D>::truncation_factor(&law, &own[..count.reference_sum]);

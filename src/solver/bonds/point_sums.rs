@@ -75,6 +75,8 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
 pub struct FamilySum<const D: usize> {
     /// The law of point i.
     pub law: AnyLaw,
+    /// How many sums it has.
+    pub count: usize,
 }
 
 impl<const D: usize> Kernel<D> for FamilySum<D> {
@@ -108,7 +110,7 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
             group.intact
         };
         let share = self.law.reference_contribution(&group.bond);
-        for k in 0..Self::Sums::COUNT {
+        for k in 0..self.count {
             let share = share.get(k) * group.volume * group.weights.own();
             *sums.get_mut(k) += simd.keep(share, counted);
         }

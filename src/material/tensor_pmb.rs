@@ -1,0 +1,244 @@
+//! Prototype microelastic material whose elastic tensor is that of the solid at every point, as far as its own family allows.
+//!
+//! The micromodulus of an end is c n·H n with the direction n of the bond and a symmetric tensor H of its point. The
+//! elastic tensor of a family, ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ, is compared with that of bond-based solids,
+//! μ (δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc), μ = 2 W₁/(d (d + 2)) with the energy density W₁ at unit isotropic stretch; H is the
+//! least-squares fit over all components. Nothing depends on the axes. In a whole family H is nearly I; near a surface it is
+//! larger across the surface than along it.
+//!
+//! A bond has the mean of its ends' micromoduli, c_ij(n), and breaks at s_c √(c/c_ij), which keeps the energy that it takes.
+//! The surface corrections of Oterkus (2010) and Madenci & Oterkus (2014, ch. 4), which fit the energies along three axes with an
+//! ellipsoid, are the model; Le & Bobaru (2018) compare others.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
+
+use super::bond::Weights;
+use super::symmetric::{Symmetric, mixed, to_entries};
+use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb};
+use crate::lanes::{LaneTuple, Lanes, Simd};
+
+/// Smallest eigenvalue of H: bodies of two or three points across would have bonds that push when they are pulled.
+const SMALLEST: f64 = 0.2;
+
+/// Share of the largest singular value below which a component of H is left at its smallest norm.
+const RANK: f64 = 1e-10;
+
+/// Number of monomials of degree 6 in three variables.
+const MONOMIALS: usize = 28;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TensorPmb {
+    /// Micromodulus c of a whole family, N/m⁶.
+    micromodulus: f64,
+    /// Shear modulus μ of the solid, Pa.
+    shear_modulus: f64,
+    /// The critical stretch of the damage law belongs to the micromodulus, and is scaled with it.
+    is_scaled: bool,
+}
+
+impl TensorPmb {
+    /// From what a body has.
+    pub(super) fn of(given: &Given) -> Self {
+        let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
+        let d = given.dimension.count() as f64;
+        Self {
+            micromodulus: Pmb::of(given).micromodulus,
+            shear_modulus: 2.0 * energy / (d * (d + 2.0)),
+            is_scaled: given.from_fracture_energy,
+        }
+    }
+}
+
+/// It has no name of its own: `pmb` is this law with `surface_correction = "tensor"`.
+impl Declared for TensorPmb {
+    const DECLARATIONS: &'static [Declaration] = &[];
+}
+
+impl Described for TensorPmb {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        let value = format!(
+            "{:.4e} N/m⁶ inside, by direction at surfaces",
+            self.micromodulus
+        );
+        vec![("micromodulus", value)]
+    }
+}
+
+/// n·H n.
+#[inline(always)]
+fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
+    let xi = &bond.reference;
+    let mut sum = diagonal[0] * (xi[0] * xi[0]);
+    for d in 1..D {
+        sum += diagonal[d] * (xi[d] * xi[d]);
+    }
+    for (k, (a, b)) in mixed::<D>().enumerate() {
+        sum += others[k] * (xi[a] * xi[b] * 2.0);
+    }
+    sum * (bond.inverse * bond.inverse)
+}
+
+/// Exponents of x, y and z in the monomials of a degree, in the order in which they are summed.
+fn exponents(degree: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..=degree).flat_map(move |z| (0..=degree - z).map(move |y| [degree - z - y, y, z]))
+}
+
+/// How many components of a symmetric tensor have the same exponents.
+fn multiplicity(exponents: [usize; 3]) -> f64 {
+    let factorial = |n: usize| (1..=n).product::<usize>();
+    let all = factorial(exponents.iter().sum());
+    (all / exponents.map(factorial).iter().product::<usize>()) as f64
+}
+
+/// A component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc by its exponents.
+fn isotropic(exponents: [usize; 3]) -> f64 {
+    let odd = exponents.iter().any(|exponent| exponent % 2 == 1);
+    match exponents.iter().max() {
+        _ if odd => 0.0,
+        Some(4) => 3.0,
+        _ => 1.0,
+    }
+}
+
+/// H of a point in `D` dimensions: the least-squares solution of ½ c Σ |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = μ (…). `sums` are
+/// Σ |ξ| Ṽ times the monomials of degree 6 of n.
+fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> SMatrix<f64, D, D> {
+    let place = |wanted: [usize; 3]| {
+        exponents(6)
+            .position(|one| one == wanted)
+            .expect("a monomial")
+    };
+    let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
+    let rows: Vec<_> = exponents(4).filter(exists).collect();
+    let columns: Vec<_> = exponents(2).filter(exists).collect();
+    // Rows are weighted by the number of components that they stand for, so that the fit does not depend on the axes; so are
+    // the columns, and the solution of the smallest norm does not either.
+    let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
+        let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
+        let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();
+        0.5 * micromodulus * sums[place(both)] * weight
+    });
+    let wanted = DVector::from_fn(rows.len(), |r, _| {
+        shear_modulus * isotropic(rows[r]) * multiplicity(rows[r]).sqrt()
+    });
+    let decomposition = matrix.svd(true, true);
+    let limit = RANK * decomposition.singular_values.max();
+    let Ok(solution) = decomposition.solve(&wanted, limit) else {
+        return SMatrix::zeros();
+    };
+    let mut tensor = SMatrix::zeros();
+    for (column, value) in columns.iter().zip(solution.iter()) {
+        let entry = value / multiplicity(*column).sqrt();
+        let mut axes = (0..D).flat_map(|d| std::iter::repeat_n(d, column[d]));
+        let (a, b) = axes.next().zip(axes.next()).expect("two axes");
+        (tensor[(a, b)], tensor[(b, a)]) = (entry, entry);
+    }
+    tensor
+}
+
+/// With eigenvalues of at least [`SMALLEST`].
+fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let whole = DMatrix::from_fn(D, D, |a, b| tensor[(a, b)]);
+    let SymmetricEigen {
+        eigenvectors,
+        eigenvalues,
+    } = SymmetricEigen::new(whole);
+    if eigenvalues.iter().all(|value| *value >= SMALLEST) {
+        return tensor;
+    }
+    SMatrix::from_fn(|a, b| {
+        let each = eigenvalues.iter().enumerate();
+        each.map(|(k, value)| eigenvectors[(a, k)] * value.max(SMALLEST) * eigenvectors[(b, k)])
+            .sum()
+    })
+}
+
+impl<const D: usize> Law<D> for TensorPmb {
+    /// ½ c H, N/m⁶.
+    type Point = Symmetric<D>;
+    type BondHistory = [Lanes; 0];
+    /// Σ |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
+    type ReferenceSum = [Lanes; MONOMIALS];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+    const CONSTANTS: usize = 2 * D;
+    const SCALED: bool = true;
+
+    #[inline(always)]
+    fn reference_contribution(&self, bond: &Bond<D>) -> [Lanes; MONOMIALS] {
+        let mut sums = [Lanes::splat(0.0); MONOMIALS];
+        for (sum, exponents) in sums.iter_mut().zip(exponents(6)) {
+            if exponents[D..].iter().any(|exponent| *exponent > 0) {
+                continue;
+            }
+            *sum = bond.length;
+            for d in 0..D {
+                for _ in 0..exponents[d] {
+                    *sum = *sum * (bond.reference[d] * bond.inverse);
+                }
+            }
+        }
+        sums
+    }
+
+    fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
+        let tensor = fit::<D>(sums, self.micromodulus, self.shear_modulus);
+        let micromoduli = limited(tensor) * (0.5 * self.micromodulus);
+        to_entries(&micromoduli, numbers);
+    }
+
+    #[inline(always)]
+    fn force(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
+        Along(bond.extension_over_deformed * (bond.inverse * along(bond, end)))
+    }
+
+    #[inline(always)]
+    fn bond_force<S: Simd>(
+        _: S,
+        _: &[Self; 2],
+        bond: &Bond<D>,
+        [i, j]: [&Symmetric<D>; 2],
+        _: &[[Lanes; 0]; 2],
+        weights: Weights,
+    ) -> Along {
+        let diagonal = LaneTuple::each(|d| weights.sum(i.0[d], j.0[d]));
+        let others = LaneTuple::each(|d| weights.sum(i.1[d], j.1[d]));
+        let micromodulus = along(bond, &(diagonal, others));
+        Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Lanes {
+        bond.stretch * bond.stretch * bond.length * along(bond, end) * 0.5
+    }
+
+    /// With the largest sum over a row of H, which no eigenvalue exceeds.
+    #[inline(always)]
+    fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
+        let mut rows = *diagonal;
+        for (k, (a, b)) in mixed::<D>().enumerate() {
+            rows[a] += others[k].abs();
+            rows[b] += others[k].abs();
+        }
+        let largest = rows
+            .iter()
+            .fold(Lanes::splat(0.0), |most, row| most.max(*row));
+        largest / length
+    }
+
+    #[inline(always)]
+    fn toughness_scale(
+        &self,
+        bond: &Bond<D>,
+        [here, there]: [&Symmetric<D>; 2],
+        other: &Self,
+    ) -> Lanes {
+        if !self.is_scaled || !other.is_scaled {
+            return Lanes::splat(1.0);
+        }
+        let micromodulus = along(bond, here) + along(bond, there);
+        let whole = 0.5 * (self.micromodulus + other.micromodulus);
+        (Lanes::splat(whole) / micromodulus).sqrt()
+    }
+}
