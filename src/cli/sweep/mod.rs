@@ -28,8 +28,8 @@ use value::{Column, Reference};
 Examples:
   fissure sweep plate.toml --set tension=18e6,20e6,22e6 --value max:fracture_energy
   fissure sweep plate.toml --set dx=2e-3,1e-3,0.5e-3 --value last:strain_energy --reference 1.25e-3
-  fissure sweep plate.toml --set dx=2e-3,1e-3 --set m=3,4 --jobs 4 --threads 1      four runs
-  fissure sweep plate.toml --set dx=2e-3,1e-3 --set m=3,6 --zip                     two runs
+  fissure sweep plate.toml --set dx=2e-3,1e-3 --set time.safety=0.8,0.4 --jobs 4 --threads 1
+  fissure sweep plate.toml --set dx=2e-3,1e-3 --set 'grid.horizon=3*dx,6*dx' --zip
   fissure sweep plate.toml --set dx=2e-3,1e-3 --launcher 'mpirun -n 4 --bind-to none'
   fissure sweep plate.toml --set dx=2e-3,1e-3 --rows $SLURM_ARRAY_TASK_ID           in a job array
 
