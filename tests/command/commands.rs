@@ -249,6 +249,26 @@ fn a_point_file_that_is_not_there() {
 }
 
 #[test]
+fn check_lists_contact_and_rigid_bodies() {
+    let deck = "tests/decks/good/pressed.toml";
+    let printed = succeed(fissure(1).args(["check", deck]));
+    for (heading, line) in [
+        ("contact", "penalty, friction 0 (static 0), restitution 0.5"),
+        (
+            "rigid bodies",
+            "half space, at [0.0000e0, 8.0000e0] m, driven, friction 0",
+        ),
+        ("body upper", "Weibull modulus"),
+    ] {
+        let section = printed.split(&format!("\n{heading}\n")).nth(1);
+        assert!(
+            section.is_some_and(|text| text.contains(line)),
+            "{heading}: {printed}"
+        );
+    }
+}
+
+#[test]
 fn the_benchmark_counts_what_it_does() {
     let figure = |json: &str, name: &str| -> f64 {
         let figures: serde_json::Value = serde_json::from_str(json).unwrap();
