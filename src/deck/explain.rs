@@ -79,7 +79,7 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         }
     }
     let time = deck.time.get_mut();
-    if problem.relaxes() {
+    if problem.is_quasi_static() {
         let default = || Spanned::new(0..0, Relaxation::default());
         time.relaxation.get_or_insert_with(default);
     }

@@ -66,6 +66,24 @@ pub enum Method {
     Relaxation(Relaxation),
 }
 
+impl Method {
+    /// Its name in a deck.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Explicit => "explicit",
+            Self::Relaxation(_) => "relaxation",
+        }
+    }
+
+    /// The number of load steps, if it finds equilibria.
+    pub fn load_steps(&self) -> Option<u64> {
+        match self {
+            Self::Explicit => None,
+            Self::Relaxation(rule) => Some(rule.load_steps),
+        }
+    }
+}
+
 /// How equilibria are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relaxation {
@@ -102,10 +120,10 @@ impl Problem {
         stages
     }
 
-    /// Whether any stage of the run is a relaxation.
-    pub fn relaxes(&self) -> bool {
+    /// Whether any stage of the run is a sequence of equilibria.
+    pub fn is_quasi_static(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
-        stages.any(|stage| stage.time.is_relaxation())
+        stages.any(|stage| stage.time.is_quasi_static())
     }
 
     /// Whether the step of any stage follows the number of bonds that break in it.
@@ -128,15 +146,15 @@ impl Problem {
 }
 
 impl Time {
-    /// Whether the method is relaxation.
-    pub fn is_relaxation(&self) -> bool {
-        matches!(self.method, Method::Relaxation(_))
+    /// Whether the method finds a sequence of equilibria.
+    pub fn is_quasi_static(&self) -> bool {
+        self.method.load_steps().is_some()
     }
 }
 
 /// Whether two stages in a row follow the equation of motion with different density scales.
 pub(crate) fn changes_density_scale(pair: &[Stage]) -> bool {
     let [before, after] = [&pair[0].time, &pair[1].time];
-    let moves = !before.is_relaxation() && !after.is_relaxation();
+    let moves = !before.is_quasi_static() && !after.is_quasi_static();
     moves && before.density_scale != after.density_scale
 }

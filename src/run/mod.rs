@@ -266,7 +266,7 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        let mut energy = (!self.problem.relaxes()).then(|| EnergyWatch::new(simulation));
+        let mut energy = (!self.problem.is_quasi_static()).then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {
             if stepper.is_refinement_due()
                 && let Some(regridded) = stepper.at_full_step().refine()?

@@ -7,7 +7,7 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, Time};
+use crate::problem::{Action, Condition, Initial, Problem, Stage, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
@@ -19,6 +19,7 @@ use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
 use super::motion::fields::{Needs, plastic_columns};
+use super::motion::integrator::{Integrator, integrator};
 use super::motion::relaxation::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
@@ -67,7 +68,9 @@ pub struct Simulation<'a, const D: usize> {
     pub stable_step: f64,
     /// Time and step of the present stage.
     pub clock: Clock,
-    /// How far the load step has come; settled without relaxation.
+    /// The method of the present stage; taken out while it advances.
+    pub(super) integrator: Option<Box<dyn Integrator<D>>>,
+    /// How far the load step has come; settled where there are none.
     pub load_step: LoadStep,
     /// What an adaptive step follows.
     pub step_control: StepControl,
@@ -201,7 +204,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             loads: all().any(Conditions::have_loads),
             supports: all().any(Conditions::have_supports),
             damping: model.damping.iter().any(|rate| *rate > 0.0),
-            relaxation: problem.relaxes(),
+            equilibria: problem.is_quasi_static(),
             damage: problem.bodies.iter().any(|body| body.damage.is_some()),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
@@ -228,6 +231,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             contact,
             conditions: waiting[0].take().unwrap_or_default(),
             waiting,
+            integrator: Some(integrator(&stages[0].time)),
             stages,
             stage: 0,
             steps,
@@ -254,10 +258,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
     fn begin(&mut self) {
         self.apply_displacements(0.0, 0.0);
         self.apply_loads(0.0, true);
-        self.evaluate(match self.time_rule().method {
-            Method::Explicit => BondUpdate::Step(0.0),
+        self.evaluate(if self.is_quasi_static() {
             // This is no equilibrium.
-            Method::Relaxation(_) => BondUpdate::None,
+            BondUpdate::None
+        } else {
+            BondUpdate::Step(0.0)
         });
         self.apply_velocities();
         self.update_damping_power();
@@ -285,27 +290,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
-        let Time {
-            method, adaptive, ..
-        } = self.time_rule();
-        match (method, adaptive) {
-            (Method::Explicit, None) => {
-                if let Some(step) = self.step_for_contact() {
-                    self.clock.set_step(step);
-                }
-                self.make_step(half_kick_pending);
-                self.count_calm_steps();
-                true
-            }
-            (Method::Explicit, Some(rule)) => {
-                self.make_adaptive_step(&rule);
-                false
-            }
-            (Method::Relaxation(rule), _) => {
-                self.relax(&rule);
-                false
-            }
-        }
+        // Taken out while it advances the simulation.
+        let mut integrator = (self.integrator.take()).expect("each stage has an integrator");
+        let is_pending = integrator.advance(self, half_kick_pending);
+        self.integrator = Some(integrator);
+        is_pending
     }
 
     /// Makes the second half kick of the present step.
@@ -447,14 +436,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
-        match self.time_rule().method {
-            Method::Explicit => {
-                self.conditions
-                    .set_guidance(self.clock.time(), self.clock.step());
-                self.walk(|part, here| here.apply_velocities(part))
-            }
-            Method::Relaxation(_) => self.walk(|part, here| here.project_residual(part)),
+        if self.is_quasi_static() {
+            return self.walk(|part, here| here.project_residual(part));
         }
+        self.conditions
+            .set_guidance(self.clock.time(), self.clock.step());
+        self.walk(|part, here| here.apply_velocities(part))
     }
 
     /// Finds the power of damping at the present velocities.

@@ -207,7 +207,7 @@ fn saved_width(problem: &Problem) -> usize {
         .bodies
         .iter()
         .any(|body| body.material.damping > 0.0);
-    let relaxed = if problem.relaxes() {
+    let relaxed = if problem.is_quasi_static() {
         2 * dimension + supported
     } else {
         0

@@ -315,8 +315,8 @@ pub struct Needs {
     pub supports: bool,
     /// Whether there is viscous damping.
     pub damping: bool,
-    /// Whether there is relaxation.
-    pub relaxation: bool,
+    /// Whether there are equilibria.
+    pub equilibria: bool,
     /// Whether bonds can break.
     pub damage: bool,
     /// Whether points keep a plastic state.
@@ -397,10 +397,10 @@ impl<const D: usize> Fields<D> {
             contact_energy: needs.contact.then(scalar),
             friction_energy: needs.contact.then(scalar),
             contact_damping_energy: needs.contact.then(scalar),
-            relaxation_velocity: needs.relaxation.then(|| vector(owned)),
-            equilibrium_displacement: needs.relaxation.then(|| vector(owned)),
-            equilibrium_reaction: (needs.relaxation && needs.supports).then(|| vector(owned)),
-            fictitious_density: needs.relaxation.then(scalar),
+            relaxation_velocity: needs.equilibria.then(|| vector(owned)),
+            equilibrium_displacement: needs.equilibria.then(|| vector(owned)),
+            equilibrium_reaction: (needs.equilibria && needs.supports).then(|| vector(owned)),
+            fictitious_density: needs.equilibria.then(scalar),
             last_seen: needs.coarsening.then(scalar),
             damped_energy: needs.damping.then(scalar),
         }

@@ -4,6 +4,7 @@ pub mod adaptive;
 pub mod clock;
 mod contact_step;
 pub mod fields;
+pub mod integrator;
 mod pieces;
 pub mod relaxation;
 pub mod saved;

@@ -40,7 +40,18 @@ use crate::solver::conditions::Work;
 use crate::solver::model::Model;
 
 use super::Fields;
+use super::integrator::Integrator;
 use super::stable_step::largest_eigenvalue;
+
+/// Damped iterations towards each equilibrium.
+pub struct DynamicRelaxation(pub Relaxation);
+
+impl<const D: usize> Integrator<D> for DynamicRelaxation {
+    fn advance(&mut self, simulation: &mut Simulation<'_, D>, _half_kick_pending: bool) -> bool {
+        simulation.relax(&self.0);
+        false
+    }
+}
 
 /// Points handled by one task.
 const CHUNK: usize = 4096;
@@ -182,7 +193,7 @@ struct Before {
 impl<const D: usize> Simulation<'_, D> {
     /// Makes an iteration towards the equilibrium of this load step, or, if that is found, begins the next
     /// one. Collective.
-    pub(in crate::solver) fn relax(&mut self, rule: &Relaxation) {
+    fn relax(&mut self, rule: &Relaxation) {
         let (start, forces) = (Instant::now(), self.times.forces.whole());
         let before = if self.load_step.is_settled {
             self.begin_load_step();

@@ -97,7 +97,7 @@ impl HistoryObserver {
         columns.add("energy_error", "J", |now| now.energies.error);
         columns.add("broken_bonds", "1", |now| now.broken as f64);
         columns.add("cracked_points", "1", |now| now.cracked_points as f64);
-        if problem.relaxes() {
+        if problem.is_quasi_static() {
             columns.add("residual", "1", |now| now.load_step.residual);
             columns.add("iterations", "1", |now| now.load_step.iterations as f64);
         }

@@ -75,7 +75,7 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(trigger) = &refinement.trigger else {
         return Ok(());
     };
-    let other = if problem.relaxes() {
+    let other = if problem.is_quasi_static() {
         "method = \"relaxation\""
     } else if problem.adapts() {
         "an adaptive step"
