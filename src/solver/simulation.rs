@@ -20,7 +20,7 @@ use super::model::Model;
 use super::motion::adaptive::StepControl;
 use super::motion::fields::{Needs, plastic_columns};
 use super::motion::integrator::{Integrator, integrator};
-use super::motion::relaxation::{LoadStep, fictitious_density};
+use super::motion::load_step::{LoadStep, fictitious_density};
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};

@@ -5,6 +5,7 @@ pub mod clock;
 mod contact_step;
 pub mod fields;
 pub mod integrator;
+pub mod load_step;
 mod pieces;
 pub mod relaxation;
 pub mod saved;

@@ -10,7 +10,7 @@ use crate::solver::refinement::Refined;
 
 use super::Clock;
 use super::adaptive::StepControl;
-use super::relaxation::LoadStep;
+use super::load_step::LoadStep;
 
 /// The state of the points of this rank's block of ids.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::solver::contact::ContactNow;
 use crate::solver::motion::Clock;
-use crate::solver::motion::relaxation::LoadStep;
+use crate::solver::motion::load_step::LoadStep;
 
 use super::fragments::Fragments;
 use super::history::Energies;
