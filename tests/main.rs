@@ -34,6 +34,7 @@ mod physics {
     mod contact;
     mod dynamics;
     mod impact;
+    mod newton;
     mod refinement;
     mod relaxation;
     mod stable_step;

@@ -373,12 +373,21 @@ pub fn run_time(
             format_args!("about {whole} for the steps, {on}"),
         );
     }
-    if problem.is_quasi_static() {
-        let iteration = duration(seconds);
+    let evaluation = duration(seconds);
+    if problem.has_relaxation() {
         report.line(
             "run time",
             format_args!(
-                "about {iteration} for an iteration, {on}; a load step takes some hundreds to ten thousands"
+                "about {evaluation} for an iteration, {on}; a load step takes some hundreds to ten thousands"
+            ),
+        );
+    }
+    if problem.has_newton() {
+        report.line(
+            "run time",
+            format_args!(
+                "about {evaluation} for a force evaluation, {on}; a load step of `static` takes some tens to hundreds, more \
+                 while bonds break"
             ),
         );
     }

@@ -99,7 +99,7 @@ pub fn contact(
     Ok(Some(contact))
 }
 
-/// An error if a run with contact is a relaxation or refines its grid.
+/// An error if a run with contact finds equilibria or refines its grid.
 fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     let refinement = deck.refinement.as_ref();
     if let Some(trigger) = refinement.and_then(|table| table.get_ref().trigger.as_ref()) {
@@ -112,9 +112,9 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     let of_stages =
         of_stages.filter_map(|stage| Some(("[[stage]]", stage.get_ref().method.as_ref()?)));
     for (section, method) in std::iter::once(of_time).chain(of_stages) {
-        if *method.get_ref() == grammar::Method::Relaxation {
+        if method.get_ref().is_quasi_static() {
             let message = format!(
-                "{section} method: contact is not available in a relaxation; use \"explicit\", or remove [contact] and [rigid]"
+                "{section} method: contact is not available in a sequence of equilibria; use \"explicit\", or remove [contact] and [rigid]"
             );
             return Err(scope.error(method.span(), message));
         }

@@ -64,6 +64,21 @@ pub enum Method {
     Explicit,
     /// From one equilibrium to the next; t is the load parameter, and [`Time::step`] is not used.
     Relaxation(Relaxation),
+    /// As [`Method::Relaxation`], by Newton's method.
+    Static(Static),
+}
+
+/// How Newton's method finds equilibria.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Static {
+    /// Number of load steps.
+    pub load_steps: u64,
+    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    pub tolerance: f64,
+    /// The most iterations of a load step without a bond that breaks.
+    pub max_iterations: u64,
+    /// How often a load step may be halved.
+    pub max_halvings: u64,
 }
 
 impl Method {
@@ -72,6 +87,17 @@ impl Method {
         match self {
             Self::Explicit => "explicit",
             Self::Relaxation(_) => "relaxation",
+            Self::Static(_) => "static",
+        }
+    }
+
+    /// What to change in a deck where it finds no equilibrium.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Static(_) => {
+                "give [time.static] more `load_steps`, `max_iterations` or `max_halvings`"
+            }
+            Self::Explicit | Self::Relaxation(_) => "give [time.relaxation] more `iterations`",
         }
     }
 
@@ -80,6 +106,7 @@ impl Method {
         match self {
             Self::Explicit => None,
             Self::Relaxation(rule) => Some(rule.load_steps),
+            Self::Static(rule) => Some(rule.load_steps),
         }
     }
 }
@@ -124,6 +151,18 @@ impl Problem {
     pub fn is_quasi_static(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.is_quasi_static())
+    }
+
+    /// Whether any stage of the run is a relaxation.
+    pub fn has_relaxation(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| matches!(stage.time.method, Method::Relaxation(_)))
+    }
+
+    /// Whether Newton's method finds the equilibria of any stage.
+    pub fn has_newton(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| matches!(stage.time.method, Method::Static(_)))
     }
 
     /// Whether the step of any stage follows the number of bonds that break in it.

@@ -21,6 +21,7 @@ use super::motion::adaptive::StepControl;
 use super::motion::fields::{Needs, plastic_columns};
 use super::motion::integrator::{Integrator, integrator};
 use super::motion::load_step::{LoadStep, fictitious_density};
+use super::motion::newton::NewtonState;
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
@@ -72,6 +73,8 @@ pub struct Simulation<'a, const D: usize> {
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
     /// How far the load step has come; settled where there are none.
     pub load_step: LoadStep,
+    /// What Newton's method remembers.
+    pub newton: NewtonState,
     /// What an adaptive step follows.
     pub step_control: StepControl,
     /// What the run was before the present step; empty where steps are not undone.
@@ -205,6 +208,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             supports: all().any(Conditions::have_supports),
             damping: model.damping.iter().any(|rate| *rate > 0.0),
             equilibria: problem.is_quasi_static(),
+            relaxation: problem.has_relaxation(),
             damage: problem.bodies.iter().any(|body| body.damage.is_some()),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
@@ -241,6 +245,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             stable_step: stable,
             clock,
             load_step: LoadStep::default(),
+            newton: NewtonState::default(),
             step_control: StepControl::default(),
             kept: Kept::default(),
             grids: refined,
@@ -290,10 +295,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
+        if self.load_step.is_settled {
+            self.newton.evaluations = 0;
+        }
+        let evaluations = self.times.evaluations;
         // Taken out while it advances the simulation.
         let mut integrator = (self.integrator.take()).expect("each stage has an integrator");
         let is_pending = integrator.advance(self, half_kick_pending);
         self.integrator = Some(integrator);
+        self.newton.evaluations += self.times.evaluations - evaluations;
         is_pending
     }
 

@@ -4,6 +4,7 @@ use crate::problem::{Method, Time};
 use crate::solver::Simulation;
 
 use super::adaptive::AdaptiveVerlet;
+use super::newton::NewtonKrylov;
 use super::relaxation::DynamicRelaxation;
 use super::verlet::Verlet;
 
@@ -20,5 +21,6 @@ pub fn integrator<const D: usize>(time: &Time) -> Box<dyn Integrator<D>> {
         (Method::Explicit, None) => Box::new(Verlet),
         (Method::Explicit, Some(rule)) => Box::new(AdaptiveVerlet(rule)),
         (Method::Relaxation(rule), _) => Box::new(DynamicRelaxation(rule)),
+        (Method::Static(rule), _) => Box::new(NewtonKrylov::new(rule)),
     }
 }

@@ -14,9 +14,8 @@
 
 use rayon::prelude::*;
 
-use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
-use crate::comm::total;
+use crate::comm::{ExactSum, Found, least, total};
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
 use crate::solver::bonds::BondUpdate;
@@ -74,29 +73,6 @@ impl Default for LoadStep {
 }
 
 impl LoadStep {
-    /// An error if no equilibrium has been found at a time (s).
-    ///
-    /// # Errors
-    /// Says how near it came.
-    pub fn outcome(&self, time: f64) -> Result<()> {
-        if !self.has_failed {
-            return Ok(());
-        }
-        let balance = if self.residual.is_finite() {
-            let residual = self.residual;
-            format!(
-                "are still {residual:.1e} of loads and reactions. More load than the body bears?"
-            )
-        } else {
-            "are more than round-off, without loads and reactions.".to_owned()
-        };
-        Err(Error::run(format!(
-            "{}; the forces out of balance {balance} Otherwise give [time.relaxation] more `iterations` or a \
-             larger `tolerance`",
-            self.failure(time)
-        )))
-    }
-
     /// What has failed at a time (s).
     fn failure(&self, time: f64) -> String {
         let iterations = self.since_breaking;
@@ -233,6 +209,18 @@ impl<const D: usize> Simulation<'_, D> {
         self.apply_velocities();
     }
 
+    /// Find the residual. Returns ‖f‖, N. Collective.
+    pub(super) fn find_residual(&mut self) -> f64 {
+        let (model, fields) = (&self.model, &self.fields);
+        let mut squares = sums(model, fields, |point, density| {
+            balance(model, fields, point, density)
+        });
+        let squares = reduce(self.comm, &mut squares);
+        let squares = std::array::from_fn(|k| squares[k]);
+        self.load_step.set_residual(squares);
+        f64::sqrt(squares[0])
+    }
+
     /// The time by which the history of bonds advances at the next equilibrium (s): once in a load step, however often
     /// bonds break.
     fn time_to_advance(&self) -> f64 {
@@ -294,12 +282,65 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// Names a piece that loads act on and nothing holds, if there is one, else says how near it came.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
-        let time = self.clock.time();
-        if self.load_step.has_failed {
-            let failure = self.load_step.failure(time);
-            self.check_pieces_are_held(&failure)?;
+        if !self.load_step.has_failed {
+            return Ok(());
         }
-        self.load_step.outcome(time)
+        let mut failure = self.load_step.failure(self.clock.time());
+        if self.newton.halvings > 0 {
+            failure += &format!(", the load step halved {} times", self.newton.halvings);
+        }
+        self.check_pieces_are_held(&failure)?;
+        let residual = self.load_step.residual;
+        let balance = if residual.is_finite() {
+            let worst = self.worst_point();
+            format!(
+                "are still {residual:.1e} of loads and reactions{worst}. More load than the body bears?"
+            )
+        } else {
+            "are more than round-off, without loads and reactions.".to_owned()
+        };
+        Err(Error::run(format!(
+            "{failure}; the forces out of balance {balance} Otherwise {} or a larger `tolerance`",
+            self.time_rule().method.remedy()
+        )))
+    }
+
+    /// Where the largest force out of balance acts, as words. Collective.
+    fn worst_point(&self) -> String {
+        let (model, fields) = (&self.model, &self.fields);
+        let density = fields.fictitious_density.as_deref().unwrap_or_default();
+        let force = |point: usize| {
+            let square = |d: usize| fields.total_force(model, d, point).powi(2);
+            model.volume[point] * (0..D).map(square).sum::<f64>().sqrt()
+        };
+        let bonded = (0..model.owned()).filter(|point| density[*point].is_finite());
+        let own = bonded.map(|point| (point, force(point)));
+        let order = |(a, of_a): &(usize, f64), (b, of_b): &(usize, f64)| {
+            let ids = model.ids[*b].cmp(&model.ids[*a]);
+            of_a.total_cmp(of_b).then(ids)
+        };
+        let own = own.max_by(order).map(|(point, force)| {
+            let [x, y, z] = model.position(point);
+            Found {
+                key: -force,
+                ids: [model.ids[point]],
+                payload: [f64::from(model.block[point]), x, y, z],
+            }
+        });
+        let Some(Found {
+            key,
+            ids: [id],
+            payload: [block, position @ ..],
+        }) = least(self.comm, own)
+        else {
+            return String::new();
+        };
+        format!(
+            ", most of them {:.1e} N at point {id} of body `{}`, {:?} m",
+            -key,
+            self.problem.block(block as usize).body.name,
+            &position[..D]
+        )
     }
 
     /// Add the work of loads and supports since the last load step, which ended in equilibrium.

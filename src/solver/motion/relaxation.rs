@@ -157,7 +157,8 @@ impl<const D: usize> Simulation<'_, D> {
         let mut all = [power, old, inertia, free, loads, reactions, stiffness];
         let all = reduce(self.comm, &mut all);
         let [power, old, inertia] = [all[0], all[1], all[2]];
-        self.load_step.set_residual([all[3], all[4], all[5], all[6]]);
+        self.load_step
+            .set_residual([all[3], all[4], all[5], all[6]]);
         if inertia > 0.0 {
             let quotient = ((old - power) / inertia).max(0.0);
             self.load_step.damping = (2.0 * quotient.sqrt()).min(MOST_DAMPING);

@@ -101,6 +101,10 @@ impl HistoryObserver {
             columns.add("residual", "1", |now| now.load_step.residual);
             columns.add("iterations", "1", |now| now.load_step.iterations as f64);
         }
+        if problem.has_newton() {
+            let evaluations = |now: &GlobalState| now.force_evaluations as f64;
+            columns.add("force_evaluations", "1", evaluations);
+        }
         if problem.adapts() {
             columns.add("time_step", "s", |now| now.clock.step());
             columns.add("undone_steps", "1", |now| now.undone_steps as f64);
@@ -387,6 +391,7 @@ impl HistoryObserver {
             cracked_extent: [lower, upper],
             singular_points,
             load_step: simulation.load_step,
+            force_evaluations: simulation.newton.evaluations,
             undone_steps: simulation.step_control.undone,
             most_broken,
             density_scale_energy: simulation.density_scale_energy,
