@@ -37,6 +37,7 @@ mod physics {
     mod contact;
     mod dynamics;
     mod impact;
+    mod newton;
     mod pressed;
     mod refinement;
     mod relaxation;

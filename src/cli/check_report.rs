@@ -352,7 +352,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     let stages = problem.all_stages();
     if let ([stage], [(step, steps)]) = (&stages[..], steps) {
         let steps = count(*steps as u64);
-        if stage.time.is_relaxation() {
+        if stage.time.is_quasi_static() {
             report.line("load steps", steps);
         } else {
             report.line(
@@ -365,7 +365,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     }
     for (number, (stage, (step, steps))) in (1..).zip(stages.iter().zip(steps)) {
         let steps = count(*steps as u64);
-        let words = if stage.time.is_relaxation() {
+        let words = if stage.time.is_quasi_static() {
             format!("{steps} load steps")
         } else {
             let (step, largest) = (si(*step, "s"), largest_step(&stage.time, *step));
@@ -406,7 +406,7 @@ pub fn run_time(
     let seconds = seconds / f64::from(ranks);
     let stages = problem.all_stages();
     let explicit = stages.iter().zip(steps);
-    let explicit = explicit.filter(|(stage, _)| !stage.time.is_relaxation());
+    let explicit = explicit.filter(|(stage, _)| !stage.time.is_quasi_static());
     let explicit: f64 = explicit.map(|(_, (_, steps))| steps).sum();
     if explicit > 0.0 {
         let whole = duration(seconds * explicit);
@@ -415,12 +415,21 @@ pub fn run_time(
             format_args!("about {whole} for the steps, {on}"),
         );
     }
-    if problem.relaxes() {
-        let iteration = duration(seconds);
+    let evaluation = duration(seconds);
+    if problem.has_relaxation() {
         report.line(
             "run time",
             format_args!(
-                "about {iteration} for an iteration, {on}; a load step takes some hundreds to ten thousands"
+                "about {evaluation} for an iteration, {on}; a load step takes some hundreds to ten thousands"
+            ),
+        );
+    }
+    if problem.has_newton() {
+        report.line(
+            "run time",
+            format_args!(
+                "about {evaluation} for a force evaluation, {on}; a load step of `static` takes some tens to hundreds, more \
+                 while bonds break"
             ),
         );
     }

@@ -8,6 +8,7 @@ mod by_id;
 mod file_sync;
 pub mod halo;
 pub mod mpi;
+pub mod rounded_sum;
 pub mod sum;
 pub mod threads;
 

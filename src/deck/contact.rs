@@ -98,13 +98,25 @@ pub fn contact(
     Ok(Some(contact))
 }
 
-/// An error if a run with contact refines its grid.
+/// An error if a run with contact refines its grid, or finds equilibria by Newton's method.
 fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     let refinement = deck.refinement.as_ref();
     if let Some(trigger) = refinement.and_then(|table| table.get_ref().trigger.as_ref()) {
         let message = "[refinement.trigger]: contact is not available on grids that change during the run; refine \
                        regions from the start, or remove [contact] and [rigid]";
         return Err(scope.error(trigger.span(), message));
+    }
+    let of_time = ("[time]", &deck.time.get_ref().method);
+    let of_stages = deck.stage.iter();
+    let of_stages =
+        of_stages.filter_map(|stage| Some(("[[stage]]", stage.get_ref().method.as_ref()?)));
+    for (section, method) in std::iter::once(of_time).chain(of_stages) {
+        if *method.get_ref() == grammar::Method::Static {
+            let message = format!(
+                "{section} method: \"static\" is not available with contact; use \"relaxation\" or \"explicit\", or remove [contact] and [rigid]"
+            );
+            return Err(scope.error(method.span(), message));
+        }
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation,
+    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, Static,
     THERMAL_EXPANSION, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
@@ -80,9 +80,14 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         }
     }
     let time = deck.time.get_mut();
-    if problem.relaxes() {
+    // Newton's method takes load steps and tolerance from the relaxation if it has none.
+    if problem.is_quasi_static() {
         let default = || Spanned::new(0..0, Relaxation::default());
         time.relaxation.get_or_insert_with(default);
+    }
+    if problem.has_newton() {
+        let default = || Spanned::new(0..0, Static::default());
+        time.newton.get_or_insert_with(default);
     }
     let output = deck.output.get_mut();
     fill_interval(

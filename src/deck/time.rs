@@ -11,6 +11,9 @@ use crate::problem::{self, Method, StepRule};
 /// The share by which times that are computed in different ways may differ.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
+/// The most halvings of a load step: then there are a million parts.
+const MOST_HALVINGS: u64 = 20;
+
 /// A stretch of time with the keys of `[time]` or of a stage.
 struct TimeSegment<'a> {
     /// The table, as messages name it.
@@ -23,6 +26,7 @@ struct TimeSegment<'a> {
     safety: &'a Number,
     method: grammar::Method,
     relaxation: Option<&'a Spanned<grammar::Relaxation>>,
+    newton: Option<&'a Spanned<grammar::Static>>,
     density_scale: &'a Number,
     adaptive: Option<&'a Spanned<grammar::Adaptive>>,
 }
@@ -39,15 +43,17 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         [] => vec![method],
         stages => stages.iter().map(|stage| method_of(deck, stage)).collect(),
     };
-    if let (Some(table), false) = (
-        &time.relaxation,
-        methods.contains(&grammar::Method::Relaxation),
-    ) {
+    let mut quasi_static = methods.iter().filter(|method| method.is_quasi_static());
+    if let (Some(table), None) = (&time.relaxation, quasi_static.next()) {
         let message = "[time] relaxation: only `method = \"relaxation\"` has these keys";
         return Err(scope.error(table.span(), message));
     }
-    if methods[0] == grammar::Method::Relaxation {
-        at_rest(scope, deck)?;
+    if let (Some(table), false) = (&time.newton, methods.contains(&grammar::Method::Static)) {
+        let message = "[time] static: only `method = \"static\"` has these keys";
+        return Err(scope.error(table.span(), message));
+    }
+    if methods[0].is_quasi_static() {
+        at_rest(scope, deck, methods[0])?;
     }
     let stretch = TimeSegment {
         key: "[time]",
@@ -62,6 +68,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
             grammar::Method::Explicit
         },
         relaxation: time.relaxation.as_ref(),
+        newton: time.newton.as_ref(),
         density_scale: &time.density_scale,
         adaptive: time.adaptive.as_ref(),
     };
@@ -81,13 +88,18 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
         let is_last = number == deck.stage.len();
         let end = stage_end(scope, table, (start, whole.end), is_last)?;
         let method = method_of(deck, table);
-        let relaxes = method == grammar::Method::Relaxation;
-        if let (Some(table), false) = (&stage.relaxation, relaxes) {
+        let is_explicit = !method.is_quasi_static();
+        if let (Some(table), true) = (&stage.relaxation, is_explicit) {
             let message = "[[stage]] relaxation: only `method = \"relaxation\"` has these keys";
             return Err(scope.error(table.span(), message));
         }
-        let inherited_step = time.step.as_ref().filter(|_| !relaxes);
-        let inherited_rule = time.adaptive.as_ref().filter(|_| !relaxes);
+        let is_newton = method == grammar::Method::Static;
+        if let (Some(table), false) = (&stage.newton, is_newton) {
+            let message = "[[stage]] static: only `method = \"static\"` has these keys";
+            return Err(scope.error(table.span(), message));
+        }
+        let inherited_step = time.step.as_ref().filter(|_| is_explicit);
+        let inherited_rule = time.adaptive.as_ref().filter(|_| is_explicit);
         let stretch = TimeSegment {
             key: "[[stage]]",
             length: end - start,
@@ -96,6 +108,7 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
             safety: stage.safety.as_ref().unwrap_or(&time.safety),
             method,
             relaxation: stage.relaxation.as_ref().or(time.relaxation.as_ref()),
+            newton: stage.newton.as_ref().or(time.newton.as_ref()),
             density_scale: stage.density_scale.as_ref().unwrap_or(&time.density_scale),
             adaptive: stage.adaptive.as_ref().or(inherited_rule),
         };
@@ -186,6 +199,12 @@ impl TimeSegment<'_> {
                 let table = self.relaxation.map(|table| table.get_ref().clone());
                 Method::Relaxation(self.relaxation(scope, &table.unwrap_or_default())?)
             }
+            grammar::Method::Static => {
+                let table = self.newton.map(|table| table.get_ref().clone());
+                let shared = self.relaxation.map(|table| table.get_ref().clone());
+                let (table, shared) = (table.unwrap_or_default(), shared.unwrap_or_default());
+                Method::Static(self.newton(scope, &table, &self.relaxation(scope, &shared)?)?)
+            }
         };
         let adaptive = self.adaptive.map(|table| self.adaptive(scope, table));
         Ok(problem::Time {
@@ -201,8 +220,9 @@ impl TimeSegment<'_> {
     fn step(&self, scope: &Scope, number: &Number) -> Result<f64> {
         let key = format!("{} step", self.key);
         let step = scope.positive(number, &key)?;
-        let words = if self.method == grammar::Method::Relaxation {
-            "relaxation has load steps, `relaxation.load_steps` of them".to_owned()
+        let words = if self.method.is_quasi_static() {
+            let method = self.method.name();
+            format!("{method} has load steps, `{method}.load_steps` of them")
         } else if step > self.length * (1.0 + UP_TO_ROUNDING) {
             let (step, length) = (format_number(step), format_number(self.length));
             let whole = if self.key == "[time]" { "run" } else { "stage" };
@@ -219,8 +239,8 @@ impl TimeSegment<'_> {
         table: &Spanned<grammar::Adaptive>,
     ) -> Result<problem::Adaptive> {
         let key = format!("{} adaptive", self.key);
-        if self.method == grammar::Method::Relaxation {
-            let message = format!("{key}: relaxation has no time steps");
+        if self.method.is_quasi_static() {
+            let message = format!("{key}: {} has no time steps", self.method.name());
             return Err(scope.error(table.span(), message));
         }
         let rule = table.get_ref();
@@ -281,15 +301,45 @@ impl TimeSegment<'_> {
             iterations: table.iterations.get(),
         })
     }
+
+    /// The rule of Newton's method; `shared` has what the table does not say.
+    fn newton(
+        &self,
+        scope: &Scope,
+        table: &grammar::Static,
+        shared: &problem::Relaxation,
+    ) -> Result<problem::Static> {
+        let key = |name: &str| format!("{} static {name}", self.key);
+        let range = f64::MIN_POSITIVE..1.0;
+        let words = "above 0 and below 1";
+        let tolerance = |number| scope.within(number, &key("tolerance"), range, words);
+        let tolerance = table.tolerance.as_ref().map(tolerance).transpose()?;
+        let max_halvings = *table.max_halvings.get_ref();
+        if max_halvings > MOST_HALVINGS {
+            let message = format!(
+                "{}: must be at most {MOST_HALVINGS}, is {max_halvings}",
+                key("max_halvings")
+            );
+            return Err(scope.error(table.max_halvings.span(), message));
+        }
+        Ok(problem::Static {
+            load_steps: table
+                .load_steps
+                .map_or(shared.load_steps, |count| count.get()),
+            tolerance: tolerance.unwrap_or(shared.tolerance),
+            max_iterations: table.max_iterations.get(),
+            max_halvings,
+        })
+    }
 }
 
-/// An error if anything moves at the start.
-fn at_rest(scope: &Scope, deck: &Deck) -> Result<()> {
+/// An error if anything moves at the start of a method that finds equilibria.
+fn at_rest(scope: &Scope, deck: &Deck, method: grammar::Method) -> Result<()> {
     for (name, table) in &deck.initial {
         if let Some(velocity) = &table.get_ref().velocity {
             let message = format!(
-                "[initial.{name}] velocity: the run begins with relaxation, in which nothing has a \
-                 velocity"
+                "[initial.{name}] velocity: the run begins with {}, in which nothing has a velocity",
+                method.name()
             );
             return Err(scope.error(velocity.span(), message));
         }

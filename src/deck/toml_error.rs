@@ -316,6 +316,8 @@ end = 1
 reduce = 0.5
 [time.relaxation]
 tolerance = 1e-3
+[time.static]
+tolerance = 1e-3
 [[stage]]
 safety = 0.5
 [output]

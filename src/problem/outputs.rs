@@ -334,7 +334,7 @@ impl Problem {
     /// When rows of the history are written.
     pub fn row_interval(&self) -> Interval {
         let seconds = self.time.end / ROWS;
-        let default = if self.relaxes() {
+        let default = if self.is_quasi_static() {
             Interval::Seconds(seconds)
         } else {
             let steps = STEPS_A_ROW;

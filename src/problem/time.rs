@@ -64,6 +64,51 @@ pub enum Method {
     Explicit,
     /// From one equilibrium to the next; t is the load parameter, and [`Time::step`] is not used.
     Relaxation(Relaxation),
+    /// As [`Method::Relaxation`], by Newton's method.
+    Static(Static),
+}
+
+/// How Newton's method finds equilibria.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Static {
+    /// Number of load steps.
+    pub load_steps: u64,
+    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    pub tolerance: f64,
+    /// The most iterations of a load step without a bond that breaks.
+    pub max_iterations: u64,
+    /// How often a load step may be halved.
+    pub max_halvings: u64,
+}
+
+impl Method {
+    /// Its name in a deck.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Explicit => "explicit",
+            Self::Relaxation(_) => "relaxation",
+            Self::Static(_) => "static",
+        }
+    }
+
+    /// What to change in a deck where it finds no equilibrium.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Static(_) => {
+                "give [time.static] more `load_steps`, `max_iterations` or `max_halvings`"
+            }
+            Self::Explicit | Self::Relaxation(_) => "give [time.relaxation] more `iterations`",
+        }
+    }
+
+    /// The number of load steps, if it finds equilibria.
+    pub fn load_steps(&self) -> Option<u64> {
+        match self {
+            Self::Explicit => None,
+            Self::Relaxation(rule) => Some(rule.load_steps),
+            Self::Static(rule) => Some(rule.load_steps),
+        }
+    }
 }
 
 /// How equilibria are found.
@@ -102,10 +147,22 @@ impl Problem {
         stages
     }
 
-    /// Whether any stage of the run is a relaxation.
-    pub fn relaxes(&self) -> bool {
+    /// Whether any stage of the run is a sequence of equilibria.
+    pub fn is_quasi_static(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
-        stages.any(|stage| stage.time.is_relaxation())
+        stages.any(|stage| stage.time.is_quasi_static())
+    }
+
+    /// Whether any stage of the run is a relaxation.
+    pub fn has_relaxation(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| matches!(stage.time.method, Method::Relaxation(_)))
+    }
+
+    /// Whether Newton's method finds the equilibria of any stage.
+    pub fn has_newton(&self) -> bool {
+        let mut stages = self.all_stages().into_iter();
+        stages.any(|stage| matches!(stage.time.method, Method::Static(_)))
     }
 
     /// Whether the step of any stage follows the number of bonds that break in it.
@@ -128,15 +185,15 @@ impl Problem {
 }
 
 impl Time {
-    /// Whether the method is relaxation.
-    pub fn is_relaxation(&self) -> bool {
-        matches!(self.method, Method::Relaxation(_))
+    /// Whether the method finds a sequence of equilibria.
+    pub fn is_quasi_static(&self) -> bool {
+        self.method.load_steps().is_some()
     }
 }
 
 /// Whether two stages in a row follow the equation of motion with different density scales.
 pub(crate) fn changes_density_scale(pair: &[Stage]) -> bool {
     let [before, after] = [&pair[0].time, &pair[1].time];
-    let moves = !before.is_relaxation() && !after.is_relaxation();
+    let moves = !before.is_quasi_static() && !after.is_quasi_static();
     moves && before.density_scale != after.density_scale
 }

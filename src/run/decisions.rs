@@ -1,7 +1,7 @@
 //! Automatic choices of a run, for the log.
 
 use crate::comm;
-use crate::problem::{Method, StepRule};
+use crate::problem::StepRule;
 use crate::solver::Simulation;
 
 /// Names and values of the automatic choices; equal on all ranks. Collective.
@@ -76,8 +76,9 @@ fn bonds<const D: usize>(simulation: &Simulation<'_, D>) -> String {
 
 fn step<const D: usize>(simulation: &Simulation<'_, D>) -> String {
     let (step, stable) = (simulation.clock.step(), simulation.scaled_stable_step());
-    if let Method::Relaxation(rule) = simulation.time_rule().method {
-        return format!("{step:.4e} s, {} load steps of relaxation", rule.load_steps);
+    let method = simulation.time_rule().method;
+    if let Some(steps) = method.load_steps() {
+        return format!("{step:.4e} s, {steps} load steps of {}", method.name());
     }
     let source = match simulation.time_rule().step {
         StepRule::Automatic(_) => "chosen",

@@ -267,7 +267,7 @@ impl<'a> Job<'a> {
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
         // Energy that changing temperatures put in is not counted.
-        let is_closed = !self.problem.relaxes() && !self.problem.temperature_changes();
+        let is_closed = !self.problem.is_quasi_static() && !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {
             if stepper.is_refinement_due()

@@ -97,7 +97,7 @@ impl Summary {
             steps,
             step: simulation.clock.step(),
             evaluations: times.evaluations,
-            stable_step: (!simulation.relaxes()).then(|| simulation.scaled_stable_step()),
+            stable_step: (!simulation.is_quasi_static()).then(|| simulation.scaled_stable_step()),
             ranks: simulation.comm.size(),
             instructions: simulation.forces.instructions().name(),
             checkpoints,

@@ -95,7 +95,10 @@ impl<'a> Job<'a> {
             return;
         };
         let (overshoot, fracture) = (row.energies.overshoot, row.energies.fracture);
-        if self.problem.relaxes() || fracture <= 0.0 || overshoot <= MAX_OVERSHOOT * fracture {
+        if self.problem.is_quasi_static()
+            || fracture <= 0.0
+            || overshoot <= MAX_OVERSHOOT * fracture
+        {
             return;
         }
         let text = format!(

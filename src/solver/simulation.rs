@@ -7,7 +7,7 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Initial, Method, Problem, Stage, Time};
+use crate::problem::{Action, Condition, Initial, Problem, Stage, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
@@ -19,7 +19,9 @@ use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
 use super::motion::fields::{Needs, plastic_columns};
-use super::motion::relaxation::{LoadStep, fictitious_density};
+use super::motion::integrator::{Integrator, integrator};
+use super::motion::load_step::{LoadStep, fictitious_density};
+use super::motion::newton::NewtonState;
 use super::motion::stable_step::stable_step;
 use super::motion::walk::{Part, walk};
 use super::motion::{Clock, Fields, Kept, verlet};
@@ -67,8 +69,12 @@ pub struct Simulation<'a, const D: usize> {
     pub stable_step: f64,
     /// Time and step of the present stage.
     pub clock: Clock,
-    /// How far the load step has come; settled without relaxation.
+    /// The method of the present stage; taken out while it advances.
+    pub(super) integrator: Option<Box<dyn Integrator<D>>>,
+    /// How far the load step has come; settled where there are none.
     pub load_step: LoadStep,
+    /// What Newton's method remembers.
+    pub newton: NewtonState,
     /// What an adaptive step follows.
     pub step_control: StepControl,
     /// What the run was before the present step; empty where steps are not undone.
@@ -203,7 +209,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
             supports: all().any(Conditions::have_supports),
             temperature: is_thermal,
             damping: model.damping.iter().any(|rate| *rate > 0.0),
-            relaxation: problem.relaxes(),
+            equilibria: problem.is_quasi_static(),
+            relaxation: problem.has_relaxation(),
             damage: problem.bodies.iter().any(|body| body.damage.is_some()),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
@@ -230,6 +237,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             contact,
             conditions: waiting[0].take().unwrap_or_default(),
             waiting,
+            integrator: Some(integrator(&stages[0].time)),
             stages,
             stage: 0,
             steps,
@@ -239,6 +247,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             stable_step: stable,
             clock,
             load_step: LoadStep::default(),
+            newton: NewtonState::default(),
             step_control: StepControl::default(),
             kept: Kept::default(),
             grids: refined,
@@ -256,10 +265,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
     fn begin(&mut self) {
         self.apply_displacements(0.0, 0.0);
         self.apply_loads(0.0, true);
-        self.evaluate(match self.time_rule().method {
-            Method::Explicit => BondUpdate::Step(0.0),
+        self.evaluate(if self.is_quasi_static() {
             // This is no equilibrium.
-            Method::Relaxation(_) => BondUpdate::None,
+            BondUpdate::None
+        } else {
+            BondUpdate::Step(0.0)
         });
         self.apply_velocities();
         self.update_damping_power();
@@ -287,27 +297,16 @@ impl<'a, const D: usize> Simulation<'a, D> {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
         }
-        let Time {
-            method, adaptive, ..
-        } = self.time_rule();
-        match (method, adaptive) {
-            (Method::Explicit, None) => {
-                if let Some(step) = self.step_for_contact() {
-                    self.clock.set_step(step);
-                }
-                self.make_step(half_kick_pending);
-                self.count_calm_steps();
-                true
-            }
-            (Method::Explicit, Some(rule)) => {
-                self.make_adaptive_step(&rule);
-                false
-            }
-            (Method::Relaxation(rule), _) => {
-                self.relax(&rule);
-                false
-            }
+        if self.load_step.is_settled {
+            self.newton.evaluations = 0;
         }
+        let evaluations = self.times.evaluations;
+        // Taken out while it advances the simulation.
+        let mut integrator = (self.integrator.take()).expect("each stage has an integrator");
+        let is_pending = integrator.advance(self, half_kick_pending);
+        self.integrator = Some(integrator);
+        self.newton.evaluations += self.times.evaluations - evaluations;
+        is_pending
     }
 
     /// Makes the second half kick of the present step.
@@ -401,7 +400,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// As [`Self::evaluate`], after [`Part::write_bond_inputs`] of all parts of the points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
-        let is_relaxing = self.relaxes();
+        let is_relaxing = self.is_quasi_static();
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -456,14 +455,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
-        match self.time_rule().method {
-            Method::Explicit => {
-                self.conditions
-                    .set_guidance(self.clock.time(), self.clock.step());
-                self.walk(|part, here| here.apply_velocities(part))
-            }
-            Method::Relaxation(_) => self.walk(|part, here| here.project_residual(part)),
+        if self.is_quasi_static() {
+            return self.walk(|part, here| here.project_residual(part));
         }
+        self.conditions
+            .set_guidance(self.clock.time(), self.clock.step());
+        self.walk(|part, here| here.apply_velocities(part))
     }
 
     /// Finds the power of damping at the present velocities.

@@ -5,6 +5,7 @@ use crate::comm::sum::{ExactSum, reduce};
 use super::Simulation;
 use super::motion::Clock;
 use super::motion::fields::Fields;
+use super::motion::integrator::integrator;
 use super::steps::even_clock;
 
 impl<const D: usize> Simulation<'_, D> {
@@ -43,15 +44,15 @@ impl<const D: usize> Simulation<'_, D> {
         self.stable_step * self.time_rule().density_scale.sqrt()
     }
 
-    /// Goes on with another stage from where the points are. Nothing moves in a relaxation, nor after
+    /// Goes on with another stage from where the points are. Nothing moves in a sequence of equilibria, nor after
     /// one.
     pub(super) fn begin_stage(&mut self, stage: usize) {
-        let (relaxed, scale) = (self.relaxes(), self.time_rule().density_scale);
+        let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);
         let (step, _) = self.steps[stage];
         self.clock.set_stage(step, self.time_rule().end);
         self.begin_adapting();
-        if relaxed || self.relaxes() {
+        if was_static || self.is_quasi_static() {
             let Fields { velocity, .. } = &mut self.fields;
             velocity
                 .iter_mut()
@@ -68,7 +69,7 @@ impl<const D: usize> Simulation<'_, D> {
         if let Some(contact) = &mut self.contact {
             contact.scale_density(factor);
         }
-        if factor != 1.0 && !relaxed && !self.relaxes() {
+        if factor != 1.0 && !was_static && !self.is_quasi_static() {
             finite &= self.keep_momentum(factor);
         }
         if !finite {
@@ -116,6 +117,7 @@ impl<const D: usize> Simulation<'_, D> {
             self.conditions.reset_temperatures();
         }
         self.stage = stage;
+        self.integrator = Some(integrator(&self.time_rule()));
         self.scale_density();
     }
 
@@ -134,8 +136,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Whether the present stage is a relaxation.
-    pub fn relaxes(&self) -> bool {
-        self.fields.relaxation_velocity.is_some() && self.time_rule().is_relaxation()
+    /// Whether the present stage is a sequence of equilibria.
+    pub fn is_quasi_static(&self) -> bool {
+        self.time_rule().is_quasi_static()
     }
 }

@@ -7,7 +7,7 @@ use crate::problem::Time;
 use super::Simulation;
 use super::model::Model;
 use super::motion::Clock;
-use super::motion::relaxation::LoadStep;
+use super::motion::load_step::LoadStep;
 use super::simulation::Times;
 
 /// Makes the steps of a simulation.

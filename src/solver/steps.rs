@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::message::format_number;
-use crate::problem::{Adaptive, Method, Problem, Stage, StepRule, Time};
+use crate::problem::{Adaptive, Problem, Stage, StepRule, Time};
 
 use super::motion::Clock;
 use super::motion::clock::steps_to;
@@ -36,32 +36,38 @@ pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
 
 /// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks.
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
-    let (step, steps) = match (time.method, time.step) {
-        (Method::Relaxation(rule), _) => {
-            let steps = rule.load_steps as f64;
-            (length / steps, steps)
-        }
-        (Method::Explicit, StepRule::Fixed(step)) => {
+    if let Some(steps) = time.method.load_steps() {
+        let steps = steps as f64;
+        return countable(problem, length, (length / steps, steps));
+    }
+    let (step, steps) = match time.step {
+        StepRule::Fixed(step) => {
             follows_damping(problem, "step", &problem.places.step, step)?;
             (step, steps_to(length, step))
         }
-        (Method::Explicit, StepRule::Automatic(_)) if stable.is_infinite() => {
+        StepRule::Automatic(_) if stable.is_infinite() => {
             let message = "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
                            in m and larger than the distance of the points?";
             return Err(Error::input(message).at(&problem.places.horizon));
         }
-        (Method::Explicit, StepRule::Automatic(safety)) => {
+        StepRule::Automatic(safety) => {
             let steps = (length / automatic_step(problem, time, safety, stable)).ceil();
             (length / steps, steps)
         }
     };
-    let (step, steps) = match (time.method, &time.adaptive) {
-        (Method::Explicit, Some(rule)) => {
+    let (step, steps) = match &time.adaptive {
+        Some(rule) => {
             adapts_in_time(problem, rule, length, step)?;
             adapted(rule, (step, steps), length)
         }
-        _ => (step, steps),
+        None => (step, steps),
     };
+    countable(problem, length, (step, steps))
+}
+
+/// A step (s) and the number of steps, or an error if there are more of these in a stage of some length (s) than can be
+/// counted.
+fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Result<(f64, f64)> {
     if steps > MOST_STEPS {
         let message = format!(
             "[time] end: {} s take {steps:.1e} steps of {step:.1e} s",

@@ -32,6 +32,9 @@ const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 /// Bytes per point of contact, if not measured: measured on a block of 512 000 points that nothing touches.
 const CONTACT: f64 = 280.0;
 
+/// Vectors of Newton's method, which are allocated in the first iteration.
+const NEWTON_VECTORS: usize = 8;
+
 /// Copies of a field during output: by point, by id, and in the file layer.
 const FIELD_COPIES: f64 = 3.0;
 
@@ -207,8 +210,13 @@ fn saved_width(problem: &Problem) -> usize {
         .bodies
         .iter()
         .any(|body| body.material.damping > 0.0);
-    let relaxed = if problem.relaxes() {
-        2 * dimension + supported
+    let equilibria = if problem.is_quasi_static() {
+        dimension + supported
+    } else {
+        0
+    };
+    let relaxed = if problem.has_relaxation() {
+        dimension
     } else {
         0
     };
@@ -234,6 +242,7 @@ fn saved_width(problem: &Problem) -> usize {
         + supported
         + worked
         + usize::from(damped)
+        + equilibria
         + relaxed
         + plastic
         + contact
@@ -265,10 +274,17 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
         CHECKPOINT_COPIES.map(|copies| copies * bonds.max(counts.points * 8.0) + offsets);
     // At a restart: all columns; then bonds are redistributed, with two more numbers for lengths and offsets.
     let restart = counts.points * 8.0 * (counts.saved as f64 + 2.0) + 2.0 * bonds;
+    let vectors = if problem.has_newton() {
+        let numbers = NEWTON_VECTORS * problem.dimension.count();
+        counts.points * 8.0 * numbers as f64
+    } else {
+        0.0
+    };
     Cost {
         set_up: counts.memory.peak,
-        time_loop: checkpoint
-            .map(|checkpoint| counts.memory.resident + output.max(checkpoint).max(restart)),
+        time_loop: checkpoint.map(|checkpoint| {
+            counts.memory.resident + vectors + output.max(checkpoint).max(restart)
+        }),
         outputs,
         result: OVERHEAD + counts.points * written + 8.0 * rows * counts.columns,
         checkpoint: OVERHEAD + counts.points * saved + bonds,

@@ -168,7 +168,7 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     let moving = problem
         .all_stages()
         .into_iter()
-        .filter(|stage| !stage.time.is_relaxation());
+        .filter(|stage| !stage.time.is_quasi_static());
     let safety = |stage: Stage| match stage.time.step {
         StepRule::Automatic(safety) => Some(safety),
         StepRule::Fixed(_) => None,
@@ -253,7 +253,7 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
     };
     let clock = simulation.clock;
     let (step, stable) = (clock.step(), simulation.scaled_stable_step());
-    if step > stable && !simulation.relaxes() {
+    if step > stable && !simulation.is_quasi_static() {
         warn(format!(
             "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s"
         ));

@@ -49,7 +49,7 @@ use Form::{Array, Key, Named, NamedKind, Table};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
-pub const SECTIONS: [Section; 35] = [
+pub const SECTIONS: [Section; 36] = [
     Section::new("title", Key, Free),
     Section::new("dimension", Key, Fixed),
     Section::new("thickness", Key, Fixed),
@@ -76,6 +76,7 @@ pub const SECTIONS: [Section; 35] = [
     Section::new("time", Table, Fixed),
     Section::new("time.adaptive", Table, Fixed),
     Section::new("time.relaxation", Table, Fixed),
+    Section::new("time.static", Table, Fixed),
     Section::new("stage", Array, Fixed),
     Section::new("output", Table, Free),
     // Definitions of history columns are compared separately.

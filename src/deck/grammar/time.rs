@@ -19,13 +19,16 @@ pub struct Time {
     /// Automatic step as a fraction of the stable one.
     #[serde(default = "default_safety")]
     pub safety: Number,
-    /// How the points come to move: `"explicit"`, by the equation of motion, or `"relaxation"`, from one
+    /// How the points come to move: `"explicit"`, by the equation of motion, or `"relaxation"` or `"static"`, from one
     /// equilibrium to the next.
     #[serde(default = "explicit")]
     pub method: Spanned<Method>,
     /// How equilibria are found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Spanned<Relaxation>>,
+    /// How Newton's method finds equilibria.
+    #[serde(rename = "static", skip_serializing_if = "Option::is_none")]
+    pub newton: Option<Spanned<Static>>,
     /// How many times its density a body has in the equation of motion; more than 1 to take larger steps
     /// through slow loading.
     #[serde(default = "default_density_scale")]
@@ -63,6 +66,9 @@ pub struct Stage {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Spanned<Relaxation>>,
     /// As in `[time]`.
+    #[serde(rename = "static", skip_serializing_if = "Option::is_none")]
+    pub newton: Option<Spanned<Static>>,
+    /// As in `[time]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_scale: Option<Number>,
     /// As in `[time]`.
@@ -88,6 +94,24 @@ pub enum Method {
     Explicit,
     /// Adaptive dynamic relaxation in load steps; t is the load parameter.
     Relaxation,
+    /// Newton's method in load steps.
+    Static,
+}
+
+impl Method {
+    /// Its name in a deck.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Explicit => "explicit",
+            Self::Relaxation => "relaxation",
+            Self::Static => "static",
+        }
+    }
+
+    /// Whether it finds equilibria.
+    pub fn is_quasi_static(self) -> bool {
+        self != Self::Explicit
+    }
 }
 
 /// A step that follows the number of bonds that break in it.
@@ -172,4 +196,42 @@ fn default_tolerance() -> Number {
 
 fn default_iterations() -> Count {
     Count::new(100_000)
+}
+
+/// How Newton's method finds equilibria.
+#[derive(Debug, Clone, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Static {
+    /// Number of load steps; that of the relaxation if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_steps: Option<Count>,
+    /// What the forces that are out of balance may be, as a share of loads and reactions; that of the relaxation if not
+    /// given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<Number>,
+    /// The most iterations of a load step.
+    #[serde(default = "default_max_iterations")]
+    pub max_iterations: Count,
+    /// How often a load step without an equilibrium is halved.
+    #[serde(default = "default_max_halvings")]
+    pub max_halvings: Spanned<u64>,
+}
+
+impl Default for Static {
+    fn default() -> Self {
+        Self {
+            load_steps: None,
+            tolerance: None,
+            max_iterations: default_max_iterations(),
+            max_halvings: default_max_halvings(),
+        }
+    }
+}
+
+fn default_max_iterations() -> Count {
+    Count::new(50)
+}
+
+fn default_max_halvings() -> Spanned<u64> {
+    Spanned::new(0..0, 5)
 }

@@ -14,6 +14,18 @@
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
 
+use super::integrator::Integrator;
+
+/// Steps that follow a rule.
+pub struct AdaptiveVerlet(pub Adaptive);
+
+impl<const D: usize> Integrator<D> for AdaptiveVerlet {
+    fn advance(&mut self, simulation: &mut Simulation<'_, D>, _half_kick_pending: bool) -> bool {
+        simulation.make_adaptive_step(&self.0);
+        false
+    }
+}
+
 /// How much longer than the step the rest of a stage may be to count as one.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
@@ -85,7 +97,7 @@ impl StepControl {
 
 impl<const D: usize> Simulation<'_, D> {
     /// Makes one step by the equation of motion, as short as the rule wants it. Collective.
-    pub(in crate::solver) fn make_adaptive_step(&mut self, rule: &Adaptive) {
+    fn make_adaptive_step(&mut self, rule: &Adaptive) {
         let mut kept = std::mem::take(&mut self.kept);
         self.keep(&mut kept);
         loop {

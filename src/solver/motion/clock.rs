@@ -81,6 +81,13 @@ impl Clock {
         self.step = step;
     }
 
+    /// Go back to before the last step, and give the steps from there another size (s).
+    pub fn retreat(&mut self, step: f64) {
+        self.number -= 1;
+        self.since = (self.before, self.number);
+        self.step = step;
+    }
+
     /// Whether the next step has another size than the last one, or is the first.
     pub fn is_new_size(&self) -> bool {
         self.number == self.since.1

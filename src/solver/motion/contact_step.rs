@@ -15,7 +15,7 @@ impl<const D: usize> Simulation<'_, D> {
     /// The step (s) from here on, where contact is too stiff for the present one, or has long been soft enough for a longer
     /// one. It divides the rest of the stage evenly.
     pub fn step_for_contact(&self) -> Option<f64> {
-        if self.relaxes() {
+        if self.is_quasi_static() {
             return None;
         }
         let (contact, limit) = (self.contact.as_ref()?, self.contact_limit()?);

@@ -289,20 +289,21 @@ fields! {
         unit: "m",
         ..STATE
     };
-    /// u at the last equilibrium, m; none without relaxation.
+    /// u at the last equilibrium, m; none without equilibria.
     equilibrium_displacement: Option<[Vec<f64>; D]> = Description {
         name: "equilibrium_displacement",
         unit: "m",
         ..STATE
     };
-    /// What supports exerted at the last equilibrium, N/m³; none without relaxation or supports.
+    /// What supports exerted at the last equilibrium, N/m³; none without equilibria or supports.
     equilibrium_reaction: Option<[Vec<f64>; D]> = Description {
         name: "equilibrium_reaction",
         unit: "N/m^3",
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Density of the relaxation, with which an iteration is stable without contact, N/m⁴; none without relaxation.
+    /// Bound of the stiffness as a density, with which an iteration of a relaxation is stable without contact, N/m⁴; none without
+    /// equilibria.
     fictitious_density: Option<Vec<f64>> = Description {
         name: "fictitious_density",
         unit: "N/m^4",
@@ -346,6 +347,8 @@ pub struct Needs {
     pub temperature: bool,
     /// Whether there is viscous damping.
     pub damping: bool,
+    /// Whether there are equilibria.
+    pub equilibria: bool,
     /// Whether there is relaxation.
     pub relaxation: bool,
     /// Whether bonds can break.
@@ -449,9 +452,9 @@ impl<const D: usize> Fields<D> {
             friction_energy: needs.contact.then(scalar),
             contact_damping_energy: needs.contact.then(scalar),
             relaxation_velocity: needs.relaxation.then(|| vector(owned)),
-            equilibrium_displacement: needs.relaxation.then(|| vector(owned)),
-            equilibrium_reaction: (needs.relaxation && needs.supports).then(|| vector(owned)),
-            fictitious_density: needs.relaxation.then(scalar),
+            equilibrium_displacement: needs.equilibria.then(|| vector(owned)),
+            equilibrium_reaction: (needs.equilibria && needs.supports).then(|| vector(owned)),
+            fictitious_density: needs.equilibria.then(scalar),
             contact_density: (needs.relaxation && needs.contact).then(scalar),
             last_seen: needs.coarsening.then(scalar),
             damped_energy: needs.damping.then(scalar),

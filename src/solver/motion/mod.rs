@@ -1,9 +1,14 @@
 //! Motion: the fields of the points, the clock, time integration.
 
 pub mod adaptive;
+mod banded;
 pub mod clock;
+mod coarse_grid;
 mod contact_step;
 pub mod fields;
+pub mod integrator;
+pub mod load_step;
+pub mod newton;
 mod pieces;
 pub mod relaxation;
 pub mod saved;

@@ -10,7 +10,8 @@ use crate::solver::refinement::Refined;
 
 use super::Clock;
 use super::adaptive::StepControl;
-use super::relaxation::LoadStep;
+use super::load_step::LoadStep;
+use super::newton::NewtonState;
 
 /// The state of the points of this rank's block of ids.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +42,9 @@ const STEP_CONTROL: usize = 6;
 /// Words of a load step.
 const LOAD_STEP: usize = 8;
 
+/// Words of what Newton's method remembers.
+const NEWTON: usize = 5;
+
 /// Words of what refinements have done.
 const REFINED: usize = 2;
 
@@ -57,7 +61,9 @@ impl<const D: usize> Simulation<'_, D> {
         let refined = refined.chain(scaled);
         let contact = self.contact.iter();
         let contact = contact.flat_map(|contact| contact.state().words());
+        let newton = self.problem.has_newton().then(|| self.newton.words());
         let progress = times.chain(refined).chain(self.load_step.words());
+        let progress = progress.chain(newton.into_iter().flatten());
         progress.chain(contact).collect()
     }
 
@@ -68,7 +74,9 @@ impl<const D: usize> Simulation<'_, D> {
         let (steps, rest) = rest.split_at(STEP_CONTROL);
         let (refined, rest) = rest.split_at(REFINED);
         let (scaled, rest) = rest.split_at(usize::from(self.problem.changes_density_scale()));
-        let (load_step, contact_words) = rest.split_at(LOAD_STEP);
+        let (load_step, rest) = rest.split_at(LOAD_STEP);
+        let has_newton = self.problem.has_newton();
+        let (newton, contact_words) = rest.split_at(if has_newton { NEWTON } else { 0 });
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
@@ -76,6 +84,9 @@ impl<const D: usize> Simulation<'_, D> {
         self.refined = Refined::of_words(std::array::from_fn(|k| refined[k]));
         self.density_scale_energy = scaled.first().copied().map_or(0.0, f64::from_bits);
         self.load_step = LoadStep::of_words(std::array::from_fn(|k| load_step[k]));
+        if has_newton {
+            self.newton = NewtonState::of_words(std::array::from_fn(|k| newton[k]));
+        }
         if let Some(contact) = &mut self.contact {
             contact.restore(&ContactState::of_words(contact_words));
         }

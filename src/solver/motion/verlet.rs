@@ -4,9 +4,25 @@
 //! steps. With viscous damping at a rate r the equation of motion is ρ ü = f − r ρ u̇ (Emmrich & Weckner
 //! 2006, eq. 11).
 
+use crate::solver::Simulation;
 use crate::solver::model::Model;
 
+use super::integrator::Integrator;
 use super::walk::{Moving, Part};
+
+/// Steps of the size of the stage, or shorter ones where contact needs them.
+pub struct Verlet;
+
+impl<const D: usize> Integrator<D> for Verlet {
+    fn advance(&mut self, simulation: &mut Simulation<'_, D>, half_kick_pending: bool) -> bool {
+        if let Some(step) = simulation.step_for_contact() {
+            simulation.clock.set_step(step);
+        }
+        simulation.make_step(half_kick_pending);
+        simulation.count_calm_steps();
+        true
+    }
+}
 
 /// Density (kg/m³) and damping (1/s) of a point.
 type Constants = (f64, f64);

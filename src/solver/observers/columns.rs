@@ -2,7 +2,7 @@
 
 use crate::solver::contact::ContactNow;
 use crate::solver::motion::Clock;
-use crate::solver::motion::relaxation::LoadStep;
+use crate::solver::motion::load_step::LoadStep;
 
 use super::fragments::Fragments;
 use super::history::Energies;
@@ -29,6 +29,8 @@ pub struct GlobalState {
     pub singular_points: u64,
     /// State of the present load step.
     pub load_step: LoadStep,
+    /// Force evaluations of the present load step.
+    pub force_evaluations: u64,
     /// Steps undone so far, and the largest number of bonds of a point that a step has broken since the last row.
     pub undone_steps: u64,
     /// See `undone_steps`.

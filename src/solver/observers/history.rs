@@ -97,9 +97,13 @@ impl HistoryObserver {
         columns.add("energy_error", "J", |now| now.energies.error);
         columns.add("broken_bonds", "1", |now| now.broken as f64);
         columns.add("cracked_points", "1", |now| now.cracked_points as f64);
-        if problem.relaxes() {
+        if problem.is_quasi_static() {
             columns.add("residual", "1", |now| now.load_step.residual);
             columns.add("iterations", "1", |now| now.load_step.iterations as f64);
+        }
+        if problem.has_newton() {
+            let evaluations = |now: &GlobalState| now.force_evaluations as f64;
+            columns.add("force_evaluations", "1", evaluations);
         }
         if problem.adapts() {
             columns.add("time_step", "s", |now| now.clock.step());
@@ -387,6 +391,7 @@ impl HistoryObserver {
             cracked_extent: [lower, upper],
             singular_points,
             load_step: simulation.load_step,
+            force_evaluations: simulation.newton.evaluations,
             undone_steps: simulation.step_control.undone,
             most_broken,
             density_scale_energy: simulation.density_scale_energy,

@@ -85,8 +85,9 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(trigger) = &refinement.trigger else {
         return Ok(());
     };
-    let other = if problem.relaxes() {
-        "method = \"relaxation\""
+    let mut methods = (problem.all_stages().into_iter()).map(|stage| stage.time.method);
+    let other = if let Some(method) = methods.find(|method| method.load_steps().is_some()) {
+        &format!("method = \"{}\"", method.name())
     } else if problem.adapts() {
         "an adaptive step"
     } else {

@@ -1,0 +1,71 @@
+//! Sums of terms that are rounded to multiples of one unit.
+//!
+//! Integers add up to the same sum in any order, so the sum is bit-identical on any number of ranks and threads. It takes
+//! 8 bytes, an [`ExactSum`](super::ExactSum) 560, and has an error of half a unit a term. It is for sums that need to be
+//! reproducible but not exact.
+
+/// Bits of the magnitude of a sum.
+const BITS: i32 = 62;
+
+/// The largest exponent of the factor, so that it and its inverse are finite.
+const MOST: i32 = 1000;
+
+/// The unit of the terms: a power of 2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    factor: f64,
+    size: f64,
+}
+
+impl Unit {
+    /// The smallest unit with which the sum of so many terms of at most this magnitude does not overflow; `None` if the
+    /// magnitude is 0 or not finite.
+    pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
+        if magnitude == 0.0 || !magnitude.is_finite() {
+            return None;
+        }
+        let (_, exponent) = libm::frexp(magnitude);
+        let terms = (u64::BITS - terms.leading_zeros()) as i32;
+        let exponent = (BITS - terms - exponent).min(MOST);
+        Some(Self {
+            factor: libm::scalbn(1.0, exponent),
+            size: libm::scalbn(1.0, -exponent),
+        })
+    }
+
+    /// A term in units.
+    #[inline]
+    pub fn round(self, term: f64) -> i64 {
+        libm::rint(term * self.factor) as i64
+    }
+
+    /// The value of a sum of units.
+    #[inline]
+    pub fn value(self, sum: i64) -> f64 {
+        sum as f64 * self.size
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_close_and_do_not_overflow() {
+        for magnitude in [1e-320, 1e-200, 3.7, 1e300] {
+            for count in [1_u64, 1000, 1 << 20] {
+                let unit = Unit::of(magnitude, count).unwrap();
+                let terms = [magnitude, -0.3 * magnitude, 0.7 * magnitude];
+                for term in terms {
+                    let all = unit.round(term).checked_mul(count as i64).unwrap();
+                    let exact = term * count as f64;
+                    let error = (unit.value(all) - exact).abs();
+                    let most = 1e-12 * magnitude * count as f64;
+                    assert!(error <= most.max(1e-301), "{magnitude} {count} {error}");
+                }
+            }
+        }
+        assert_eq!(Unit::of(0.0, 3), None);
+        assert_eq!(Unit::of(f64::NAN, 3), None);
+    }
+}

@@ -1,0 +1,159 @@
+//! Symmetric matrices with a band, and their Cholesky factor.
+
+/// Share of a diagonal entry below which its pivot is round-off.
+const SINGULAR: f64 = 1e-10;
+
+/// A symmetric, positive semidefinite matrix, or its Cholesky factor: the lower half of the band, row by row.
+#[derive(Debug, Clone, Default)]
+pub struct Banded {
+    size: usize,
+    /// Entries of a row beside the diagonal.
+    band: usize,
+    /// Rows of `band + 1` entries, the diagonal last.
+    entries: Vec<f64>,
+    /// 1/L_ii of the factor; 0 where the pivot is round-off.
+    inverse: Vec<f64>,
+}
+
+impl Banded {
+    /// Zero, of a size and with so many entries of a row beside the diagonal.
+    pub fn zero(size: usize, band: usize) -> Self {
+        Self {
+            size,
+            band,
+            entries: vec![0.0; size * (band + 1)],
+            inverse: vec![0.0; size],
+        }
+    }
+
+    /// Set all entries to 0.
+    pub fn clear(&mut self) {
+        self.entries.fill(0.0);
+    }
+
+    /// Add to an entry of the lower half.
+    ///
+    /// # Panics
+    /// Outside of the band.
+    pub fn add(&mut self, row: usize, column: usize, value: f64) {
+        assert!(
+            column <= row && row - column <= self.band,
+            "within the band"
+        );
+        self.entries[row * (self.band + 1) + self.band + column - row] += value;
+    }
+
+    /// Replace the matrix by its factor L, L Lᵀ = A. Rows whose pivot is round-off become 0: their unknowns are 0 in
+    /// [`Self::solve`], which is then a generalized inverse.
+    pub fn factor(&mut self) {
+        let width = self.band + 1;
+        for row in 0..self.size {
+            let (above, own) = self.entries.split_at_mut(row * width);
+            let own = &mut own[..width];
+            let first = row.saturating_sub(self.band);
+            let at = |column: usize| self.band + column - row;
+            let diagonal = own[self.band];
+            for column in first..row {
+                // The entries of both rows from where both have any up to this column.
+                let from = first.max(column.saturating_sub(self.band));
+                let other = &above[column * width..][..width];
+                let start = self.band + from - column;
+                let known = &other[start..self.band];
+                let product = dot(&own[at(from)..at(column)], known);
+                own[at(column)] = (own[at(column)] - product) * self.inverse[column];
+            }
+            let known = &own[at(first)..self.band];
+            let pivot = diagonal - dot(known, known);
+            if pivot > SINGULAR * diagonal {
+                let root = pivot.sqrt();
+                own[self.band] = root;
+                self.inverse[row] = 1.0 / root;
+            } else {
+                own.fill(0.0);
+                self.inverse[row] = 0.0;
+            }
+        }
+    }
+
+    /// Solve L Lᵀ x = b in place, after [`Self::factor`].
+    pub fn solve(&self, values: &mut [f64]) {
+        let width = self.band + 1;
+        for row in 0..self.size {
+            let first = row.saturating_sub(self.band);
+            let own = &self.entries[row * width..][..width];
+            let product = dot(
+                &own[self.band + first - row..self.band],
+                &values[first..row],
+            );
+            values[row] = (values[row] - product) * self.inverse[row];
+        }
+        for row in (0..self.size).rev() {
+            let first = row.saturating_sub(self.band);
+            let own = &self.entries[row * width..][..width];
+            let value = values[row] * self.inverse[row];
+            values[row] = value;
+            let known = &own[self.band + first - row..self.band];
+            for (value_before, entry) in values[first..row].iter_mut().zip(known) {
+                *value_before -= entry * value;
+            }
+        }
+    }
+}
+
+/// The scalar product of two slices of the same length.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Springs from each of `count` nodes to the next two, the first one held by `support`.
+    fn chain(count: usize, support: f64) -> (Banded, Vec<Vec<f64>>) {
+        let mut matrix = Banded::zero(count, 2);
+        let mut full = vec![vec![0.0; count]; count];
+        let mut add = |row: usize, column: usize, value: f64| {
+            full[row][column] += value;
+            if row != column {
+                full[column][row] += value;
+            }
+            matrix.add(row, column, value);
+        };
+        for node in 0..count {
+            for next in node + 1..count.min(node + 3) {
+                let stiffness = 1.0 + node as f64 / next as f64;
+                add(node, node, stiffness);
+                add(next, next, stiffness);
+                add(next, node, -stiffness);
+            }
+        }
+        add(0, 0, support);
+        (matrix, full)
+    }
+
+    #[test]
+    fn a_chain_of_springs_is_solved() {
+        let (mut matrix, full) = chain(9, 0.5);
+        let wanted: Vec<f64> = (0..9).map(|k| f64::from(k * k % 7) - 2.0).collect();
+        let mut values: Vec<f64> = full.iter().map(|row| dot(row, &wanted)).collect();
+        matrix.factor();
+        matrix.solve(&mut values);
+        for (value, wanted) in values.iter().zip(&wanted) {
+            assert!((value - wanted).abs() < 1e-12, "{values:?}");
+        }
+    }
+
+    #[test]
+    fn a_free_chain_is_solved_up_to_its_rigid_motion() {
+        let (mut matrix, full) = chain(9, 0.0);
+        let wanted: Vec<f64> = (0..9).map(|k| f64::from(k * k % 7) - 2.0).collect();
+        let mut values: Vec<f64> = full.iter().map(|row| dot(row, &wanted)).collect();
+        matrix.factor();
+        matrix.solve(&mut values);
+        for (value, wanted_here) in values.iter().zip(&wanted) {
+            let rigid = values[0] - wanted[0];
+            assert!((value - rigid - wanted_here).abs() < 1e-12, "{values:?}");
+        }
+    }
+}

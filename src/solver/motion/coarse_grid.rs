@@ -1,0 +1,423 @@
+//! The coarse grid of a preconditioner: what long waves of the displacement of a body need.
+//!
+//! A grid of box cells over all bodies, each edge at least a horizon long, has a displacement at each node and is
+//! linear along each axis within a cell. Its stiffness is that of the classical solid: a cell has the elastic constants of
+//! the points in it, weighted by their volume and by the share of their bonds that is intact. Supported components of
+//! points are springs at their place in the cell. A force on a point goes to the nodes of its cell (restriction), and
+//! displacements of nodes come back to the points (prolongation) with the same weights, so the preconditioner is
+//! symmetric.
+//!
+//! Every rank has the whole grid, factors its matrix and solves with it; there are few nodes. Sums over points are
+//! [rounded](crate::comm::rounded_sum::Unit), hence the same on any ranks and threads.
+
+use rayon::prelude::*;
+
+use crate::comm::rounded_sum::Unit;
+use crate::comm::{Communicator, min};
+use crate::solver::model::Model;
+
+use super::banded::Banded;
+use super::load_step::CHUNK;
+
+/// The shortest edge of a cell, horizons.
+const EDGE: f64 = 1.0;
+
+/// The factor by which edges grow until the matrix is small enough.
+const GROWTH: f64 = 1.1;
+
+/// Multiply-adds of a solution for each point: about those of a force evaluation of few bonds.
+const SOLUTION: f64 = 16.0;
+
+/// Multiply-adds of a solution that any body may have.
+const LEAST_SOLUTION: f64 = 2e4;
+
+/// Most multiply-adds of the factorization.
+const FACTORIZATION: f64 = 2e8;
+
+/// The nodes of a cell at most.
+const CORNERS: usize = 8;
+
+/// Pairs of nodes of a cell at most.
+const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
+
+/// The grid with the factor of its stiffness.
+pub struct CoarseGrid<const D: usize> {
+    lower: [f64; D],
+    /// Cells for each m, by axis.
+    per_length: [f64; D],
+    cells: [usize; D],
+    /// Distance of the numbers of nodes and of cells that are adjacent along an axis.
+    node_strides: [usize; D],
+    cell_strides: [usize; D],
+    matrix: Banded,
+    /// Forces on the nodes in units, for each thread.
+    parts: Vec<Vec<i64>>,
+    /// Their sums.
+    words: Vec<u64>,
+    /// Displacements of the nodes by component, m.
+    values: Vec<f64>,
+}
+
+/// What a point is to the grid.
+#[derive(Debug, Clone, Copy)]
+pub struct Share<const D: usize> {
+    /// λ V and G V, N m.
+    pub moduli: [f64; 2],
+    /// Stiffness of its supported components, N/m; 0 for those that are free.
+    pub springs: [f64; D],
+}
+
+/// Where a point is.
+struct Place<const D: usize> {
+    cell: usize,
+    /// The first node of the cell.
+    node: usize,
+    /// From 0 to 1 along each axis.
+    along: [f64; D],
+}
+
+impl<const D: usize> CoarseGrid<D> {
+    /// Over all points, with cells of a few horizons (m). Collective.
+    pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
+        let owned = model.owned();
+        let column = |d: usize| model.reference[d][..owned].iter().copied();
+        let mut lower: [f64; D] = std::array::from_fn(|d| column(d).fold(f64::INFINITY, f64::min));
+        let mut upper: [f64; D] =
+            std::array::from_fn(|d| column(d).fold(f64::NEG_INFINITY, f64::max));
+        min(comm, &mut lower);
+        comm.max(&mut upper);
+        let length: [f64; D] = std::array::from_fn(|d| upper[d] - lower[d]);
+        let mut edge = EDGE * horizon;
+        let solution = (SOLUTION * model.total as f64).max(LEAST_SOLUTION);
+        let shape = loop {
+            let shape = Shape::new(length, edge);
+            let (size, band) = (shape.size as f64, (shape.band + 1) as f64);
+            let is_small = 2.0 * size * band <= solution && size * band * band <= FACTORIZATION;
+            if is_small || shape.cells == [1; D] {
+                break shape;
+            }
+            edge *= GROWTH;
+        };
+        Self {
+            lower,
+            per_length: std::array::from_fn(|d| {
+                if length[d] > 0.0 {
+                    shape.cells[d] as f64 / length[d]
+                } else {
+                    1.0 / edge
+                }
+            }),
+            cells: shape.cells,
+            node_strides: shape.node_strides,
+            cell_strides: shape.cell_strides,
+            matrix: Banded::zero(shape.size, shape.band),
+            parts: vec![vec![0; shape.size]; rayon::current_num_threads()],
+            words: vec![0; shape.size],
+            values: vec![0.0; shape.size],
+        }
+    }
+
+    /// Find the stiffness from what each owned point is to the grid. Collective.
+    pub fn assemble(
+        &mut self,
+        comm: &dyn Communicator,
+        model: &Model<D>,
+        share: impl Fn(usize) -> Share<D>,
+    ) {
+        let owned = model.owned();
+        let mut largest = [0.0_f64; 2];
+        for point in 0..owned {
+            let Share { moduli, springs } = share(point);
+            let most = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            largest = [
+                largest[0].max(most(&moduli)),
+                largest[1].max(most(&springs)),
+            ];
+        }
+        comm.max(&mut largest);
+        let units = largest.map(|magnitude| Unit::of(magnitude, model.total));
+        let cells: usize = self.cells.iter().product();
+        let width = 2 + D * PAIRS;
+        let mut words = vec![0_u64; cells * width];
+        for point in 0..owned {
+            let Share { moduli, springs } = share(point);
+            let place = self.place(model, point);
+            let own = &mut words[place.cell * width..][..width];
+            let mut add = |index: usize, unit: Option<Unit>, value: f64| {
+                if let Some(unit) = unit {
+                    own[index] = own[index].wrapping_add(unit.round(value) as u64);
+                }
+            };
+            add(0, units[0], moduli[0]);
+            add(1, units[0], moduli[1]);
+            for (d, spring) in springs.into_iter().enumerate().filter(|(_, k)| *k > 0.0) {
+                for (pair, (p, q)) in pairs::<D>().enumerate() {
+                    let value = spring * place.weight(p) * place.weight(q);
+                    add(2 + d * PAIRS + pair, units[1], value);
+                }
+            }
+        }
+        comm.sum(&mut words);
+        let value = |unit: Option<Unit>, word: u64| unit.map_or(0.0, |u| u.value(word as i64));
+        let [bulk, shear] = self.reference_stiffness();
+        self.matrix.clear();
+        for cell in 0..cells {
+            let own = &words[cell * width..][..width];
+            let moduli = [value(units[0], own[0]), value(units[0], own[1])];
+            let first = self.first_node(cell);
+            for (pair, (p, q)) in pairs::<D>().enumerate() {
+                for a in 0..D {
+                    for b in 0..D {
+                        let entry = (p * D + a) * CORNERS * D + q * D + b;
+                        let spring = if a == b {
+                            value(units[1], own[2 + a * PAIRS + pair])
+                        } else {
+                            0.0
+                        };
+                        let stiffness = moduli[0] * bulk[entry] + moduli[1] * shear[entry];
+                        let row = (first + self.corner(p)) * D + a;
+                        let column = (first + self.corner(q)) * D + b;
+                        // The other half of a pair of nodes is the transposed one.
+                        if row >= column {
+                            self.matrix.add(row, column, stiffness + spring);
+                        } else if p != q {
+                            self.matrix.add(column, row, stiffness + spring);
+                        }
+                    }
+                }
+            }
+        }
+        self.matrix.factor();
+    }
+
+    /// Find the displacements of the nodes under forces on the owned points (N/m³, by component). Collective.
+    pub fn solve(&mut self, comm: &dyn Communicator, model: &Model<D>, force: &[Vec<f64>; D]) {
+        let owned = model.owned();
+        let largest = (0..owned).into_par_iter().with_min_len(CHUNK).map(|point| {
+            let volume = model.volume[point];
+            let force = force.iter().map(|column| (volume * column[point]).abs());
+            force.fold(0.0, f64::max)
+        });
+        let mut largest = [largest.reduce(|| 0.0, f64::max)];
+        comm.max(&mut largest);
+        let Some(unit) = Unit::of(largest[0], model.total) else {
+            self.values.fill(0.0);
+            return;
+        };
+        // Taken out while they are written.
+        let mut parts = std::mem::take(&mut self.parts);
+        let size = owned.div_ceil(parts.len()).max(1);
+        parts.par_iter_mut().enumerate().for_each(|(part, sums)| {
+            sums.fill(0);
+            for point in (part * size).min(owned)..((part + 1) * size).min(owned) {
+                let place = self.place(model, point);
+                let volume = model.volume[point];
+                for p in 0..1 << D {
+                    let (weight, node) = (place.weight(p), place.node + self.corner(p));
+                    for d in 0..D {
+                        sums[node * D + d] += unit.round(weight * (volume * force[d][point]));
+                    }
+                }
+            }
+        });
+        self.words.fill(0);
+        for sums in &parts {
+            for (word, sum) in self.words.iter_mut().zip(sums) {
+                *word = word.wrapping_add(*sum as u64);
+            }
+        }
+        self.parts = parts;
+        comm.sum(&mut self.words);
+        for (value, word) in self.values.iter_mut().zip(&self.words) {
+            *value = unit.value(*word as i64);
+        }
+        self.matrix.solve(&mut self.values);
+    }
+
+    /// A component of the displacement of an owned point after [`Self::solve`], m.
+    pub fn displacement(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
+        let place = self.place(model, point);
+        let of = |p: usize| place.weight(p) * self.values[(place.node + self.corner(p)) * D + d];
+        (0..1 << D).map(of).sum()
+    }
+
+    /// The place of an owned point.
+    fn place(&self, model: &Model<D>, point: usize) -> Place<D> {
+        let mut place = Place {
+            cell: 0,
+            node: 0,
+            along: [0.0; D],
+        };
+        for d in 0..D {
+            let along = (model.reference[d][point] - self.lower[d]) * self.per_length[d];
+            let cell = (along as usize).min(self.cells[d] - 1);
+            place.cell += cell * self.cell_strides[d];
+            place.node += cell * self.node_strides[d];
+            place.along[d] = along - cell as f64;
+        }
+        place
+    }
+
+    /// The first node of a cell.
+    fn first_node(&self, cell: usize) -> usize {
+        let along = |d: usize| cell / self.cell_strides[d] % self.cells[d];
+        (0..D).map(|d| along(d) * self.node_strides[d]).sum()
+    }
+
+    /// The number of a node of a cell, from that of the first one.
+    fn corner(&self, corner: usize) -> usize {
+        let strides = self.node_strides.iter().enumerate();
+        strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
+    }
+
+    /// The stiffness of a cell for λ V = 1 and for G V = 1, over its volume, between components of its nodes.
+    fn reference_stiffness(&self) -> [Vec<f64>; 2] {
+        let mut both = [0; 2].map(|_| vec![0.0; (CORNERS * D) * (CORNERS * D)]);
+        let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
+        let share = 1.0 / f64::from(1_u32 << D);
+        for number in 0..1_usize << D {
+            let at = Place::<D> {
+                cell: 0,
+                node: 0,
+                along: std::array::from_fn(|d| gauss[number >> d & 1]),
+            };
+            let slopes: Vec<[f64; D]> =
+                (0..1 << D).map(|p| at.slope(p, &self.per_length)).collect();
+            for (p, of_p) in slopes.iter().enumerate() {
+                for (q, of_q) in slopes.iter().enumerate() {
+                    let product: f64 = (0..D).map(|d| of_p[d] * of_q[d]).sum();
+                    for a in 0..D {
+                        for b in 0..D {
+                            let entry = (p * D + a) * CORNERS * D + q * D + b;
+                            let same = if a == b { product } else { 0.0 };
+                            both[0][entry] += share * of_p[a] * of_q[b];
+                            both[1][entry] += share * (of_p[b] * of_q[a] + same);
+                        }
+                    }
+                }
+            }
+        }
+        both
+    }
+}
+
+impl<const D: usize> Place<D> {
+    /// The weight of a node of the cell.
+    fn weight(&self, corner: usize) -> f64 {
+        let along = self.along.iter().enumerate();
+        along
+            .map(|(d, along)| weight(corner >> d & 1, *along))
+            .product()
+    }
+
+    /// The slope of the weight of a node, 1/m.
+    fn slope(&self, corner: usize, per_length: &[f64; D]) -> [f64; D] {
+        std::array::from_fn(|d| {
+            let others = (0..D).filter(|other| *other != d);
+            let others: f64 = others
+                .map(|other| weight(corner >> other & 1, self.along[other]))
+                .product();
+            let sign = if corner >> d & 1 == 1 { 1.0 } else { -1.0 };
+            sign * per_length[d] * others
+        })
+    }
+}
+
+/// The weight of the lower (0) or the upper (1) end of a cell along an axis.
+fn weight(end: usize, along: f64) -> f64 {
+    if end == 1 { along } else { 1.0 - along }
+}
+
+/// Pairs of nodes of a cell, p ≤ q.
+fn pairs<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
+    (0..1 << D).flat_map(|q| (0..=q).map(move |p| (p, q)))
+}
+
+/// How many cells a grid has along each axis, and in which order its nodes are numbered.
+struct Shape<const D: usize> {
+    cells: [usize; D],
+    node_strides: [usize; D],
+    cell_strides: [usize; D],
+    /// Size and band of its matrix.
+    size: usize,
+    band: usize,
+}
+
+impl<const D: usize> Shape<D> {
+    /// Of a box with these lengths (m) and cells of at least an edge (m). Nodes are numbered along the axis with the
+    /// fewest first, so that the band is narrow.
+    fn new(length: [f64; D], edge: f64) -> Self {
+        let cells = length.map(|length| ((length / edge) as usize).max(1));
+        let mut axes: [usize; D] = std::array::from_fn(|d| d);
+        axes.sort_by_key(|d| cells[*d]);
+        let (mut node_strides, mut cell_strides) = ([0; D], [0; D]);
+        let (mut nodes, mut all) = (1, 1);
+        for d in axes {
+            node_strides[d] = nodes;
+            cell_strides[d] = all;
+            nodes *= cells[d] + 1;
+            all *= cells[d];
+        }
+        Self {
+            cells,
+            node_strides,
+            cell_strides,
+            size: nodes * D,
+            band: node_strides.iter().sum::<usize>() * D + D - 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+    use crate::solver::palette_column::PaletteColumn;
+
+    /// Every `size`-th of 41 points, 1 m apart and of 1 m³, from one on.
+    fn bar(first: usize, size: usize) -> (Model<1>, Vec<usize>) {
+        let own: Vec<usize> = (first..41).step_by(size).collect();
+        let model = Model {
+            reference: [own.iter().map(|point| *point as f64).collect()],
+            volume: PaletteColumn::new(vec![1.0; own.len()]),
+            block: vec![0; own.len()],
+            ids: own.iter().map(|point| *point as u64).collect(),
+            total: 41,
+            ..Model::empty()
+        };
+        (model, own)
+    }
+
+    #[test]
+    fn a_bar_on_a_spring_is_stretched_alike_on_any_ranks() {
+        let (modulus, spring, force) = (50.0, 3.0, 0.7);
+        let run = |ranks: usize| {
+            let parts = threads::run(ranks, |comm| {
+                let (model, own) = bar(comm.rank(), comm.size());
+                let mut grid = CoarseGrid::new(comm, &model, 4.0);
+                grid.assemble(comm, &model, |point| Share {
+                    moduli: [0.0, 0.5 * modulus],
+                    springs: [if own[point] == 0 { spring } else { 0.0 }],
+                });
+                let load = own
+                    .iter()
+                    .map(|point| if *point == 40 { force } else { 0.0 });
+                grid.solve(comm, &model, &[load.collect()]);
+                let at = |k: usize| (own[k], grid.displacement(&model, 0, k).to_bits());
+                (0..own.len()).map(at).collect::<Vec<_>>()
+            });
+            let mut all = parts.concat();
+            all.sort_unstable();
+            all
+        };
+        let one = run(1);
+        let of = |point: usize| f64::from_bits(one[point].1);
+        let (start, end) = (force / spring, force / spring + force * 40.0 / modulus);
+        assert!((of(0) - start).abs() < 1e-9, "{}", of(0));
+        // The last cell has one point more than the others.
+        assert!((of(40) / end - 1.0).abs() < 0.03, "{} {end}", of(40));
+        for ranks in [2, 3] {
+            assert_eq!(run(ranks), one);
+        }
+    }
+}

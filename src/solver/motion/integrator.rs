@@ -1,0 +1,26 @@
+//! How a stage of a run advances: one integrator for each method.
+
+use crate::problem::{Method, Time};
+use crate::solver::Simulation;
+
+use super::adaptive::AdaptiveVerlet;
+use super::newton::NewtonKrylov;
+use super::relaxation::DynamicRelaxation;
+use super::verlet::Verlet;
+
+/// The method of a stage.
+pub trait Integrator<const D: usize>: Send + Sync {
+    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending`: the half kick of
+    /// the step before is not applied yet. Returns whether this step has one pending. Collective.
+    fn advance(&mut self, simulation: &mut Simulation<'_, D>, half_kick_pending: bool) -> bool;
+}
+
+/// The integrator of a stage.
+pub fn integrator<const D: usize>(time: &Time) -> Box<dyn Integrator<D>> {
+    match (time.method, time.adaptive) {
+        (Method::Explicit, None) => Box::new(Verlet),
+        (Method::Explicit, Some(rule)) => Box::new(AdaptiveVerlet(rule)),
+        (Method::Relaxation(rule), _) => Box::new(DynamicRelaxation(rule)),
+        (Method::Static(rule), _) => Box::new(NewtonKrylov::new(rule)),
+    }
+}

@@ -1,0 +1,421 @@
+//! Load steps: from one equilibrium to the next, whichever method finds it.
+//!
+//! A load step moves time, which is the load parameter, and with it loads and supports. A method then looks for the
+//! equilibrium: [`super::relaxation`] or [`super::newton`].
+//!
+//! Bonds break at equilibria only: in equilibrium those that must break do, and the next equilibrium is looked for at
+//! the same load, until nothing breaks. The history of bonds and points is part of the equilibrium. Each iteration takes
+//! the forces from the history that a step from the last equilibrium to the present place would leave, and stores it
+//! when the equilibrium is found.
+//!
+//! The equilibrium is found when ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). Without loads and reactions, as in a
+//! free body that is moved, both sides are round-off; so ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is an equilibrium, too. ρ bounds
+//! the stiffness of a point, hence ε ‖V ρ u‖ the forces that come from rounding u.
+
+use rayon::prelude::*;
+
+use crate::comm::sum::reduce;
+use crate::comm::{ExactSum, Found, least, total};
+use crate::error::{Error, Result};
+use crate::solver::Simulation;
+use crate::solver::bonds::BondUpdate;
+use crate::solver::conditions::Work;
+use crate::solver::model::Model;
+
+use super::Fields;
+use super::stable_step::largest_eigenvalue;
+
+/// Points handled by one task.
+pub(super) const CHUNK: usize = 4096;
+
+/// How much larger the fictitious density is than the bound, for bonds that turn.
+const MARGIN: f64 = 1.2;
+
+/// Forces on the points are round-off below this share of ‖V ρ u‖.
+const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
+
+/// How far a load step has come; the same on all ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadStep {
+    /// Iterations made in this load step.
+    pub iterations: u64,
+    /// Those of them since bonds broke.
+    pub since_breaking: u64,
+    /// ‖f‖/(‖loads‖ + ‖reactions‖), norms of the forces on the points; 0 where f is round-off, not a number before
+    /// the first load step.
+    pub residual: f64,
+    /// c of a relaxation; not a number from rest.
+    pub(super) damping: f64,
+    /// The largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N: a body that is unloaded, or broken
+    /// in two, is not looked at more closely than when it was loaded.
+    pub(super) scale: f64,
+    /// Bonds have broken in an equilibrium of this load step.
+    pub(super) has_broken: bool,
+    /// Whether the equilibrium has been found, and nothing more breaks.
+    pub is_settled: bool,
+    /// Whether it has not been found in as many iterations as there may be.
+    pub has_failed: bool,
+}
+
+impl Default for LoadStep {
+    fn default() -> Self {
+        Self {
+            iterations: 0,
+            since_breaking: 0,
+            residual: f64::NAN,
+            damping: f64::NAN,
+            scale: 0.0,
+            has_broken: false,
+            is_settled: true,
+            has_failed: false,
+        }
+    }
+}
+
+impl LoadStep {
+    /// What has failed at a time (s).
+    fn failure(&self, time: f64) -> String {
+        let iterations = self.since_breaking;
+        format!("t = {time:.6e} s: no equilibrium within {iterations} iterations")
+    }
+
+    /// Find the residual from the squares of the norms of [`balance`].
+    pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
+        let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
+        let scale = (loads + reactions).max(self.scale);
+        let is_round_off = free <= ROUND_OFF * stiffness;
+        self.residual = if is_round_off { 0.0 } else { free / scale };
+    }
+
+    /// All of it, as a checkpoint holds it.
+    pub fn words(&self) -> [u64; 8] {
+        let [residual, damping, scale] =
+            [self.residual, self.damping, self.scale].map(f64::to_bits);
+        let [broken, settled, failed] =
+            [self.has_broken, self.is_settled, self.has_failed].map(u64::from);
+        let counts = [self.iterations, self.since_breaking];
+        [
+            counts[0], counts[1], residual, damping, scale, broken, settled, failed,
+        ]
+    }
+
+    /// What [`Self::words`] gave.
+    pub fn of_words(words: [u64; 8]) -> Self {
+        let [
+            iterations,
+            since_breaking,
+            residual,
+            damping,
+            scale,
+            broken,
+            settled,
+            failed,
+        ] = words;
+        let [residual, damping, scale] = [residual, damping, scale].map(f64::from_bits);
+        Self {
+            iterations,
+            since_breaking,
+            residual,
+            damping,
+            scale,
+            has_broken: broken == 1,
+            is_settled: settled == 1,
+            has_failed: failed == 1,
+        }
+    }
+}
+
+/// The density (N/m⁴) with which iterations of Δt = 1 are stable, for the largest eigenvalue of D of
+/// [`super::stable_step`], N/m⁴.
+pub fn stable_density(eigenvalue: f64) -> f64 {
+    0.5 * MARGIN * eigenvalue
+}
+
+/// Bound of the stiffness of each owned point as a density (N/m⁴): with it iterations of Δt = 1 are stable; infinite for one
+/// without bonds. `stiffness` is that of [`super::stable_step`].
+pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
+    let density = |point: usize| {
+        let entries = stiffness.each_ref().map(|column| column[point]);
+        match stable_density(largest_eigenvalue(&entries)) {
+            0.0 => f64::INFINITY,
+            density => density,
+        }
+    };
+    (0..stiffness[0].len()).map(density).collect()
+}
+
+/// Squares of the norms that the residual follows from, of a point with a fictitious density (N/m⁴): the total force,
+/// loads, reactions (N), and V ρ u.
+pub(super) fn balance<const D: usize>(
+    model: &Model<D>,
+    fields: &Fields<D>,
+    point: usize,
+    density: f64,
+) -> [f64; 4] {
+    let volume = model.volume[point];
+    let of = |field: &Option<[Vec<f64>; D]>, d: usize| field.as_ref().map_or(0.0, |f| f[d][point]);
+    let mut squares = [0.0; 4];
+    for d in 0..D {
+        squares[0] += (volume * fields.total_force(model, d, point)).powi(2);
+        squares[1] += (volume * of(&fields.external_force, d)).powi(2);
+        squares[2] += (volume * of(&fields.reaction, d)).powi(2);
+        squares[3] += (volume * density * fields.displacement[d][point]).powi(2);
+    }
+    squares
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Take note of the last equilibrium, and move time, loads and supports on. Where the step keeps its size and
+    /// `extrapolates`, the points move as far as in the last load step.
+    pub(super) fn begin_load_step(&mut self, extrapolates: bool) {
+        self.walk(|part, mut here| {
+            here.before_moving(part);
+            true
+        });
+        self.note_equilibrium(extrapolates && !self.clock.is_new_size());
+        self.clock.advance();
+        let (time, step) = (self.clock.time(), self.clock.step());
+        self.apply_displacements(time, step);
+        self.apply_loads(time, false);
+        if let Some(contact) = &mut self.contact {
+            contact.place_rigid(time);
+        }
+        self.load_step = LoadStep {
+            scale: self.load_step.scale,
+            is_settled: false,
+            ..LoadStep::default()
+        };
+    }
+
+    /// Take note of the last equilibrium, and move the points `again` as far as in the last load step.
+    fn note_equilibrium(&mut self, again: bool) {
+        let owned = self.model.owned();
+        let fields = &mut self.fields;
+        if let Some(equilibrium) = &mut fields.equilibrium_displacement {
+            for d in 0..D {
+                let displacement = fields.displacement[d][..owned].par_iter_mut();
+                let both = displacement.zip(&mut equilibrium[d]);
+                both.with_min_len(CHUNK).for_each(|(now, before)| {
+                    let moved = *now - *before;
+                    *before = *now;
+                    if again {
+                        *now += moved;
+                    }
+                });
+            }
+        }
+        if let (Some(equilibrium), Some(reaction)) =
+            (&mut fields.equilibrium_reaction, &fields.reaction)
+        {
+            equilibrium.clone_from(reaction);
+        }
+    }
+
+    /// Evaluate the forces and reactions at the present place, for the history that the points would have if this were the
+    /// equilibrium of the load step. Collective.
+    pub(super) fn evaluate_at_rest(&mut self) {
+        self.evaluate(self.bond_update_at_rest());
+        self.apply_velocities();
+    }
+
+    /// Find the residual. Returns ‖f‖, N. Collective.
+    pub(super) fn find_residual(&mut self) -> f64 {
+        let (model, fields) = (&self.model, &self.fields);
+        let mut squares = sums(model, fields, |point, density| {
+            balance(model, fields, point, density)
+        });
+        let squares = reduce(self.comm, &mut squares);
+        let squares = std::array::from_fn(|k| squares[k]);
+        self.load_step.set_residual(squares);
+        f64::sqrt(squares[0])
+    }
+
+    /// The time by which the history of bonds advances at the next equilibrium (s): once in a load step, however often
+    /// bonds break.
+    fn time_to_advance(&self) -> f64 {
+        if self.load_step.has_broken {
+            0.0
+        } else {
+            self.clock.step()
+        }
+    }
+
+    /// How forces follow from the present place without a change of the state: during a load step from the history that
+    /// bonds would have if this were its equilibrium.
+    pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
+        if self.load_step.is_settled {
+            BondUpdate::None
+        } else {
+            BondUpdate::Trial(self.time_to_advance())
+        }
+    }
+
+    /// In equilibrium: break the bonds that must. Where none does, the load step is over. Returns whether any broke; then
+    /// the forces are still those before.
+    pub(super) fn break_or_settle(&mut self) -> bool {
+        self.raise_scale();
+        let is_first = !self.load_step.has_broken;
+        self.evaluate(BondUpdate::Step(self.time_to_advance()));
+        let breaks = total(self.comm, self.forces.broken().len() as u64) > 0;
+        match (is_first, breaks) {
+            (true, true) => self.add_work_since_equilibrium(Work::FirstEquilibrium),
+            (true, false) => self.add_work_since_equilibrium(Work::Trapezoid),
+            (false, true) => {}
+            (false, false) => self.add_work_since_equilibrium(Work::LastEquilibrium),
+        }
+        if breaks {
+            self.load_step.has_broken = true;
+            self.load_step.since_breaking = 0;
+        }
+        self.load_step.is_settled = !breaks;
+        breaks
+    }
+
+    /// Sum of the squares of the forces of rigid bodies on the points of this rank, N².
+    pub(super) fn rigid_forces(&self) -> ExactSum {
+        let contact = self.contact.as_ref();
+        contact.map_or(ExactSum::ZERO, |contact| contact.rigid_forces().clone())
+    }
+
+    /// Raise the scale to the loads and reactions of the present equilibrium.
+    fn raise_scale(&mut self) {
+        let (model, fields) = (&self.model, &self.fields);
+        let [loads, mut reactions] = sums(model, fields, |point, _| {
+            let of = |field: &Option<[Vec<f64>; D]>| {
+                let square = |f: &[Vec<f64>; D]| f.iter().map(|f| f[point].powi(2)).sum::<f64>();
+                model.volume[point].powi(2) * field.as_ref().map_or(0.0, square)
+            };
+            [of(&fields.external_force), of(&fields.reaction)]
+        });
+        reactions.merge(&self.rigid_forces());
+        let norms = reduce(self.comm, &mut [loads, reactions]);
+        let scale = norms.into_iter().map(f64::sqrt).sum();
+        self.load_step.scale = self.load_step.scale.max(scale);
+    }
+
+    /// An error if the present load step has failed. Collective.
+    ///
+    /// # Errors
+    /// Names a piece that loads act on and nothing holds, if there is one, else says how near it came.
+    pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
+        if !self.load_step.has_failed {
+            return Ok(());
+        }
+        let mut failure = self.load_step.failure(self.clock.time());
+        if self.newton.halvings > 0 {
+            failure += &format!(", the load step halved {} times", self.newton.halvings);
+        }
+        // Contact can hold pieces as well.
+        if self.contact.is_none() {
+            self.check_pieces_are_held(&failure)?;
+        }
+        let residual = self.load_step.residual;
+        let balance = if residual.is_finite() {
+            let worst = self.worst_point();
+            format!(
+                "are still {residual:.1e} of loads and reactions{worst}. More load than the body bears?"
+            )
+        } else {
+            "are more than round-off, without loads and reactions.".to_owned()
+        };
+        Err(Error::run(format!(
+            "{failure}; the forces out of balance {balance} Otherwise {} or a larger `tolerance`",
+            self.time_rule().method.remedy()
+        )))
+    }
+
+    /// Where the largest force out of balance acts, as words. Collective.
+    fn worst_point(&self) -> String {
+        let (model, fields) = (&self.model, &self.fields);
+        let density = fields.fictitious_density.as_deref().unwrap_or_default();
+        let force = |point: usize| {
+            let square = |d: usize| fields.total_force(model, d, point).powi(2);
+            model.volume[point] * (0..D).map(square).sum::<f64>().sqrt()
+        };
+        let bonded = (0..model.owned()).filter(|point| density[*point].is_finite());
+        let own = bonded.map(|point| (point, force(point)));
+        let order = |(a, of_a): &(usize, f64), (b, of_b): &(usize, f64)| {
+            let ids = model.ids[*b].cmp(&model.ids[*a]);
+            of_a.total_cmp(of_b).then(ids)
+        };
+        let own = own.max_by(order).map(|(point, force)| {
+            let [x, y, z] = model.position(point);
+            Found {
+                key: -force,
+                ids: [model.ids[point]],
+                payload: [f64::from(model.block[point]), x, y, z],
+            }
+        });
+        let Some(Found {
+            key,
+            ids: [id],
+            payload: [block, position @ ..],
+        }) = least(self.comm, own)
+        else {
+            return String::new();
+        };
+        format!(
+            ", most of them {:.1e} N at point {id} of body `{}`, {:?} m",
+            -key,
+            self.problem.block(block as usize).body.name,
+            &position[..D]
+        )
+    }
+
+    /// Add the work of loads and supports since the last load step, which ended in equilibrium.
+    fn add_work_since_equilibrium(&mut self, work: Work) {
+        let (then, now) = (self.clock.time_before(), self.clock.time());
+        // Taken out while they are read.
+        let displacement = self.fields.equilibrium_displacement.take();
+        let reaction = self.fields.equilibrium_reaction.take();
+        if let Some(displacement) = &displacement {
+            self.conditions.set_loads(then, true);
+            self.walk(|part, mut here| {
+                let reaction = reaction.as_ref().map(|field| part.of(field));
+                here.find_loads();
+                here.remember(part.of(displacement), reaction);
+                true
+            });
+            self.conditions.set_loads(now, true);
+        }
+        self.walk(|part, mut here| {
+            here.find_loads();
+            here.add_work(part, work);
+            true
+        });
+        self.fields.equilibrium_displacement = displacement;
+        self.fields.equilibrium_reaction = reaction;
+    }
+}
+
+/// Sums over the owned points with bonds: `terms` finds those of a point from its index and its
+/// fictitious density (N/m⁴).
+pub(super) fn sums<const D: usize, const N: usize>(
+    model: &Model<D>,
+    fields: &Fields<D>,
+    terms: impl Fn(usize, f64) -> [f64; N] + Sync,
+) -> [ExactSum; N] {
+    let density = fields.relaxation_density();
+    (0..model.owned().div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let mut sums = [const { ExactSum::ZERO }; N];
+            for point in chunk * CHUNK..((chunk + 1) * CHUNK).min(model.owned()) {
+                let density = density.at(point);
+                if density.is_finite() {
+                    let terms = terms(point, density);
+                    sums.iter_mut()
+                        .zip(terms)
+                        .for_each(|(sum, term)| sum.add(term));
+                }
+            }
+            sums
+        })
+        .reduce(
+            || [const { ExactSum::ZERO }; N],
+            |mut a, b| {
+                a.iter_mut().zip(&b).for_each(|(a, b)| a.merge(b));
+                a
+            },
+        )
+}

@@ -1,0 +1,655 @@
+//! Equilibria by an inexact Newton method with conjugate gradients.
+//!
+//! [`super::load_step`] says what an equilibrium is, and when bonds break. An iteration is
+//!
+//! ```text
+//! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
+//! u ← u + s x                              s = 1, or where x·f(u + s x) is small
+//! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: by how much the forces are not linear
+//! ```
+//!
+//! (Eisenstat & Walker 1996 for η; Knoll & Keyes 2004 for the differences.) f holds the reactions, so that it is 0 for
+//! supported components. All differences are taken at the history of the last equilibrium with its trial update, so that
+//! K is the consistent tangent where points yield. ε moves no point by more than `SHIFT` horizons: the error
+//! of the difference is then of the order of this share for bonds that turn, and of ε/`SHIFT` from rounding.
+//!
+//! K is symmetric for laws with an energy. Where it is not positive definite, as in a body that softens or buckles, the
+//! conjugate gradients end at the first direction of negative curvature. The preconditioner adds up two parts: the
+//! diagonal, which is good for short waves, and a [coarse grid](super::coarse_grid), for long ones.
+//!
+//! The first iteration of a load step of another size than the one before, and after one in which bonds broke, is taken
+//! about the last equilibrium with the prescribed displacements as part of the motion. Others begin where the points get to
+//! if they move as far as in the last load step.
+//!
+//! A load step without an equilibrium is repeated with half its size, and again up to `max_halvings` times, unless bonds
+//! have broken in it: then its load has been reached. The halves are made up to where the whole load step would have ended.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::comm::sum::reduce;
+use crate::dimension::{Constraint, Dimension};
+use crate::elastic::Isotropic;
+use crate::problem::Static;
+use crate::solver::Simulation;
+
+use super::coarse_grid::{CoarseGrid, Share};
+use super::integrator::Integrator;
+use super::load_step::{CHUNK, sums};
+
+/// How far the largest component of a difference moves a point, horizons.
+const SHIFT: f64 = 1e-6;
+
+/// Most conjugate gradients of an iteration.
+const MOST_GRADIENTS: u64 = 500;
+
+/// Most places that are looked at along a direction.
+const MOST_PLACES: usize = 8;
+
+/// A place along a direction is good where its power x·f is at most this share of the one at its begin.
+const POWER_LEFT: f64 = 0.9;
+
+/// η of the first iteration of a run, and the largest η.
+const FIRST_FORCING: f64 = 0.01;
+const MOST_FORCING: f64 = 0.1;
+
+/// Share of the tolerance to which the linear problem is solved at most.
+const OF_TOLERANCE: f64 = 0.5;
+
+/// The least share of intact bonds that counts in the diagonal.
+const LEAST_INTACT: f64 = 1e-3;
+
+/// What the method remembers from one load step to the next; the same on all ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NewtonState {
+    /// Force evaluations of the present load step, whichever method makes it.
+    pub evaluations: u64,
+    /// η of the next iteration.
+    forcing: f64,
+    /// The mean diagonal of K over the fictitious density; not a number before it is known.
+    diagonal: f64,
+    /// How often the present load step has been halved.
+    pub halvings: u64,
+    /// Load steps of the present size up to where the whole one ends.
+    left: u64,
+}
+
+impl Default for NewtonState {
+    fn default() -> Self {
+        Self {
+            evaluations: 0,
+            forcing: FIRST_FORCING,
+            diagonal: f64::NAN,
+            halvings: 0,
+            left: 1,
+        }
+    }
+}
+
+impl NewtonState {
+    /// All of it, as a checkpoint holds it.
+    pub fn words(&self) -> [u64; 5] {
+        let [forcing, diagonal] = [self.forcing, self.diagonal].map(f64::to_bits);
+        [
+            self.evaluations,
+            forcing,
+            diagonal,
+            self.halvings,
+            self.left,
+        ]
+    }
+
+    /// What [`Self::words`] gave.
+    pub fn of_words([evaluations, forcing, diagonal, halvings, left]: [u64; 5]) -> Self {
+        let [forcing, diagonal] = [forcing, diagonal].map(f64::from_bits);
+        Self {
+            evaluations,
+            forcing,
+            diagonal,
+            halvings,
+            left,
+        }
+    }
+}
+
+/// The method with its vectors.
+pub struct NewtonKrylov<const D: usize> {
+    rule: Static,
+    /// Allocated in the first iteration.
+    vectors: Option<Vectors<D>>,
+}
+
+impl<const D: usize> NewtonKrylov<D> {
+    /// Follows a rule.
+    pub fn new(rule: Static) -> Self {
+        Self {
+            rule,
+            vectors: None,
+        }
+    }
+}
+
+impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
+    fn advance(&mut self, simulation: &mut Simulation<'_, D>, _half_kick_pending: bool) -> bool {
+        let (start, forces) = (Instant::now(), simulation.times.forces.whole());
+        let rule = self.rule;
+        let vectors = (self.vectors).get_or_insert_with(|| Vectors::new(simulation));
+        if simulation.load_step.is_settled {
+            vectors.begin_load_step(simulation, &rule);
+        } else {
+            vectors.iterate(simulation, &rule);
+        }
+        if simulation.load_step.residual <= rule.tolerance {
+            if simulation.break_or_settle() {
+                vectors.is_stale = true;
+                simulation.evaluate_at_rest();
+                simulation.find_residual();
+            } else {
+                simulation.end_halves();
+            }
+        } else if simulation.load_step.residual.is_nan()
+            || simulation.load_step.since_breaking >= rule.max_iterations
+        {
+            vectors.halve_or_fail(simulation, &rule);
+        }
+        let forces = simulation.times.forces.whole() - forces;
+        simulation.times.motion += start.elapsed().saturating_sub(forces);
+        false
+    }
+}
+
+/// Vectors over the owned points.
+struct Vectors<const D: usize> {
+    /// u about which differences are taken, m, and f there, N/m³.
+    base: [Vec<f64>; D],
+    force: [Vec<f64>; D],
+    /// x, m.
+    correction: [Vec<f64>; D],
+    /// f − K x, N/m³.
+    residual: [Vec<f64>; D],
+    /// The present direction, m.
+    direction: [Vec<f64>; D],
+    /// K times it, N/m³.
+    product: [Vec<f64>; D],
+    /// The residual times the preconditioner, m.
+    preconditioned: [Vec<f64>; D],
+    /// Of the diagonal of K, m⁴/N; 0 for supported components and points that have never had a bond.
+    inverse_diagonal: [Vec<f64>; D],
+    coarse: CoarseGrid<D>,
+    /// Bonds have broken since the preconditioner was made.
+    is_stale: bool,
+    /// The shortest horizon, m.
+    horizon: f64,
+}
+
+impl<const D: usize> Vectors<D> {
+    fn new(simulation: &Simulation<'_, D>) -> Self {
+        let (model, comm) = (&simulation.model, simulation.comm);
+        let zero = || std::array::from_fn(|_| vec![0.0; model.owned()]);
+        let horizons = simulation.problem.blocks().map(|block| block.horizon);
+        let horizon = horizons.fold(f64::INFINITY, f64::min);
+        Self {
+            base: zero(),
+            force: zero(),
+            correction: zero(),
+            residual: zero(),
+            direction: zero(),
+            product: zero(),
+            preconditioned: zero(),
+            inverse_diagonal: zero(),
+            coarse: CoarseGrid::new(comm, model, horizon),
+            is_stale: true,
+            horizon,
+        }
+    }
+
+    /// Begin a load step, and find the residual at the place that the points are expected in.
+    fn begin_load_step(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
+        let follows_the_last = !simulation.clock.is_new_size() && !simulation.load_step.has_broken;
+        self.refresh(simulation);
+        simulation.begin_load_step(follows_the_last);
+        if follows_the_last {
+            simulation.evaluate_at_rest();
+            simulation.find_residual();
+        } else {
+            self.predict(simulation, rule);
+        }
+    }
+
+    /// Make the first iteration of a load step about the last equilibrium.
+    fn predict(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
+        let owned = simulation.model.owned();
+        let fields = &mut simulation.fields;
+        let equilibrium = fields.equilibrium_displacement.as_ref();
+        for (d, equilibrium) in equilibrium.into_iter().flatten().enumerate() {
+            self.base[d].copy_from_slice(equilibrium);
+            for point in 0..owned {
+                self.correction[d][point] = fields.displacement[d][point] - equilibrium[point];
+            }
+            self.direction[d].copy_from_slice(&self.correction[d]);
+            fields.displacement[d][..owned].copy_from_slice(equilibrium);
+        }
+        simulation.evaluate_at_rest();
+        self.note_force(simulation);
+        self.multiply(simulation);
+        add(&mut self.residual, -1.0, &self.product);
+        let scale = simulation.load_step.scale;
+        let linear = self.solve(simulation, rule.tolerance * scale);
+        move_from(simulation, &self.base, 1.0, &self.correction);
+        let (time, step) = (simulation.clock.time(), simulation.clock.step());
+        simulation.apply_displacements(time, step);
+        simulation.evaluate_at_rest();
+        let force = simulation.find_residual();
+        simulation.newton.adapt(linear, force);
+    }
+
+    /// Make an iteration.
+    fn iterate(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
+        simulation.load_step.iterations += 1;
+        simulation.load_step.since_breaking += 1;
+        self.refresh(simulation);
+        let owned = simulation.model.owned();
+        for d in 0..D {
+            self.base[d].copy_from_slice(&simulation.fields.displacement[d][..owned]);
+            self.correction[d].fill(0.0);
+        }
+        self.note_force(simulation);
+        let scale = self.residual_norm(simulation) / simulation.load_step.residual;
+        let linear = self.solve(simulation, rule.tolerance * scale);
+        let force = self.search(simulation, rule);
+        simulation.newton.adapt(linear, force);
+    }
+
+    /// Take note of the forces at the base.
+    fn note_force(&mut self, simulation: &Simulation<'_, D>) {
+        let (model, fields) = (&simulation.model, &simulation.fields);
+        for d in 0..D {
+            let inverse = &self.inverse_diagonal[d];
+            let both = self.force[d].par_iter_mut().zip(&mut self.residual[d]);
+            both.with_min_len(CHUNK)
+                .enumerate()
+                .for_each(|(point, (force, residual))| {
+                    *force = fields.total_force(model, d, point);
+                    *residual = if inverse[point] > 0.0 { *force } else { 0.0 };
+                });
+        }
+    }
+
+    /// Add to x until ‖f − K x‖ is small, in any case where it is below `allowed`, which ‖f‖ may be in equilibrium (N).
+    /// Collective.
+    fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
+        let first = self.residual_norm(simulation);
+        let mut linear = Linear { first, last: first };
+        let wanted = simulation.newton.forcing * first;
+        let wanted = wanted.max(OF_TOLERANCE * allowed);
+        // Power of the residual along the last direction, and the length of the step along it.
+        let (mut power, mut length) = (f64::NAN, 0.0);
+        for number in 0..MOST_GRADIENTS {
+            if linear.last.is_nan() || linear.last <= wanted {
+                break;
+            }
+            self.precondition(simulation);
+            let own = dot(simulation, &self.residual, &self.preconditioned);
+            // The residual has changed by −`length` K times the last direction.
+            let kept = if number == 0 {
+                0.0
+            } else {
+                let change = dot(simulation, &self.product, &self.preconditioned);
+                (-length * change / power).max(0.0)
+            };
+            power = own;
+            for (direction, preconditioned) in self.direction.iter_mut().zip(&self.preconditioned) {
+                let pairs = direction.par_iter_mut().zip(preconditioned);
+                pairs
+                    .with_min_len(CHUNK)
+                    .for_each(|(direction, new)| *direction = new + kept * *direction);
+            }
+            self.multiply(simulation);
+            let curvature = dot(simulation, &self.direction, &self.product);
+            if curvature.is_nan() || curvature <= 0.0 {
+                if number == 0 {
+                    add(&mut self.correction, 1.0, &self.direction);
+                }
+                break;
+            }
+            length = power / curvature;
+            add(&mut self.correction, length, &self.direction);
+            add(&mut self.residual, -length, &self.product);
+            linear.last = self.residual_norm(simulation);
+        }
+        linear
+    }
+
+    /// ‖f − K x‖, N. Collective.
+    fn residual_norm(&self, simulation: &Simulation<'_, D>) -> f64 {
+        let (model, fields) = (&simulation.model, &simulation.fields);
+        let square = sums(model, fields, |point, _| {
+            let force = |d: usize| model.volume[point] * self.residual[d][point];
+            [(0..D).map(|d| f64::powi(force(d), 2)).sum()]
+        });
+        reduce(simulation.comm, &mut { square })[0].sqrt()
+    }
+
+    /// Find K times the direction. Collective.
+    fn multiply(&mut self, simulation: &mut Simulation<'_, D>) {
+        let columns = self.direction.par_iter().flatten();
+        let magnitude = columns.map(|component: &f64| component.abs());
+        let mut largest = [magnitude.reduce(|| 0.0, f64::max)];
+        simulation.comm.max(&mut largest);
+        if largest[0] == 0.0 {
+            self.product.iter_mut().for_each(|column| column.fill(0.0));
+            return;
+        }
+        let shift = SHIFT * self.horizon / largest[0];
+        move_from(simulation, &self.base, shift, &self.direction);
+        simulation.evaluate_at_rest();
+        let (model, fields) = (&simulation.model, &simulation.fields);
+        for d in 0..D {
+            let (force, inverse) = (&self.force[d], &self.inverse_diagonal[d]);
+            let product = self.product[d].par_iter_mut().with_min_len(CHUNK);
+            product.enumerate().for_each(|(point, product)| {
+                let change = force[point] - fields.total_force(model, d, point);
+                *product = if inverse[point] > 0.0 {
+                    change / shift
+                } else {
+                    0.0
+                };
+            });
+        }
+    }
+
+    /// Apply the preconditioner to the residual. Collective.
+    fn precondition(&mut self, simulation: &Simulation<'_, D>) {
+        let (model, comm) = (&simulation.model, simulation.comm);
+        self.coarse.solve(comm, model, &self.residual);
+        for d in 0..D {
+            let (residual, inverse) = (&self.residual[d], &self.inverse_diagonal[d]);
+            let coarse = &self.coarse;
+            let column = self.preconditioned[d].par_iter_mut().with_min_len(CHUNK);
+            column.enumerate().for_each(|(point, value)| {
+                *value = if inverse[point] > 0.0 {
+                    inverse[point] * residual[point] + coarse.displacement(model, d, point)
+                } else {
+                    0.0
+                };
+            });
+        }
+    }
+
+    /// Move the points along x to where its power is small, and find the residual there. Returns ‖f‖, N. Collective.
+    fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
+        let at_base = dot(simulation, &self.force, &self.correction);
+        let mut length = 1.0;
+        // Lengths between which the power changes its sign, with the powers there.
+        let (mut below, mut above) = ((0.0, at_base), None);
+        for place in 1.. {
+            move_from(simulation, &self.base, length, &self.correction);
+            simulation.evaluate_at_rest();
+            let force = simulation.find_residual();
+            let power = self.power(simulation);
+            let is_good = power.abs() <= POWER_LEFT * at_base
+                || simulation.load_step.residual <= rule.tolerance;
+            if is_good || place == MOST_PLACES || at_base <= 0.0 {
+                return force;
+            }
+            if power.is_nan() {
+                length = 0.5 * (below.0 + length);
+                continue;
+            }
+            if power > 0.0 {
+                below = (length, power);
+            } else {
+                above = Some((length, power));
+            }
+            length = match above {
+                None => 2.0 * length,
+                Some((end, power)) => {
+                    let width = end - below.0;
+                    let share = below.1 / (below.1 - power);
+                    below.0 + width * share.clamp(0.1, 0.9)
+                }
+            };
+        }
+        unreachable!("the loop returns")
+    }
+
+    /// Power x·f of the present forces, J. Collective.
+    fn power(&self, simulation: &Simulation<'_, D>) -> f64 {
+        let (model, fields) = (&simulation.model, &simulation.fields);
+        let power = sums(model, fields, |point, _| {
+            let of = |d: usize| self.correction[d][point] * fields.total_force(model, d, point);
+            [model.volume[point] * (0..D).map(of).sum::<f64>()]
+        });
+        reduce(simulation.comm, &mut { power })[0]
+    }
+
+    /// Make the preconditioner for the bonds that are intact, if it is not that. Collective.
+    fn refresh(&mut self, simulation: &mut Simulation<'_, D>) {
+        if !std::mem::take(&mut self.is_stale) {
+            return;
+        }
+        let (model, forces) = (&simulation.model, &mut simulation.forces);
+        let owned = model.owned();
+        let family = &simulation.family_volume;
+        let mut intact = forces.intact_families(model).volume;
+        for (point, share) in intact.iter_mut().enumerate() {
+            *share = if family[point] > 0.0 {
+                (*share / family[point]).max(LEAST_INTACT)
+            } else {
+                0.0
+            };
+        }
+        let is_free = simulation.conditions.free_components(owned);
+        let density = simulation.fields.fictitious_density.as_deref();
+        let density = density.expect("a run with equilibria has fictitious densities");
+        for d in 0..D {
+            for point in 0..owned {
+                let stiffness = density[point] * intact[point];
+                let takes_part = is_free[d][point] == 1.0 && stiffness.is_finite();
+                self.inverse_diagonal[d][point] = if takes_part && stiffness > 0.0 {
+                    1.0 / stiffness
+                } else {
+                    0.0
+                };
+            }
+        }
+        if simulation.newton.diagonal.is_nan() {
+            self.measure_diagonal(simulation);
+        }
+        let diagonal = simulation.newton.diagonal;
+        let columns = self.inverse_diagonal.iter_mut().flatten();
+        columns.for_each(|inverse| *inverse /= diagonal);
+        let problem = simulation.problem;
+        let moduli: Vec<[f64; 2]> = problem
+            .blocks()
+            .map(|block| moduli(block.body.material.elastic, problem.dimension))
+            .collect();
+        let model = &simulation.model;
+        let density = simulation.fields.fictitious_density.as_deref();
+        let density = density.expect("a run with equilibria has fictitious densities");
+        self.coarse.assemble(simulation.comm, model, |point| {
+            let weight = model.volume[point] * intact[point];
+            let stiffness = density[point] * diagonal * weight;
+            Share {
+                moduli: moduli[usize::from(model.block[point])].map(|modulus| weight * modulus),
+                springs: std::array::from_fn(|d| {
+                    if is_free[d][point] == 1.0 || !stiffness.is_finite() {
+                        0.0
+                    } else {
+                        stiffness
+                    }
+                }),
+            }
+        });
+    }
+
+    /// Find the mean diagonal of K over the fictitious density: with a vector s of random signs, s·K s is the trace of K
+    /// but for a small error (Hutchinson 1990). Collective.
+    fn measure_diagonal(&mut self, simulation: &mut Simulation<'_, D>) {
+        let owned = simulation.model.owned();
+        for d in 0..D {
+            self.base[d].copy_from_slice(&simulation.fields.displacement[d][..owned]);
+            for point in 0..owned {
+                let is_free = self.inverse_diagonal[d][point] > 0.0;
+                let sign = sign(simulation.model.ids[point], d);
+                self.direction[d][point] = if is_free { sign } else { 0.0 };
+            }
+        }
+        simulation.evaluate_at_rest();
+        self.note_force(simulation);
+        self.multiply(simulation);
+        let [direction, product, inverse] =
+            [&self.direction, &self.product, &self.inverse_diagonal];
+        let (model, fields) = (&simulation.model, &simulation.fields);
+        let both = sums(model, fields, |point, _| {
+            let mut terms = [0.0; 2];
+            for d in (0..D).filter(|d| inverse[*d][point] > 0.0) {
+                terms[0] += model.volume[point] * direction[d][point] * product[d][point];
+                terms[1] += model.volume[point] / inverse[d][point];
+            }
+            terms
+        });
+        let both = reduce(simulation.comm, &mut { both });
+        let diagonal = both[0] / both[1];
+        simulation.newton.diagonal = if diagonal > 0.0 && diagonal.is_finite() {
+            diagonal
+        } else {
+            1.0
+        };
+        move_from(simulation, &self.base, 0.0, &self.direction);
+        simulation.evaluate_at_rest();
+    }
+
+    /// Repeat the load step with half its size, or let it fail. Collective.
+    fn halve_or_fail(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
+        let can_be_halved = !simulation.load_step.has_broken
+            && simulation.newton.halvings < rule.max_halvings
+            && simulation.check_pieces_are_held("").is_ok();
+        if can_be_halved {
+            simulation.return_to_equilibrium();
+            self.begin_load_step(simulation, rule);
+            return;
+        }
+        simulation.load_step.has_failed = true;
+        if simulation.load_step.residual.is_nan() {
+            let clock = simulation.clock;
+            simulation.note_bad(&clock);
+        }
+    }
+}
+
+/// ‖f − K x‖ before and after the linear problem has been solved, N.
+struct Linear {
+    first: f64,
+    last: f64,
+}
+
+impl NewtonState {
+    /// Choose the next η by how much the forces, with the norm `force` (N), differ from those of the linear problem.
+    fn adapt(&mut self, linear: Linear, force: f64) {
+        let forcing = (force - linear.last).abs() / linear.first;
+        if forcing.is_finite() {
+            self.forcing = forcing.min(MOST_FORCING);
+        }
+    }
+}
+
+impl<const D: usize> Simulation<'_, D> {
+    /// Go back to the last equilibrium, and halve the load step.
+    fn return_to_equilibrium(&mut self) {
+        let fields = &mut self.fields;
+        for (d, equilibrium) in fields.equilibrium_displacement.iter().flatten().enumerate() {
+            fields.displacement[d][..equilibrium.len()].copy_from_slice(equilibrium);
+        }
+        if let (Some(equilibrium), Some(reaction)) =
+            (&fields.equilibrium_reaction, &mut fields.reaction)
+        {
+            reaction.clone_from(equilibrium);
+        }
+        self.clock.retreat(0.5 * self.clock.step());
+        self.newton.halvings += 1;
+        self.newton.left *= 2;
+    }
+
+    /// After a load step: if that was the last of the parts of a halved one, give the next one the whole size.
+    fn end_halves(&mut self) {
+        self.newton.left -= 1;
+        if self.newton.left > 0 {
+            return;
+        }
+        self.newton.left = 1;
+        let halvings = std::mem::take(&mut self.newton.halvings);
+        if halvings > 0 && !self.clock.is_over() {
+            let whole = libm::scalbn(self.clock.step(), halvings as i32);
+            self.clock.set_step(whole);
+        }
+    }
+}
+
+/// Move the points to the base plus so much of a direction.
+fn move_from<const D: usize>(
+    simulation: &mut Simulation<'_, D>,
+    base: &[Vec<f64>; D],
+    length: f64,
+    direction: &[Vec<f64>; D],
+) {
+    for d in 0..D {
+        let displacement = simulation.fields.displacement[d].par_iter_mut();
+        let both = displacement.zip(base[d].par_iter().zip(&direction[d]));
+        both.with_min_len(CHUNK)
+            .for_each(|(displacement, (base, direction))| {
+                *displacement = base + length * direction;
+            });
+    }
+}
+
+/// Add a multiple of a vector to another one.
+fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; D]) {
+    for (to, vector) in to.iter_mut().zip(vector) {
+        let both = to.par_iter_mut().zip(vector).with_min_len(CHUNK);
+        both.for_each(|(to, value)| *to += factor * value);
+    }
+}
+
+/// The scalar product of a force density and a displacement, weighted with the volume, J. Collective.
+fn dot<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    a: &[Vec<f64>; D],
+    b: &[Vec<f64>; D],
+) -> f64 {
+    let (model, fields) = (&simulation.model, &simulation.fields);
+    let sum = sums(model, fields, |point, _| {
+        let products = (0..D).map(|d| a[d][point] * b[d][point]);
+        [model.volume[point] * products.sum::<f64>()]
+    });
+    reduce(simulation.comm, &mut { sum })[0]
+}
+
+/// λ and G (Pa) of the classical solid that a body in so many dimensions is.
+fn moduli(elastic: Isotropic, dimension: Dimension) -> [f64; 2] {
+    let (lambda, shear) = (elastic.lame_lambda(), elastic.shear_modulus());
+    match dimension {
+        Dimension::Line {
+            constraint: Constraint::UniaxialStress,
+            ..
+        } => [0.0, 0.5 * elastic.youngs_modulus],
+        Dimension::PlaneStress { .. } => [2.0 * lambda * shear / (lambda + 2.0 * shear), shear],
+        Dimension::Line { .. } | Dimension::PlaneStrain { .. } | Dimension::Space => {
+            [lambda, shear]
+        }
+    }
+}
+
+/// 1 or −1, as if at random, for a component of a point (by id).
+fn sign(id: u64, d: usize) -> f64 {
+    // The finalizer of MurmurHash3.
+    let mut bits = id.wrapping_mul(3).wrapping_add(d as u64 + 1);
+    bits = (bits ^ bits >> 33).wrapping_mul(0xff51_afd7_ed55_8ccd);
+    bits = (bits ^ bits >> 33).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+    if (bits ^ bits >> 33) & 1 == 0 {
+        1.0
+    } else {
+        -1.0
+    }
+}

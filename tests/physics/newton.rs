@@ -1,0 +1,390 @@
+//! `method = "static"`: its equilibria are those of relaxation, in a fraction of the force evaluations; what it does where
+//! it finds none; ranks, threads and restarts change no bit.
+
+use crate::support::history::{column, row};
+use crate::support::saved::{state, whole};
+use crate::support::{problem, simulate, simulate_input, simulate_on};
+use fissure::comm::{Communicator, threads};
+use fissure::problem::Problem;
+use fissure::solver::Simulation;
+use fissure::solver::observers::HistoryObserver;
+
+/// Make all load steps. Returns the number of force evaluations.
+fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) -> u64 {
+    while !simulation.is_over() {
+        simulation.advance();
+        simulation.check().unwrap_or_else(|error| panic!("{error}"));
+    }
+    simulation.times.evaluations
+}
+
+fn displacements<const D: usize>(simulation: &Simulation<D>) -> Vec<f64> {
+    let owned = simulation.model.owned();
+    let columns = simulation.fields.displacement.iter();
+    columns
+        .flat_map(|column| column[..owned].to_vec())
+        .collect()
+}
+
+/// The largest difference as a share of the largest value.
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    let largest = b.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.fold(0.0, f64::max) / largest
+}
+
+#[test]
+fn a_bar_between_supports_is_stretched_evenly() {
+    let deck = "dimension = '1d'
+        grid = { spacing = 0.1, horizon = 0.3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.bar = { material = 'rubber', shape.box = { lower = [0], upper = [10] } }
+        set.ends.where = 'x < 0.6 || x > 9.4'
+        condition.pull = { set = 'ends', displacement = ['1e-3*t*x'] }
+        time = { end = 1, method = 'static', static = { load_steps = 2, tolerance = 1e-10 } }
+        ";
+    simulate(deck, |mut simulation: Simulation<1>| {
+        to_the_end(&mut simulation);
+        for point in 0..simulation.model.owned() {
+            let [x, ..] = simulation.model.position(point);
+            let u = simulation.fields.displacement[0][point];
+            assert!((u - 1e-3 * x).abs() < 1e-12, "{x}: {u}");
+        }
+    });
+}
+
+/// A body of a law, held at one side and moved at the other.
+fn pulled<const D: usize>(law: &str, motion: &str, method: &str) -> String {
+    let (dimension, upper, free) = match D {
+        2 => ("plane-strain", "[0.02, 6e-3]", "'free'"),
+        _ => ("3d", "[0.012, 4e-3, 4e-3]", "'free', 'free'"),
+    };
+    let thickness = if D == 2 { "thickness = 1e-3" } else { "" };
+    let zero = if D == 2 { "0" } else { "0, 0" };
+    format!(
+        "dimension = '{dimension}'
+        {thickness}
+        grid = {{ spacing = 1e-3, horizon = 2.5e-3 }}
+        material.m.{law}
+        body.b = {{ material = 'm', shape.box = {{ lower = [0, 0{}], upper = {upper} }} }}
+        set.left.where = 'x < 3e-3'
+        set.right.where = 'x > {}'
+        condition.left = {{ set = 'left', displacement = [0, {zero}] }}
+        condition.right = {{ set = 'right', displacement = [{motion}, {free}] }}
+        time = {{ end = 1, method = '{method}', relaxation = {{ load_steps = 4, tolerance = 1e-8 }} }}
+        ",
+        if D == 2 { "" } else { ", 0" },
+        if D == 2 { "0.017" } else { "0.009" },
+    )
+}
+
+/// Compare both methods in a body of a law.
+fn compare<const D: usize>(law: &str, motion: &str) {
+    let run = |method: &str| {
+        simulate(
+            &pulled::<D>(law, motion, method),
+            |mut simulation: Simulation<D>| {
+                let evaluations = to_the_end(&mut simulation);
+                let yielded = simulation.fields.plastic_strain_equivalent.clone();
+                let most = yielded.map(|all| all.into_iter().fold(0.0, f64::max));
+                (displacements(&simulation), evaluations, most)
+            },
+        )
+    };
+    let (relaxed, slow, _) = run("relaxation");
+    let (found, fast, yielded) = run("static");
+    let error = difference(&found, &relaxed);
+    assert!(error < 1e-5, "{law}: {error:e}");
+    assert!(2 * fast < slow, "{law}: {fast} against {slow} evaluations");
+    // A law that can yield does.
+    assert!(yielded.is_none_or(|most| most > 1e-3), "{law}: {yielded:?}");
+}
+
+const PMB: &str = "pmb = { density = 1000, youngs_modulus = 1e9 }";
+const ORDINARY: &str = "ordinary = { density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.35 }";
+const ORDINARY_PLASTIC: &str = "ordinary_plastic = { density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, \
+                                yield_stress = 1e6 }";
+const CORRESPONDENCE: &str = "correspondence = { density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, \
+                              zero_energy = 'dispersion' }";
+const J2: &str = "correspondence = { density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3, yield_stress = 1e6, \
+                  hardening_modulus = 5e7, zero_energy = 'silling2017', zero_energy_coefficient = 0.1 }";
+
+#[test]
+fn elastic_bodies_have_the_equilibria_of_relaxation() {
+    compare::<2>(PMB, "'1e-3*t'");
+    compare::<2>(ORDINARY, "'1e-3*t'");
+    compare::<3>(ORDINARY, "'1e-4*t'");
+    compare::<3>(CORRESPONDENCE, "'1e-4*t'");
+}
+
+#[test]
+fn bodies_that_yield_have_the_equilibria_of_relaxation() {
+    compare::<2>(ORDINARY_PLASTIC, "'6e-5*t'");
+    compare::<2>(J2, "'1e-4*t'");
+    compare::<3>(J2, "'6e-5*t'");
+}
+
+/// Force evaluations of both methods on a deck of `inputs/`.
+fn evaluations(name: &str, parameters: &[(&str, &str)]) -> [u64; 2] {
+    ["relaxation", "static"].map(|method| {
+        let method = [("time.method", method)];
+        let all = [parameters, &method].concat();
+        simulate_input(name, &all, |mut simulation: Simulation<2>| {
+            to_the_end(&mut simulation)
+        })
+    })
+}
+
+#[test]
+fn it_takes_a_fifth_of_the_force_evaluations() {
+    for (name, parameters) in [
+        ("plate_with_hole", &[("dx", "1e-3")][..]),
+        ("cantilever", &[("m", "2")]),
+        ("three_point_bending", &[("dx", "2e-3")]),
+    ] {
+        let [slow, fast] = evaluations(name, parameters);
+        assert!(5 * fast <= slow, "{name}: {fast} against {slow}");
+    }
+}
+
+/// A notched plate that is torn, with bonds of two kinds.
+fn torn(family: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
+        material.sheet.pmb = {{ density = 2, youngs_modulus = 5 }}
+        damage.brittle.critical_stretch = {{ critical_stretch = 0.02, alpha = 0.1 }}
+        body.plate = {{ material = 'sheet', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [24, 16] }} }}
+        crack.notch.segment = {{ from = [-1, 8], to = [8, 8] }}
+        set.top.where = 'y > 13'
+        set.bottom.where = 'y < 3'
+        set.right.where = 'x > 22'
+        condition.down = {{ set = 'bottom', velocity = [0, '-0.04'] }}
+        condition.up = {{ set = 'top', displacement = [0, '0.04*t'] }}
+        condition.push = {{ set = 'right', body_force = ['1e-4*t', 0] }}
+        time = {{ end = 4, method = 'static', static = {{ load_steps = 4, tolerance = 1e-5 }} }}
+        "
+    )
+}
+
+#[test]
+fn ranks_do_not_change_a_bit() {
+    for family in ["lattice", "list"] {
+        let run = |ranks: usize| {
+            let parts = simulate_on(ranks, &torn(family), |mut simulation: Simulation<2>| {
+                to_the_end(&mut simulation);
+                state(&simulation).1
+            });
+            whole(parts)
+        };
+        let one = run(1);
+        let broken = one.1.iter().any(|byte| *byte != one.1[0]);
+        assert!(broken);
+        for ranks in [2, 3] {
+            assert!(run(ranks) == one, "{family}, {ranks} ranks");
+        }
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let run = |count: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
+        pool.unwrap().install(|| {
+            simulate(&torn("lattice"), |mut simulation: Simulation<2>| {
+                to_the_end(&mut simulation);
+                whole(vec![state(&simulation).1])
+            })
+        })
+    };
+    let one = run(1);
+    for count in [2, 3] {
+        assert!(run(count) == one, "{count} threads");
+    }
+}
+
+#[test]
+fn goes_on_between_load_steps_and_within_them_to_the_same_bits() {
+    let problem: Problem = problem(&torn("lattice"));
+    let run = |stop: usize| {
+        let parts = threads::run(2, |comm: &dyn Communicator| {
+            let mut simulation = Simulation::<2>::new(&problem, comm).unwrap();
+            let mut settled = Vec::new();
+            while !simulation.is_over() {
+                simulation.advance();
+                simulation.check().unwrap_or_else(|error| panic!("{error}"));
+                settled.push(simulation.load_step.is_settled);
+                if settled.len() == stop {
+                    let (order, saved) = state(&simulation);
+                    simulation = Simulation::new(&problem, comm).unwrap();
+                    simulation.restore(&order, &saved).unwrap();
+                    assert_eq!(state(&simulation).1, saved);
+                }
+            }
+            (state(&simulation).1, settled)
+        });
+        let settled = parts[0].1.clone();
+        (
+            whole(parts.into_iter().map(|part| part.0).collect()),
+            settled,
+        )
+    };
+    let (expected, settled) = run(0);
+    let stops = |wanted: bool| {
+        let all = (1..)
+            .zip(&settled)
+            .filter(|(_, settled)| **settled == wanted);
+        let all: Vec<usize> = all.map(|(stop, _)| stop).collect();
+        [all[0], all[all.len() / 2]]
+    };
+    for stop in [stops(true), stops(false)].concat() {
+        let (found, _) = run(stop);
+        assert!(
+            found == expected,
+            "stopped after {stop} of {}",
+            settled.len()
+        );
+    }
+}
+
+/// A clamped strip whose end is moved so far that it turns.
+fn bent(newton: &str) -> String {
+    format!(
+        "dimension = 'plane-stress'
+        thickness = 1e-3
+        grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+        material.m.pmb = {{ density = 1000, youngs_modulus = 1e9 }}
+        body.b = {{ material = 'm', shape.box = {{ lower = [0, 0], upper = [0.04, 4e-3] }} }}
+        set.left.where = 'x < 3e-3'
+        set.right.where = 'x > 0.039'
+        condition.left = {{ set = 'left', displacement = [0, 0] }}
+        condition.right = {{ set = 'right', force = [0, '6*t'] }}
+        time = {{ end = 1, method = 'static', static = {{ {newton} }} }}
+        "
+    )
+}
+
+#[test]
+fn a_load_step_without_an_equilibrium_is_halved() {
+    let run = |newton: &str| {
+        simulate(&bent(newton), |mut simulation: Simulation<2>| {
+            to_the_end(&mut simulation);
+            assert!((simulation.clock.time() - 1.0).abs() < 1e-12);
+            (displacements(&simulation), simulation.clock.number())
+        })
+    };
+    let (whole, one) = run("load_steps = 1, tolerance = 1e-8");
+    let (halved, several) = run("load_steps = 1, tolerance = 1e-8, max_iterations = 4");
+    assert_eq!(one, 1);
+    assert!(several > 1 && several.is_power_of_two(), "{several}");
+    // The end moves by a third of the length.
+    let most = whole.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    assert!(most > 0.3 * 0.04, "{most}");
+    let error = difference(&halved, &whole);
+    assert!(error < 1e-6, "{error:e}");
+}
+
+#[test]
+fn the_worst_point_is_named_where_halving_does_not_help() {
+    let deck = bent("load_steps = 1, tolerance = 1e-12, max_iterations = 1, max_halvings = 2");
+    for ranks in [1, 2] {
+        let texts = simulate_on::<2, _>(ranks, &deck, |mut simulation| {
+            loop {
+                simulation.advance();
+                if let Err(error) = simulation.check() {
+                    return error.message;
+                }
+                assert!(!simulation.is_over());
+            }
+        });
+        let wanted = "t = 2.500000e-1 s: no equilibrium within 1 iterations, the load step halved 2 times; the forces \
+                      out of balance are still ";
+        assert!(texts[0].starts_with(wanted), "{}", texts[0]);
+        for words in [
+            " of loads and reactions, most of them ",
+            " N at point ",
+            " of body `b`, [",
+            "Otherwise give [time.static] more `load_steps`, `max_iterations` or `max_halvings` or a larger `tolerance`",
+        ] {
+            assert!(texts[0].contains(words), "{}", texts[0]);
+        }
+        assert!(texts.iter().all(|text| *text == texts[0]));
+    }
+}
+
+#[test]
+fn a_loaded_piece_that_nothing_holds_is_named() {
+    let deck = bent("load_steps = 1, max_iterations = 2").replace(
+        "set = 'left', displacement = [0, 0]",
+        "set = 'left', displacement = [0, 'free']",
+    );
+    simulate(&deck, |mut simulation: Simulation<2>| {
+        let text = loop {
+            simulation.advance();
+            if let Err(error) = simulation.check() {
+                break error.message;
+            }
+            assert!(!simulation.is_over());
+        };
+        let wanted =
+            "loads of 6.000e0 N act along y on a piece of body `b` that no support holds along y";
+        assert!(text.contains(wanted), "{text}");
+    });
+}
+
+#[test]
+fn a_body_that_is_carried_without_loads_comes_to_rest() {
+    for (motion, size) in [("'1e-3*t', 0", 1e-3), ("'1e-22*t', 0", 1e-22)] {
+        let deck = format!(
+            "dimension = 'plane-stress'
+            thickness = 1e-3
+            grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+            material.m.ordinary = {{ density = 1000, youngs_modulus = 1e9, poisson_ratio = 0.3 }}
+            body.b = {{ material = 'm', shape.box = {{ lower = [0, 0], upper = [0.01, 0.004] }} }}
+            set.left.where = 'x < 1e-3'
+            condition.move = {{ set = 'left', displacement = [{motion}] }}
+            time = {{ end = 1, method = 'static', static = {{ load_steps = 2 }} }}
+            "
+        );
+        simulate(&deck, |mut simulation: Simulation<2>| {
+            to_the_end(&mut simulation);
+            for u in &simulation.fields.displacement[0] {
+                assert!((u - size).abs() < 1e-10 * size, "{motion}: {u:e}");
+            }
+        });
+    }
+}
+
+#[test]
+fn a_torn_plate_breaks_as_in_a_relaxation() {
+    let run = |deck: &str| {
+        simulate(deck, |mut simulation: Simulation<2>| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            let mut rows = vec![row(&mut observer, &mut simulation).values];
+            while !simulation.is_over() {
+                simulation.advance();
+                simulation.check().unwrap_or_else(|error| panic!("{error}"));
+                if simulation.load_step.is_settled {
+                    rows.push(row(&mut observer, &mut simulation).values);
+                }
+            }
+            let names = ["broken_bonds", "strain_energy", "external_work"];
+            let columns = names.map(|name| column(&observer, name));
+            rows.into_iter()
+                .map(|row| columns.map(|column| row[column]))
+                .collect::<Vec<_>>()
+        })
+    };
+    let newton = run(&torn("lattice"));
+    let relaxed = run(&torn("lattice")
+        .replace("'static'", "'relaxation'")
+        .replace("static =", "relaxation ="));
+    assert!(newton.last().unwrap()[0] > 0.0);
+    assert_eq!(newton.len(), relaxed.len());
+    let scale = relaxed.last().unwrap()[2];
+    for (a, b) in newton.iter().zip(&relaxed) {
+        assert_eq!(a[0], b[0]);
+        assert!((a[1] - b[1]).abs() < 1e-4 * scale, "{a:?} {b:?}");
+        assert!((a[2] - b[2]).abs() < 1e-4 * scale, "{a:?} {b:?}");
+    }
+}
