@@ -7,6 +7,7 @@ mod check_report;
 mod compare;
 mod explain;
 mod format;
+mod import;
 mod init;
 mod launch;
 mod machine_limits;
@@ -63,6 +64,7 @@ Examples:
   fissure plot out/plate --y kinetic_energy     a curve of the history
   fissure movie out/plate                       the damage over time
   fissure compare out/plate out/before          the differences between two results
+  fissure import disk_impact.yaml               a deck of Peridigm, PeriLab or LAMMPS
   fissure bench                                 how fast this machine is at it
 
 Exit codes: 0 done, 1 the run failed or the compared results differ, 2 the deck or the arguments are
@@ -89,6 +91,7 @@ enum Command {
     Compare(compare::CompareArguments),
     Explain(DeckArguments),
     Init(init::InitArguments),
+    Import(import::ImportArguments),
     Bench(BenchArguments),
 }
 
@@ -291,6 +294,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments, verbosity),
         Command::Explain(arguments) => explain::explain(&arguments),
         Command::Init(arguments) => init::init(&arguments, verbosity),
+        Command::Import(arguments) => import::import(&arguments, verbosity),
     };
     finish(outcome, true)
 }
