@@ -107,7 +107,8 @@ pub fn damage(
             tension_only,
         } => {
             let bond_based = BOND_BASED.contains(&material.law);
-            let name = match bond_based {
+            // Bonds of a bond-based law break in tension only.
+            let name = match bond_based && !tension_only {
                 true => translation.name("damage", &format!("{} of bonds", model.read)),
                 false => translation.name("damage", &model.read),
             };

@@ -25,6 +25,8 @@ struct Initial {
     key: &'static str,
     component: usize,
     value: Value,
+    /// Where the value stands.
+    node: Node,
 }
 
 /// Writes conditions one after the other.
@@ -110,6 +112,7 @@ impl Conditions {
                     key,
                     component,
                     value: expression,
+                    node: value.clone(),
                 });
                 return Ok(());
             }
@@ -165,6 +168,21 @@ impl Conditions {
 
     /// Write the initial values, one table a set.
     pub fn finish(&mut self, translation: &mut Translation) {
+        for initial in &self.initials {
+            let others = self
+                .initials
+                .iter()
+                .filter(|other| other.key == initial.key);
+            let gives = |set: &str, component: usize| {
+                let mut all = self.initials.iter();
+                all.any(|o| o.key == initial.key && o.set == set && o.component == component)
+            };
+            let mut missing = others.filter(|other| !gives(&other.set, initial.component));
+            if let Some(other) = missing.next() {
+                let note = format!("0 in points that are in the set `{}` too", other.set);
+                translation.log.approximated(&initial.node, note);
+            }
+        }
         for initial in std::mem::take(&mut self.initials) {
             let header = format!("initial.{}", initial.set);
             let is_new = !translation.draft.has(&header);

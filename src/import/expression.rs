@@ -165,6 +165,7 @@ fn template(dialect: Dialect, name: &str, arguments: usize) -> Option<&'static s
         (_, "pow", 2) => "(($1)^($2))",
         (Dialect::Peridigm, "fabs", 1) => "abs($1)",
         (Dialect::PeriLab, "ifelse", 3) => "if($1, $2, $3)",
+        (Dialect::PeriLab, "atan", 2) => "atan2($1, $2)",
         (Dialect::Lammps, "ln", 1) => "log($1)",
         (Dialect::Lammps, "log", 1) => "log10($1)",
         (Dialect::Lammps, "vdisplace", 2) => "($1 + ($2)*t)",
@@ -492,6 +493,7 @@ mod tests {
             ("if t>2 0 else 20 end", 20.0),
             ("if (t>1) (3) else 20 end", 3.0),
             ("t < 1 ? 5 : 6", 6.0),
+            ("atan(y, x)", libm::atan2(y, x)),
             ("2.*t", 3.0),
             ("t > 1 & x < 1", 1.0),
         ] {

@@ -9,7 +9,15 @@ use crate::points::columns::{Columns, entries, heading, is_comment};
 
 /// The path of a file as seen from another folder, with `/` between its parts.
 pub fn relative(file: &Path, folder: &Path) -> PathBuf {
-    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let absolute = |path: &Path| {
+        // No path at all is the working directory.
+        let path = if path.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            path
+        };
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+    };
     let (file, folder) = (plain(&absolute(file)), plain(&absolute(folder)));
     let common = file
         .components()
@@ -103,6 +111,9 @@ mod tests {
             ("/a/b/mesh.txt", "/a", "b/mesh.txt"),
             ("/a/b/../mesh.txt", "/a/c/d", "../../mesh.txt"),
             ("/a/b/./mesh.txt", "/a/b/c", "../mesh.txt"),
+            ("mesh.txt", "", "mesh.txt"),
+            ("a/mesh.txt", "", "a/mesh.txt"),
+            ("mesh.txt", "a/b", "../../mesh.txt"),
         ] {
             assert_eq!(
                 relative(file.as_ref(), folder.as_ref()),

@@ -63,13 +63,13 @@ impl fmt::Display for Entry {
 
 /// The fates of the nodes of a tree, by their ids.
 #[derive(Debug, Default)]
-pub struct Log {
+pub(super) struct Log {
     fates: RefCell<HashMap<usize, (Fate, String)>>,
 }
 
 impl Log {
     /// Note what became of a node. Notes about the same node are joined; a loss outweighs `Taken`.
-    pub fn note(&self, node: &Node, fate: Fate, note: impl Into<String>) {
+    pub(super) fn note(&self, node: &Node, fate: Fate, note: impl Into<String>) {
         let mut fates = self.fates.borrow_mut();
         match fates.get_mut(&node.id) {
             Some((known, text)) => {
@@ -88,22 +88,22 @@ impl Log {
     }
 
     /// Note that the new deck says the same as a node.
-    pub fn taken(&self, node: &Node, note: impl Into<String>) {
+    pub(super) fn taken(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Taken, note);
     }
 
     /// Note that the new deck says something similar.
-    pub fn approximated(&self, node: &Node, note: impl Into<String>) {
+    pub(super) fn approximated(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::Approximated, note);
     }
 
     /// Note that the new deck does not say what a node says.
-    pub fn left_out(&self, node: &Node, note: impl Into<String>) {
+    pub(super) fn left_out(&self, node: &Node, note: impl Into<String>) {
         self.note(node, Fate::LeftOut, note);
     }
 
     /// The fates of all keys of a tree in the order of the text. A key that nothing was noted about is left out.
-    pub fn entries(&self, root: &Node) -> Vec<Entry> {
+    pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.collect(root, "", &mut entries);
         entries
@@ -124,10 +124,7 @@ impl Log {
                 }
                 return;
             }
-            None => (
-                Fate::LeftOut,
-                "unknown, or without a counterpart".to_owned(),
-            ),
+            None => (Fate::LeftOut, reason(key).to_owned()),
         };
         entries.push(Entry {
             line: node.line,
@@ -160,6 +157,28 @@ impl Log {
             });
         }
     }
+}
+
+/// Why keys that no translator reads are left out: a word of their keys, and the reason.
+const REASONS: [(&str, &str); 11] = [
+    ("verbose", "concerns what the code prints"),
+    ("pre calculation", "what a law needs is computed"),
+    ("specific heat", "there are no temperatures"),
+    ("thermal", "there are no temperatures"),
+    ("temperature", "there are no temperatures"),
+    ("additive", "points exist from the start"),
+    ("flaw", "a material is the same everywhere"),
+    ("fluid", "there are no fluids"),
+    ("permeability", "there are no fluids"),
+    ("external topology", "there are no finite elements"),
+    ("preconditioner", "concerns a solver of linear systems"),
+];
+
+/// Why a key that no translator reads is left out.
+fn reason(key: &str) -> &'static str {
+    let key = key.to_lowercase().replace('_', " ");
+    let known = REASONS.iter().find(|(word, _)| key.contains(word));
+    known.map_or("unknown, or without a counterpart", |(_, reason)| reason)
 }
 
 /// The value of a node for a list.

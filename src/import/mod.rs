@@ -1,8 +1,8 @@
 //! Decks of other codes, translated into decks of this one: `fissure import`.
 //!
-//! A deck becomes a [tree](tree) of parameters, or a list of commands. A translator per code reads it, notes what
-//! becomes of every key in a [log](log), and fills a [draft](draft), which is written as TOML. A key that no
-//! translator knows is listed as left out.
+//! A deck becomes a tree of parameters (`tree`), or a list of commands (`script`). A translator per code reads it,
+//! notes what becomes of every key in a [log], and fills a `draft`, which is written as TOML. A key that no translator
+//! knows is listed as left out.
 
 mod bodies;
 mod bond_filters;

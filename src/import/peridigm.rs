@@ -233,12 +233,20 @@ fn points(translation: &mut Translation, node: &Node) -> Result<Points> {
     if is_key(&name, "PdQuickGrid") {
         return quick_grid(translation, node);
     }
+    let is_text = is_key(&name, "Text File");
+    if !is_text && !is_key(&name, "Exodus") {
+        let message = format!(
+            "the discretization {} is not read; known are Text File, Exodus and PdQuickGrid",
+            excerpt(&name)
+        );
+        return Err(translation.error(kind.line, message));
+    }
     let file = translation.required(node, "Input Mesh File", "the discretization")?;
     let path = translation.text(file, "Input Mesh File")?.to_owned();
     let value = translation.file(&path);
     let grid = translation.draft.section("grid");
     grid.set("volume_correction", Value::text("none"));
-    if is_key(&name, "Text File") {
+    if is_text {
         let known = PointFile::read(&translation.path(&path), &COLUMNS);
         let note = match known {
             Some(_) => "points.file of the bodies",
@@ -247,16 +255,9 @@ fn points(translation: &mut Translation, node: &Node) -> Result<Points> {
         translation.log.taken(file, note);
         return Ok(Points::File(value, known));
     }
-    if is_key(&name, "Exodus") {
-        let note = "points.mesh of the bodies; sphere elements are not read";
-        translation.log.taken(file, note);
-        return Ok(Points::Mesh(value));
-    }
-    let message = format!(
-        "the discretization {} is not read; known are Text File, Exodus and PdQuickGrid",
-        excerpt(&name)
-    );
-    Err(translation.error(kind.line, message))
+    let note = "points.mesh of the bodies; sphere elements are not read";
+    translation.log.taken(file, note);
+    Ok(Points::Mesh(value))
 }
 
 /// The box of a generated grid.

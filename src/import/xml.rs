@@ -131,7 +131,7 @@ mod tests {
         ] {
             assert_eq!(parse(text), Err((line, message.to_owned())), "{text}");
         }
-        let (line, message) = parse("<ParameterList>\n<Parameter").unwrap_err();
+        let (line, message) = parse("<ParameterList>\n<a></b>\n</ParameterList>").unwrap_err();
         assert!(
             line == 2 && message.starts_with("is no XML: "),
             "{line}: {message}"

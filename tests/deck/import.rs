@@ -119,6 +119,7 @@ Peridigm:
     Verbose: false
     Initial Time: 0.0
     Final Time: 4.0e-3
+    Enable Magic: true
     Verlet:
       Fixed dt: 2.0e-5
   Output:
@@ -176,6 +177,10 @@ fn two_points_of_peridigm_oscillate() {
     );
     assert_eq!(
         fate(&imported, "Peridigm > Solver > Verbose"),
+        (Fate::LeftOut, "concerns what the code prints")
+    );
+    assert_eq!(
+        fate(&imported, "Peridigm > Solver > Enable Magic"),
         (Fate::LeftOut, "unknown, or without a counterpart")
     );
     // Every key has one fate, and the deck lists all of them.
@@ -536,35 +541,35 @@ fn a_wrong_deck_names_file_and_line() {
     for (text, message) in [
         (
             peridigm("Density: 1000.0", "Density: heavy"),
-            "21:7: `Density` must be a number, is `heavy`",
+            "20:7: `Density` must be a number, is `heavy`",
         ),
         (
             peridigm("      Density: 1000.0\n", ""),
-            "19:5: the material `Soft Solid` has no `Density`",
+            "18:5: the material `Soft Solid` has no `Density`",
         ),
         (
             peridigm("Material: Soft Solid", "Material: Air"),
-            "28:7: the material `Air` is not defined, or has no counterpart",
+            "27:7: the material `Air` is not defined, or has no counterpart",
         ),
         (
             peridigm("Coordinate: x", "Coordinate: r"),
-            "37:7: `Coordinate` must be x, y or z, is `r`",
+            "36:7: `Coordinate` must be x, y or z, is `r`",
         ),
         (
             peridigm("Node Set: Left Node Set", "Node Set: Top"),
-            "36:7: the deck defines no node set `Top`",
+            "35:7: the deck defines no node set `Top`",
         ),
         (
             peridigm("Left Node Set: \"1\"", "Left Node Set: \"0\""),
-            "31:5: `Left Node Set`: number 1 is 0; points count from 1",
+            "30:5: `Left Node Set`: number 1 is 0; points count from 1",
         ),
         (
             peridigm("Final Time: 4.0e-3", "Final Time: 0"),
-            "44:3: the end 0 must be later than the start 0",
+            "43:3: the end 0 must be later than the start 0",
         ),
         (
             peridigm("    Verlet:", "    Leapfrog:"),
-            "44:3: the solver is none of Verlet, QuasiStatic, NOXQuasiStatic, Implicit, Static, Newmark and the matrix-based ones",
+            "43:3: the solver is none of Verlet, QuasiStatic, NOXQuasiStatic, Implicit, Static, Newmark and the matrix-based ones",
         ),
         (
             peridigm("Type: PdQuickGrid", "Type: Albany"),
@@ -572,7 +577,7 @@ fn a_wrong_deck_names_file_and_line() {
         ),
         (
             perilab("Young's Modulus: 7.0e+4", "Z: 1"),
-            "16:7: the material `Alu` has too few elastic constants",
+            "14:7: the material `Alu` has too few elastic constants",
         ),
         (
             perilab("  Models:\n", "  Modules:\n"),
@@ -588,7 +593,7 @@ fn a_wrong_deck_names_file_and_line() {
         ),
         (
             lammps("run             200", "run             soon"),
-            "27:1: run: must be a number, is `soon`",
+            "28:1: run: must be a number, is `soon`",
         ),
         (
             lammps("$(10*v_a)", "${b}"),
