@@ -449,7 +449,7 @@ fn velocity(
 }
 
 /// The values of a material's coefficients.
-fn coefficients<'m>(model: &'m Model, kind: u32) -> Option<&'m Coefficients> {
+fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
     let fits = |of: u32| of == 0 || of == kind;
     let found = model.coefficients.iter().rev();
     let mut found = found.filter(|c| fits(c.types[0]) && fits(c.types[1]));
@@ -712,7 +712,7 @@ fn simulate(
         let number = script
             .number(word)
             .map_err(|message| wrong(translation, command, message))?;
-        match number >= 1.0 && number < 1e15 {
+        match (1.0..1e15).contains(&number) {
             true => Ok(number as u64),
             false => Err(wrong(
                 translation,

@@ -111,7 +111,7 @@ impl<'a> Translation<'a> {
     /// If the value is none.
     pub fn count(&self, node: &Node, key: &str) -> Result<u64> {
         let number = self.number(node, key)?;
-        let is_whole = number >= 0.0 && number < 1e15 && number.fract() == 0.0;
+        let is_whole = (0.0..1e15).contains(&number) && number.fract() == 0.0;
         match is_whole {
             true => Ok(number as u64),
             false => {

@@ -48,7 +48,7 @@ struct Share {
 }
 
 /// The columns that the deck names for a file; equal for all bodies that use it.
-fn columns<'a>(problem: &'a Problem, user: usize) -> Option<&'a Columns> {
+fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
     match &problem.bodies[user].points {
         PointSource::File { columns, .. } => columns.as_ref(),
         _ => None,
