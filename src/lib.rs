@@ -7,6 +7,7 @@ pub mod elastic;
 pub mod error;
 pub mod expression;
 pub mod families;
+pub mod import;
 pub mod lanes;
 pub mod material;
 pub mod memory;

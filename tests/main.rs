@@ -5,6 +5,7 @@ mod support;
 
 mod deck {
     mod decks;
+    mod import;
     mod meshes;
     mod survey;
 }

@@ -176,7 +176,7 @@ fn costs(cost: &Cost, request: &Request, ghosts: f64) -> Map<String, Value> {
 fn times(problem: &Problem, stable_step: f64, steps: &[(f64, f64)]) -> Map<String, Value> {
     let stages = problem.all_stages();
     let stages = stages.iter().zip(steps).map(|(stage, (step, steps))| {
-        if stage.time.is_relaxation() {
+        if stage.time.is_quasi_static() {
             json!({ "load_steps": steps })
         } else {
             json!({ "steps": steps, "step": step })

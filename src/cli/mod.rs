@@ -9,6 +9,7 @@ mod compare;
 mod explain;
 mod format;
 mod generate;
+mod import;
 mod init;
 mod launch;
 mod machine_limits;
@@ -67,6 +68,7 @@ Examples:
   fissure movie out/plate                       the damage over time
   fissure compare out/plate out/before          the differences between two results
   fissure sweep plate.toml --set dx=2e-3,1e-3   the deck for several values
+  fissure import disk_impact.yaml               a deck of Peridigm, PeriLab or LAMMPS
   fissure bench                                 how fast this machine is at it
   fissure slurm hybrid > job.sbatch             a job script
 
@@ -95,6 +97,7 @@ enum Command {
     Sweep(sweep::SweepArguments),
     Explain(DeckArguments),
     Init(init::InitArguments),
+    Import(import::ImportArguments),
     Bench(BenchArguments),
     Schema(generate::SchemaArguments),
     Completions(generate::CompletionsArguments),
@@ -316,6 +319,7 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => generate::completions(&arguments),
         Command::Man(arguments) => generate::man(&arguments, verbosity),
         Command::Slurm(arguments) => generate::slurm(&arguments),
+        Command::Import(arguments) => import::import(&arguments, verbosity),
     };
     finish(outcome, true)
 }

@@ -13,6 +13,7 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::mesh::{Format, GroupKey};
 use crate::message::format_number;
+use crate::points::Columns;
 use crate::problem;
 
 /// The square of this number of bond lists is looked through in every step.
@@ -172,7 +173,9 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
 /// An error if a body asks for rows of a point file, or elements of a mesh, that an earlier one takes.
 fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
     let rows = |body: &problem::Body| match &body.points {
-        problem::PointSource::File { path, block, span } => {
+        problem::PointSource::File {
+            path, block, span, ..
+        } => {
             let block = block.map(|block| GroupKey::Number(block.into()));
             Some((path.clone(), block, span.clone(), ("file", "rows")))
         }
@@ -204,7 +207,37 @@ fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<
             return Err(scope.error(span, message));
         }
     }
+    columns_agree(scope, &bodies)?;
     Ok(bodies)
+}
+
+/// An error if two bodies name different columns of the same point file.
+fn columns_agree(scope: &Scope, bodies: &[problem::Body]) -> Result<()> {
+    let file = |body: &problem::Body| match &body.points {
+        problem::PointSource::File {
+            path,
+            columns,
+            span,
+            ..
+        } => Some((path.clone(), columns.clone(), span.clone())),
+        _ => None,
+    };
+    for (index, body) in bodies.iter().enumerate() {
+        let Some((path, columns, span)) = file(body) else {
+            continue;
+        };
+        let differs = |other: &&problem::Body| {
+            file(other).is_some_and(|(other, theirs, _)| other == path && theirs != columns)
+        };
+        if let Some(other) = bodies[..index].iter().find(differs) {
+            let message = format!(
+                "[body.{}] points columns: differ from those of [body.{}], which has the same file",
+                body.name, other.name
+            );
+            return Err(scope.error(span, message));
+        }
+    }
+    Ok(())
 }
 
 fn point_source(
@@ -287,6 +320,10 @@ fn from_file(
     }
     let folder = scope.source.path.parent().unwrap_or("".as_ref());
     let block = points.block.as_ref();
+    if let (Some(_), Some(columns)) = (&points.mesh, &points.columns) {
+        let message = format!("{key_of_points} columns: are for a point file, not for a mesh");
+        return Err(scope.error(columns.span(), message));
+    }
     if let Some(mesh) = &points.mesh {
         let path = folder.join(mesh.get_ref());
         if Format::of(&path).is_none() {
@@ -321,9 +358,19 @@ fn from_file(
             Err(scope.error(block.span(), message))
         }
     };
+    let columns = points.columns.as_ref().map(|columns| {
+        let named = Columns::named(columns.get_ref(), scope.dimension);
+        named.map_err(|message| {
+            scope.error(
+                columns.span(),
+                format!("{key_of_points} columns: {message}"),
+            )
+        })
+    });
     Ok(problem::PointSource::File {
         path: folder.join(file.get_ref()),
         block: block.map(number).transpose()?,
+        columns: columns.transpose()?,
         span: file.span(),
     })
 }

@@ -9,7 +9,8 @@ use super::resolve::Scope;
 use crate::error::{Error, Result, Warning};
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::problem::{Problem, Selector, changes_density_scale};
+use crate::points::file;
+use crate::problem::{PointSource, Problem, Selector, changes_density_scale};
 
 /// A warning for each of them. `scope` is that of the validated deck.
 ///
@@ -43,7 +44,35 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
         );
         warnings.push(Warning::new(message).at(&table.span()));
     }
+    warnings.extend(ignored_columns(problem));
     Ok(warnings)
+}
+
+/// A warning for each point file with columns that are not read.
+fn ignored_columns(problem: &Problem) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    for (index, body) in problem.bodies.iter().enumerate() {
+        let PointSource::File { path, span, .. } = &body.points else {
+            continue;
+        };
+        if file::users(problem, path)[0].0 != index {
+            continue;
+        }
+        // A file that cannot be read is reported where its points are.
+        let Ok(Ok(layout)) = file::layout_of(problem, path) else {
+            continue;
+        };
+        let ignored = layout.columns.ignored();
+        if !ignored.is_empty() {
+            let message = format!(
+                "[body.{}] points file: these columns are not read: {}",
+                body.name,
+                ignored.join(", ")
+            );
+            warnings.push(Warning::new(message).at(span));
+        }
+    }
+    warnings
 }
 
 /// A warning for each table that is there to be referred to, and that no other part of the deck refers to.

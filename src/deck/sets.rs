@@ -6,6 +6,7 @@ use super::shapes;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::POSITION;
+use crate::points::id_file;
 use crate::problem;
 
 /// The sets of a problem: `all`, the bodies, those of the deck.
@@ -58,9 +59,14 @@ fn selector(
         ("where", set.condition.as_ref().map(Spanned::span)),
         ("shape", set.shape.as_ref().map(Spanned::span)),
         ("ids", set.ids.as_ref().map(Spanned::span)),
+        ("file", set.file.as_ref().map(Spanned::span)),
         ("mesh", set.mesh.as_ref().map(Spanned::span)),
     ];
     scope.exactly_one(table.span(), &key, &given)?;
+    if let (Some(first), None) = (&set.first_id, &set.file) {
+        let message = format!("{key} first_id: is the number of the first point in a `file`");
+        return Err(scope.error(first.span(), message));
+    }
     if let Some(condition) = &set.condition {
         scope
             .expression(condition, &format!("{key} where"), &POSITION)
@@ -78,6 +84,16 @@ fn selector(
         }
         let set = problem::MeshSet::new(group.get_ref().0.clone(), group.span());
         Ok(problem::Selector::Mesh(set))
+    } else if let Some(file) = &set.file {
+        let folder = scope.source.path.parent().unwrap_or("".as_ref());
+        let first = set.first_id.as_ref().map_or(0, |first| *first.get_ref());
+        let ids = id_file::read(&folder.join(file.get_ref()), first)
+            .map_err(|message| scope.error(file.span(), format!("{key} file: {message}")))?;
+        Ok(problem::Selector::Ids {
+            ids,
+            key: "file",
+            largest: file.span(),
+        })
     } else {
         let given = set.ids.as_ref().map_or(&[][..], |ids| ids.get_ref());
         if let Some(id) = given.iter().find(|id| *id.get_ref() > i64::MAX as u64) {
@@ -90,6 +106,7 @@ fn selector(
         let largest = given.iter().max_by_key(|id| *id.get_ref());
         Ok(problem::Selector::Ids {
             ids,
+            key: "ids",
             largest: largest.map_or(table.span(), Spanned::span),
         })
     }

@@ -1,7 +1,7 @@
 //! Points from a text file; each rank reads its share of the bytes.
 //!
-//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Skipped are empty
-//! rows, rows that start with `#`, and a heading: a first row without any number.
+//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space, or has the columns that the
+//! deck or a heading names. Skipped are empty rows, comments, and a heading: a first row without any number.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -12,6 +12,7 @@ use crate::error::{Error, Result, excerpt};
 use crate::problem::{PointSource, Problem};
 
 use super::Point;
+use super::columns::{BYTE_ORDER_MARK, Columns, LONGEST_ROW, Layout, entries, is_comment, layout};
 
 /// The bodies that use a file: their index and the block number they select.
 pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
@@ -26,9 +27,6 @@ pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
         .collect()
 }
 
-/// Maximum length of a row, bytes.
-const LONGEST_ROW: u64 = 1 << 16;
-
 /// Length of a sample of a long file, bytes.
 const PIECE: u64 = 1 << 16;
 /// Number of samples of a long file.
@@ -36,9 +34,6 @@ const SAMPLED: u64 = 256;
 
 /// Largest absolute coordinate, m; squared distances stay far from overflow.
 const FARTHEST: f64 = 1e30;
-
-/// Optional first bytes of a UTF-8 file.
-const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// An invalid row: its line within the share, from 0, and the message.
 type RowError = (u64, String);
@@ -48,12 +43,31 @@ type RowError = (u64, String);
 struct Share {
     points: Vec<Point>,
     lines: u64,
-    /// The share has at least one row.
-    has_rows: bool,
-    /// The first row, if it has no number; an error unless it is the first row of the file.
-    heading: Option<RowError>,
-    /// The first invalid row after that.
+    /// The first invalid row.
     error: Option<RowError>,
+}
+
+/// The columns that the deck names for a file; equal for all bodies that use it.
+fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
+    match &problem.bodies[user].points {
+        PointSource::File { columns, .. } => columns.as_ref(),
+        _ => None,
+    }
+}
+
+/// The layout of a file.
+///
+/// # Errors
+/// As [`layout`].
+pub fn layout_of(problem: &Problem, path: &Path) -> std::io::Result<Result<Layout>> {
+    let given = users(problem, path)
+        .first()
+        .and_then(|(user, _)| columns(problem, *user));
+    let layout = layout(path, given, problem.dimension.count())?;
+    Ok(layout.map_err(|error| {
+        let (line, message) = (error.line, error.message);
+        Error::input(format!("{}:{line}: {message}", path.display()))
+    }))
 }
 
 /// Read this rank's share of a file's points, for all bodies that use it. Collective.
@@ -62,18 +76,19 @@ struct Share {
 /// If the file cannot be read or a row is invalid; the message gives file and line.
 pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Vec<Point>> {
     let users = users(problem, path);
-    let share = read_share(problem, path, &users, comm.rank(), comm.size()).map_err(|error| {
+    let unreadable = |error| {
         let PointSource::File { span, .. } = &problem.bodies[users[0].0].points else {
             unreachable!("users are bodies with a file");
         };
         let message = format!("cannot read the point file {}: {error}", path.display());
         Error::input(message).at(span)
-    });
-    let share = agree(comm, share)?;
+    };
+    let layout = layout_of(problem, path).map_err(unreadable).flatten();
+    let layout = agree(comm, layout)?;
+    let share = read_share(path, &layout, &users, comm.rank(), comm.size());
+    let share = agree(comm, share.map_err(unreadable))?;
     let (lines_before, _) = scan(comm, share.lines);
-    let (ranks_before, _) = scan(comm, u64::from(share.has_rows));
-    let heading = share.heading.filter(|_| ranks_before > 0);
-    let checked = match heading.or(share.error) {
+    let checked = match share.error {
         None => Ok(share.points),
         Some((line, message)) => {
             let line = lines_before + line + 1;
@@ -92,9 +107,10 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
 /// be read.
 pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     let users = users(problem, path);
+    let layout = layout_of(problem, path).ok()?.ok()?;
     let length = std::fs::metadata(path).ok()?.len();
     if length <= SAMPLED * PIECE {
-        let share = read_share(problem, path, &users, 0, 1).ok()?;
+        let share = read_share(path, &layout, &users, 0, 1).ok()?;
         return Some((share.points, 1.0));
     }
     let pieces = length.div_ceil(PIECE);
@@ -102,7 +118,7 @@ pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     for k in 0..SAMPLED {
         let piece = (u128::from(pieces) * u128::from(k) / u128::from(SAMPLED)) as usize;
         points.extend(
-            read_share(problem, path, &users, piece, pieces as usize)
+            read_share(path, &layout, &users, piece, pieces as usize)
                 .ok()?
                 .points,
         );
@@ -112,16 +128,12 @@ pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
 
 /// Read the rows that start within a rank's share of the file's bytes.
 fn read_share(
-    problem: &Problem,
     path: &Path,
+    layout: &Layout,
     users: &[(usize, Option<u32>)],
     rank: usize,
     size: usize,
 ) -> std::io::Result<Share> {
-    // Opening a pipe would block until its other end is opened.
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::other("it is not a regular file"));
-    }
     let mut file = File::open(path)?;
     let length = file.metadata()?.len();
     let border = |rank: usize| (u128::from(length) * rank as u128 / size as u128) as u64;
@@ -155,13 +167,16 @@ fn read_share(
             0 => line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line),
             _ => &line[..],
         };
+        let is_heading = layout.heading == Some(at);
         at += read;
         if read == LONGEST_ROW && !bytes.ends_with(b"\n") {
             let message = format!("is longer than {LONGEST_ROW} bytes; is this a point file?");
             share.error.get_or_insert((share.lines, message));
             break;
         }
-        share.read_row(problem, users, bytes);
+        if !is_heading {
+            share.read_row(&layout.columns, users, bytes);
+        }
         share.lines += 1;
     }
     Ok(share)
@@ -169,22 +184,17 @@ fn read_share(
 
 impl Share {
     /// Parse the next row and append its point.
-    fn read_row(&mut self, problem: &Problem, users: &[(usize, Option<u32>)], row: &[u8]) {
+    fn read_row(&mut self, columns: &Columns, users: &[(usize, Option<u32>)], row: &[u8]) {
         let entries = match std::str::from_utf8(row) {
-            Ok(row) if row.trim_start().starts_with('#') => return,
+            Ok(row) if is_comment(row) => return,
             Ok(row) => entries(row),
             Err(_) => Err("is not UTF-8 text".to_owned()),
         };
         if entries.as_ref().is_ok_and(Vec::is_empty) {
             return;
         }
-        let is_first = !std::mem::replace(&mut self.has_rows, true);
-        let names_columns =
-            |entries: &Vec<&str>| !entries.iter().any(|entry| resembles_number(entry));
-        let is_heading = is_first && entries.as_ref().is_ok_and(names_columns);
-        match entries.and_then(|entries| point(problem, users, &entries)) {
+        match entries.and_then(|entries| point(columns, users, &entries)) {
             Ok(point) => self.points.push(point),
-            Err(message) if is_heading => self.heading = Some((self.lines, message)),
             Err(message) => {
                 self.error.get_or_insert((self.lines, message));
             }
@@ -192,53 +202,31 @@ impl Share {
     }
 }
 
-/// Split a row into entries.
-fn entries(row: &str) -> std::result::Result<Vec<&str>, String> {
-    let row = row.trim();
-    let mut entries = Vec::new();
-    for part in row.split([',', ';']) {
-        let before = entries.len();
-        entries.extend(part.split_whitespace());
-        if entries.len() == before && !row.is_empty() {
-            return Err(format!("entry {} is empty", before + 1));
-        }
-    }
-    Ok(entries)
-}
-
-/// Test whether an entry is a number, possibly mistyped or in quotes.
-fn resembles_number(entry: &str) -> bool {
-    let bare = entry.trim_matches(['"', '\'']);
-    let digits = bare.trim_start_matches(['+', '-', '.']);
-    bare.parse::<f64>().is_ok() || digits.starts_with(|c: char| c.is_ascii_digit())
-}
-
 /// Parse the point of a row.
 fn point(
-    problem: &Problem,
+    columns: &Columns,
     users: &[(usize, Option<u32>)],
     entries: &[&str],
 ) -> std::result::Result<Point, String> {
-    let dimension = problem.dimension.count();
-    let names = &["x", "y", "z"][..dimension];
-    if entries.len() != dimension + 2 {
+    if entries.len() != columns.names.len() {
         return Err(format!(
-            "has {} entries, must have {}: {} volume block",
+            "has {} entries, must have {}: {}",
             entries.len(),
-            dimension + 2,
-            names.join(" ")
+            columns.names.len(),
+            columns.names.join(" ")
         ));
     }
-    let number = |k: usize, name: &str| {
-        let value = entries[k]
+    let number = |column: usize, name: &str| {
+        let value = entries[column]
             .parse::<f64>()
             .ok()
             .filter(|value| value.is_finite());
-        value.ok_or_else(|| format!("{name} must be a number, is {}", excerpt(entries[k])))
+        value.ok_or_else(|| format!("{name} must be a number, is {}", excerpt(entries[column])))
     };
     let mut position = [0.0; 3];
-    for (k, name) in names.iter().enumerate() {
-        position[k] = number(k, name)?;
+    for (k, column) in columns.position.iter().enumerate() {
+        let name = ["x", "y", "z"][k];
+        position[k] = number(*column, name)?;
         if position[k].abs() > FARTHEST {
             return Err(format!(
                 "{name} must be at most {FARTHEST:e} m, is {:e}",
@@ -246,16 +234,19 @@ fn point(
             ));
         }
     }
-    let volume = number(dimension, "volume")?;
+    let volume = number(columns.volume, "volume")?;
     if volume <= 0.0 {
         return Err(format!("volume must be above 0 m³, is {volume}"));
     }
-    let block: u32 = entries[dimension + 1].parse().map_err(|_| {
-        format!(
-            "block must be a whole number, is {}",
-            excerpt(entries[dimension + 1])
-        )
-    })?;
+    let block: u32 = match columns.block {
+        None => 0,
+        Some(column) => entries[column].parse().map_err(|_| {
+            format!(
+                "block must be a whole number, is {}",
+                excerpt(entries[column])
+            )
+        })?,
+    };
     let body = users
         .iter()
         .find(|(_, selected)| selected.is_none_or(|selected| selected == block));
@@ -300,6 +291,7 @@ mod tests {
         problem.bodies[0].points = PointSource::File {
             path: path.clone(),
             block: None,
+            columns: None,
             span: 0..0,
         };
         let on = |ranks: usize| {
@@ -380,6 +372,41 @@ mod tests {
         assert_eq!(read("late", late.as_bytes()), expected);
         let expected = Err("points.csv:2: is not UTF-8 text".to_owned());
         assert_eq!(read("latin", b"0,0,1,1\n# \xb5m\n1,0,1,1\n"), expected);
+    }
+
+    #[test]
+    fn a_heading_with_a_column_x_names_the_columns() {
+        for (text, expected) in [
+            ("block volume y x\n1 1 0 5\n1 1 0 6\n", vec![5.0, 6.0]),
+            ("X,Y,Block_ID,Volume\n5,0,1,2\n", vec![5.0]),
+            (
+                "# by PeriLab\n\nheader: x y block_id volume Temperature\n5 0 1 2 20\n/ no\n* no\n",
+                vec![5.0],
+            ),
+            ("\u{feff}z\tx\ty\tvol\n9\t5\t0\t2\n", vec![5.0]),
+            // No column x: the default order.
+            ("a,b,c,d\n5,0,2,1\n", vec![5.0]),
+        ] {
+            assert_eq!(read("columns", text.as_bytes()), Ok(expected), "{text}");
+        }
+        for (text, message) in [
+            (
+                "# volumes\nx y block\n0 0 1\n",
+                "2: has no column `volume`; the columns are `x y block`, the known names x y volume block",
+            ),
+            ("x x y volume\n0 0 0 1\n", "1: has two columns `x`"),
+            (
+                "x y volume vx\n0 0 1 2\n0 0 1\n",
+                "3: has 3 entries, must have 4: x y volume vx",
+            ),
+            (
+                "y x volume\n0 1 -1\n",
+                "2: volume must be above 0 m³, is -1",
+            ),
+        ] {
+            let expected = Err(format!("points.csv:{message}"));
+            assert_eq!(read("columns", text.as_bytes()), expected, "{text}");
+        }
     }
 
     #[test]

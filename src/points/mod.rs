@@ -3,8 +3,10 @@
 //! Each rank generates or reads its own piece of the points; no rank holds all of them.
 
 pub mod bins;
+pub mod columns;
 pub mod crack;
 pub(crate) mod file;
+pub mod id_file;
 pub mod lattice;
 pub(crate) mod mesh;
 mod polygon;
@@ -12,6 +14,7 @@ mod region;
 pub mod set;
 pub mod shape;
 
+pub use columns::Columns;
 pub use lattice::LatticeBody;
 pub use polygon::Polygon;
 
@@ -172,11 +175,11 @@ fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result
 
 fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
     for set in &problem.sets {
-        if let Selector::Ids { ids, largest } = &set.selector
+        if let Selector::Ids { ids, key, largest } = &set.selector
             && let Some(id) = ids.last().filter(|id| **id >= total)
         {
             let message = format!(
-                "[set.{}] ids: no point has the id {id}; those of the {total} points are 0 to {}",
+                "[set.{}] {key}: no point has the id {id}; those of the {total} points are 0 to {}",
                 set.name,
                 total - 1
             );

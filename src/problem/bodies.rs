@@ -9,7 +9,7 @@ use super::{Calibration, Law, ThermalExpansion, WorkRule};
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 use crate::mesh::{GroupKey, Runs};
-use crate::points::Polygon;
+use crate::points::{Columns, Polygon};
 use crate::scatter::Weibull;
 
 /// A body, which is a block with its own material and damage.
@@ -203,6 +203,8 @@ pub enum PointSource {
         path: PathBuf,
         /// Only rows with this block number.
         block: Option<u32>,
+        /// The columns of a row, if the deck names them.
+        columns: Option<Columns>,
         /// Where the file is named in the deck.
         span: Range<usize>,
     },
@@ -288,6 +290,8 @@ pub enum Selector {
     Ids {
         /// Sorted.
         ids: Vec<u64>,
+        /// The key that has them.
+        key: &'static str,
         /// Where the largest one stands in the deck.
         largest: Range<usize>,
     },

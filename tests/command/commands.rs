@@ -599,3 +599,137 @@ fn a_point_file_without_line_ends_is_not_read_into_memory() {
         assert!(text(&output).contains(words), "{}", text(&output));
     }
 }
+
+/// The tensile test of Peridigm's examples on a bar of its own: E = 9 k G/(3 k + G) = 180 GPa, in cgs.
+const TENSILE_TEST: &str = r#"
+Peridigm:
+  Discretization:
+    Type: "Text File"
+    Input Mesh File: "bar.txt"
+  Materials:
+    Steel:
+      Material Model: "Elastic Correspondence"
+      Density: 8.0
+      Bulk Modulus: 1.5e12
+      Shear Modulus: 6.923e11
+      Hourglass Coefficient: 0.02
+  Blocks:
+    All Blocks:
+      Block Names: "block_1 block_2 block_3"
+      Material: "Steel"
+      Horizon: 1.5
+  Boundary Conditions:
+    Node Set Ends: "ends.txt"
+    Pull:
+      Type: "Prescribed Displacement"
+      Node Set: "Node Set Ends"
+      Coordinate: "y"
+      Value: "0.001*y*t"
+  Solver:
+    Final Time: 1.0
+    QuasiStatic:
+      Number of Load Steps: 1
+      Absolute Tolerance: 1.0
+  Compute Class Parameters:
+    Top:
+      Compute Class: "Block_Data"
+      Calculation Type: "Sum"
+      Block: "block_3"
+      Variable: "Force"
+      Output Label: "Top_Reaction_Force"
+    Lower Gage:
+      Compute Class: "Nearest_Point_Data"
+      X: 1.0
+      Y: 4.0
+      Z: 1.0
+      Variable: "Displacement"
+    Upper Gage:
+      Compute Class: "Nearest_Point_Data"
+      X: 1.0
+      Y: 11.0
+      Z: 1.0
+      Variable: "Displacement"
+  Output:
+    Output Frequency: 1
+    Output Variables:
+      Displacement: true
+      Top_Reaction_Force: true
+"#;
+
+#[test]
+fn an_imported_tensile_test_has_youngs_modulus() {
+    let folder = Folder::new("import");
+    let (mut points, mut ends) = (String::new(), String::new());
+    for index in 0..4 * 16 * 4_u32 {
+        let (x, y, z) = (index % 4, index / 4 % 16, index / 64);
+        let block = match y {
+            0..2 => 1,
+            2..14 => 2,
+            _ => 3,
+        };
+        points += &format!("{x} {y} {z} {block} 1.0\n");
+        if block != 2 {
+            ends += &format!("{}\n", index + 1);
+        }
+    }
+    folder.write("bar.txt", &points);
+    folder.write("ends.txt", &ends);
+    let deck = folder.write("tensile.yaml", TENSILE_TEST);
+    let import = |arguments: &[&str]| finish(fissure(1).arg("import").arg(&deck).args(arguments));
+
+    let output = import(&[]);
+    let printed = text(&output);
+    assert!(output.status.success(), "{printed}");
+    for line in [
+        "approximated  Peridigm > Compute Class Parameters > Top > Variable: Force",
+        "30 keys taken, 9 approximated, 0 left out",
+    ] {
+        assert!(printed.contains(line), "{printed}");
+    }
+    let new = folder.join("tensile.toml");
+    let output = import(&[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output).contains("tensile.toml exists already"),
+        "{}",
+        text(&output)
+    );
+    assert!(import(&["--overwrite", "--quiet"]).status.success());
+    let output = import(&["--from", "perilab", "--overwrite"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output).contains("tensile.yaml:"), "{}", text(&output));
+
+    succeed(fissure(1).arg("check").arg(&new).arg("--quiet"));
+    let out = folder.join("out");
+    succeed(
+        fissure(1)
+            .arg("run")
+            .arg(&new)
+            .arg("-o")
+            .arg(&out)
+            .arg("--quiet"),
+    );
+    let history = std::fs::read_to_string(out.join("history.csv")).unwrap();
+    let value = |name: &str| -> f64 {
+        let mut names = history.lines().next().unwrap().split(',');
+        let column = names.position(|column| column.starts_with(name)).unwrap();
+        history
+            .lines()
+            .last()
+            .unwrap()
+            .split(',')
+            .nth(column)
+            .unwrap()
+            .parse()
+            .unwrap()
+    };
+    let gage = |name: &str| value(&format!("probe_{name}_gage_displacement_y"));
+    let strain = (gage("upper") - gage("lower")) / 7.0;
+    // A strain of 0.1 % is not small to the last digit: its square counts in this law.
+    let modulus = value("reaction_block_3_y") / 16.0 / strain;
+    let expected = 9.0 * 1.5e12 * 6.923e11 / (3.0 * 1.5e12 + 6.923e11);
+    assert!(
+        (modulus / expected - 1.0).abs() < 3e-3,
+        "{modulus:e} {expected:e}"
+    );
+}

@@ -31,8 +31,8 @@ pub struct Body {
     pub horizon: Option<Number>,
 }
 
-/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces, or from the elements of a
-/// mesh; exactly one of `file` and `mesh`.
+/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces, or with the columns that its
+/// header names, or from the elements of a mesh; exactly one of `file` and `mesh`.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {
@@ -45,6 +45,9 @@ pub struct Points {
     /// Take only the rows with this block number, or the elements of this group; all if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
+    /// Names of the columns of a file without a header: coordinates, `volume`, `block`, any others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub columns: Option<Spanned<Vec<String>>>,
     /// Metres per unit of length of the mesh; 1 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<Number>,
@@ -117,6 +120,12 @@ pub struct Set {
     /// The points' global ids, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ids: Option<Spanned<Vec<Spanned<u64>>>>,
+    /// Path of a file with the points' numbers, relative to the deck.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<Text>,
+    /// Number that the file gives to the first point; 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_id: Option<Spanned<u64>>,
     /// A group of the meshes that bodies have their points from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Spanned<GroupName>>,

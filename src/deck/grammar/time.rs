@@ -199,7 +199,7 @@ fn default_iterations() -> Count {
 }
 
 /// How Newton's method finds equilibria.
-#[derive(Debug, Clone, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Static {
     /// Number of load steps; that of the relaxation if not given.

@@ -1,0 +1,130 @@
+//! `fissure import`: decks of other codes.
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use fissure::error::{Error, Result};
+use fissure::import::log::Fate;
+use fissure::import::{self, Code};
+
+use super::{Verbosity, errln, file_error, outln};
+
+/// Translate a deck of Peridigm, PeriLab or LAMMPS.
+///
+/// Writes a commented deck, and lists what became of each key: taken, approximated or left out, and why.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  fissure import disk_impact.yaml               writes disk_impact.toml beside it
+  fissure import WaveInBar.xml -o bar.toml
+  fissure import in.peri                        writes in.peri.toml
+  fissure import model.yaml --from peridigm     do not look which code the deck is of")]
+pub struct ImportArguments {
+    /// The deck: YAML, XML or an input script.
+    deck: PathBuf,
+
+    /// The new deck [default: the name of the deck with the ending .toml].
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+
+    /// The code that the deck is of [default: as its text says].
+    #[arg(long, value_enum, value_name = "CODE")]
+    from: Option<From>,
+
+    /// Replace a deck that is already there.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// A code whose decks are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum From {
+    /// Peridigm.
+    Peridigm,
+    /// PeriLab.
+    Perilab,
+    /// LAMMPS with `atom_style peri`.
+    Lammps,
+}
+
+/// Translate a deck and write the new one.
+///
+/// # Errors
+/// If the deck cannot be translated, or the new one exists or cannot be written.
+pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
+    let target = arguments.output.clone();
+    let target = target.unwrap_or_else(|| default_target(&arguments.deck));
+    let code = arguments.from.map(|from| match from {
+        From::Peridigm => Code::Peridigm,
+        From::Perilab => Code::PeriLab,
+        From::Lammps => Code::Lammps,
+    });
+    let exists = || {
+        let message = format!(
+            "{} exists already; choose another name with --output, or replace it with --overwrite",
+            target.display()
+        );
+        Error::input(message)
+    };
+    if target.exists() && !arguments.overwrite {
+        return Err(exists());
+    }
+    let imported = import::import(&arguments.deck, code, &target)?;
+    let mut options = OpenOptions::new();
+    match arguments.overwrite {
+        true => options.write(true).create(true).truncate(true),
+        false => options.write(true).create_new(true),
+    };
+    let mut file = match options.open(&target) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(exists()),
+        Err(error) => return Err(file_error(&target, "create", &error)),
+    };
+    file.write_all(imported.text.as_bytes())
+        .map_err(|error| file_error(&target, "write", &error))?;
+    let name = target.display();
+    if verbosity > Verbosity::Quiet {
+        errln!(
+            " line  what became of the keys of {}",
+            arguments.deck.display()
+        );
+        for entry in &imported.entries {
+            errln!("{entry}");
+        }
+        outln!(
+            "wrote {name} from a deck of {}: {} keys taken, {} approximated, {} left out",
+            imported.code,
+            imported.count(Fate::Taken),
+            imported.count(Fate::Approximated),
+            imported.count(Fate::LeftOut)
+        );
+        match &imported.fault {
+            None => outln!("next: fissure check {name}, then fissure run {name}"),
+            Some(_) => outln!("next: correct {name}"),
+        }
+    }
+    if let Some(fault) = &imported.fault {
+        errln!("warning: the new deck is not valid yet: {fault}");
+    }
+    Ok(())
+}
+
+/// The default path of the new deck.
+fn default_target(deck: &Path) -> PathBuf {
+    let endings = ["yaml", "yml", "xml", "peridigm"];
+    let ending = deck.extension().and_then(|ending| ending.to_str());
+    match ending.is_some_and(|ending| {
+        endings
+            .iter()
+            .any(|known| ending.eq_ignore_ascii_case(known))
+    }) {
+        true => deck.with_extension("toml"),
+        false => {
+            let mut name = deck.as_os_str().to_owned();
+            name.push(".toml");
+            name.into()
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Bodies of an import: blocks with a material, a damage model and a horizon, and damage that fits the law.
+
+use super::draft::{Section, Value};
+use super::elastic::Constants;
+use super::translation::Translation;
+use crate::error::Result;
+
+/// A material of the new deck.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// Its name in the deck that is read.
+    pub read: String,
+    /// Its name in the new deck.
+    pub written: String,
+    /// Its law.
+    pub law: &'static str,
+    /// Its elastic constants.
+    pub constants: Constants,
+}
+
+/// When bonds of a deck break.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Criterion {
+    /// At a stretch.
+    Stretch(Value, f64),
+    /// At a work that follows from a fracture energy by PeriLab's formula.
+    Energy {
+        /// Fracture energy, J/m².
+        energy: Value,
+        /// Compressed bonds do not break.
+        tension_only: bool,
+    },
+}
+
+/// A damage model of the deck that is read.
+#[derive(Debug, Clone)]
+pub struct DamageModel {
+    /// Its name there.
+    pub read: String,
+    /// When bonds break.
+    pub criterion: Criterion,
+    /// Line of the criterion's value.
+    pub node: super::tree::Node,
+}
+
+/// Laws whose bonds break by work only.
+const BY_ENERGY: [&str; 3] = [
+    "ordinary_plastic",
+    "correspondence",
+    "bond_associated_correspondence",
+];
+
+/// Laws of bonds.
+const BOND_BASED: [&str; 1] = ["pmb"];
+
+/// Write the damage law of a body; return its name.
+///
+/// # Errors
+/// If the law needs an energy and the elastic constants do not give one.
+pub fn damage(
+    translation: &mut Translation,
+    model: &DamageModel,
+    material: &Material,
+    horizon: f64,
+) -> Result<Option<String>> {
+    let by_energy = BY_ENERGY.contains(&material.law);
+    match &model.criterion {
+        Criterion::Stretch(value, _) if !by_energy => {
+            let name = translation.name("damage", &model.read);
+            let header = format!("damage.{name}.critical_stretch");
+            translation
+                .log
+                .taken(&model.node, format!("[{header}] critical_stretch"));
+            translation
+                .draft
+                .section(&header)
+                .set("critical_stretch", value.clone());
+            Ok(Some(name))
+        }
+        Criterion::Stretch(_, stretch) => {
+            let Some([bulk, shear]) = material.constants.moduli() else {
+                let note = format!(
+                    "{} breaks by energy only, which needs two moduli",
+                    material.law
+                );
+                translation.log.left_out(&model.node, note);
+                return Ok(None);
+            };
+            // Silling & Askari (2005) for the solid: G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)).
+            let energy = stretch
+                * stretch
+                * horizon
+                * (3.0 * shear + 0.316_406_25 * (bulk - 5.0 * shear / 3.0));
+            let name = translation.name("damage", &format!("{} energy {horizon}", model.read));
+            let header = format!("damage.{name}.energy");
+            let note = format!(
+                "[{header}] fracture_energy = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)): {} breaks by energy only",
+                material.law
+            );
+            translation.log.approximated(&model.node, note);
+            let section = translation.draft.section(&header);
+            section.set("fracture_energy", Value::number(energy));
+            Ok(Some(name))
+        }
+        Criterion::Energy {
+            energy,
+            tension_only,
+        } => {
+            let bond_based = BOND_BASED.contains(&material.law);
+            // Bonds of a bond-based law break in tension only.
+            let name = match bond_based && !tension_only {
+                true => translation.name("damage", &format!("{} of bonds", model.read)),
+                false => translation.name("damage", &model.read),
+            };
+            let header = format!("damage.{name}.energy");
+            let note = format!("[{header}] fracture_energy with PeriLab's calibration");
+            translation.log.taken(&model.node, note);
+            let section = translation.draft.section(&header);
+            section
+                .set("fracture_energy", energy.clone())
+                .set("calibration", Value::text("perilab"));
+            if !tension_only && !bond_based {
+                section.set("tension_only", Value::Flag(false));
+            }
+            Ok(Some(name))
+        }
+    }
+}
+
+/// A body of the new deck.
+pub struct Body {
+    /// Its name in the new deck.
+    pub name: String,
+    /// Its material.
+    pub material: String,
+    /// Its damage law.
+    pub damage: Option<String>,
+    /// Its horizon as it stands.
+    pub horizon: Value,
+    /// The key and value of its points: `points` or `shape.box`.
+    pub points: (String, Value),
+}
+
+/// Write bodies. The horizon of the first one is that of the grid.
+pub fn write(translation: &mut Translation, bodies: &[Body]) {
+    let Some(first) = bodies.first() else {
+        return;
+    };
+    let grid = translation.draft.section("grid");
+    grid.set("horizon", first.horizon.clone());
+    for body in bodies {
+        let mut section = Section::new(format!("body.{}", body.name));
+        section.set("material", Value::text(body.material.clone()));
+        if let Some(damage) = &body.damage {
+            section.set("damage", Value::text(damage.clone()));
+        }
+        if body.horizon != first.horizon {
+            section.set("horizon", body.horizon.clone());
+        }
+        section.set(body.points.0.clone(), body.points.1.clone());
+        translation.add(section);
+    }
+}

@@ -1,0 +1,138 @@
+//! Bond filters: surfaces that cut bonds, which become pre-cracks.
+
+use super::draft::{Section, Value};
+use super::translation::Translation;
+use super::tree::Node;
+use crate::error::Result;
+
+/// Write the pre-cracks of a table of bond filters.
+///
+/// # Errors
+/// If a key is missing or no number.
+pub fn bond_filters(translation: &mut Translation, filters: &Node) -> Result<()> {
+    for (name, filter) in filters.tables() {
+        let kind = translation.required(filter, "Type", &format!("the bond filter `{name}`"))?;
+        let kind_name = translation
+            .text(kind, "Type")?
+            .to_lowercase()
+            .replace('_', " ");
+        match kind_name.as_str() {
+            "rectangular plane" => plane(translation, name, filter, kind)?,
+            "disk" => disc(translation, name, filter, kind)?,
+            _ => translation.log.left_out(
+                filter,
+                "only rectangular planes and discs can be pre-cracks",
+            ),
+        }
+    }
+    Ok(())
+}
+
+/// The vector of three keys with the same beginning. In the plane, the third one may be missing.
+fn vector(translation: &Translation, filter: &Node, key: &str, note: &str) -> Result<[f64; 3]> {
+    let mut vector = [0.0; 3];
+    for (k, axis) in ["X", "Y", "Z"].iter().enumerate() {
+        let key = format!("{key} {axis}");
+        let node = match filter.get(&key) {
+            None if k >= translation.dimension => continue,
+            _ => translation.required(filter, &key, "the bond filter")?,
+        };
+        vector[k] = translation.number(node, &key)?;
+        match k < translation.dimension {
+            true => translation.log.taken(node, note),
+            false => translation.log.left_out(node, "the problem has no z"),
+        }
+    }
+    Ok(vector)
+}
+
+fn length(translation: &Translation, filter: &Node, key: &str, note: &str) -> Result<f64> {
+    let node = translation.required(filter, key, "the bond filter")?;
+    translation.log.taken(node, note);
+    translation.number(node, key)
+}
+
+fn scaled(vector: [f64; 3], factor: f64) -> [f64; 3] {
+    vector.map(|component| factor * component)
+}
+
+/// A vector of length 1, or the zero vector.
+fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
+    match length > 0.0 {
+        true => scaled(vector, 1.0 / length),
+        false => vector,
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// The rectangle with the bottom edge ub·b from a corner and the side edge (ub × n)·a. In the plane, its bottom edge.
+fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
+    let written = translation.name("crack", name);
+    let shape = match translation.dimension {
+        3 => "rectangle",
+        _ => "segment",
+    };
+    let header = format!("[crack.{written}.{shape}]");
+    let normal = unit(vector(translation, filter, "Normal", &header)?);
+    let corner = vector(translation, filter, "Lower Left Corner", &header)?;
+    let bottom = unit(vector(translation, filter, "Bottom Unit Vector", &header)?);
+    let bottom_length = length(translation, filter, "Bottom Length", &header)?;
+    let edge = scaled(bottom, bottom_length);
+    translation.log.taken(kind, &header);
+    let mut section = Section::new(format!("crack.{written}.{shape}"));
+    if translation.dimension == 3 {
+        let side_length = length(translation, filter, "Side Length", &header)?;
+        let side = scaled(cross(bottom, normal), side_length);
+        section
+            .set("corner", Value::numbers(&corner))
+            .set("edge_a", Value::numbers(&edge))
+            .set("edge_b", Value::numbers(&side));
+    } else {
+        let end = [corner[0] + edge[0], corner[1] + edge[1]];
+        section
+            .set("from", Value::numbers(&corner[..2]))
+            .set("to", Value::numbers(&end));
+        if let Some(side) = filter.get("Side Length") {
+            translation.log.left_out(side, "the problem has no z");
+        }
+    }
+    translation.add(section);
+    Ok(())
+}
+
+/// A disc; in the plane, the line across its normal.
+fn disc(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) -> Result<()> {
+    let written = translation.name("crack", name);
+    let shape = match translation.dimension {
+        3 => "disc",
+        _ => "segment",
+    };
+    let header = format!("[crack.{written}.{shape}]");
+    let centre = vector(translation, filter, "Center", &header)?;
+    let normal = unit(vector(translation, filter, "Normal", &header)?);
+    let radius = length(translation, filter, "Radius", &header)?;
+    translation.log.taken(kind, &header);
+    let mut section = Section::new(format!("crack.{written}.{shape}"));
+    if translation.dimension == 3 {
+        section
+            .set("centre", Value::numbers(&centre))
+            .set("normal", Value::numbers(&normal))
+            .set("radius", Value::number(radius));
+    } else {
+        let half = [-radius * normal[1], radius * normal[0]];
+        let end = |sign: f64| [centre[0] + sign * half[0], centre[1] + sign * half[1]];
+        section
+            .set("from", Value::numbers(&end(-1.0)))
+            .set("to", Value::numbers(&end(1.0)));
+    }
+    translation.add(section);
+    Ok(())
+}

@@ -1,0 +1,203 @@
+//! Initial values, loads and supports of decks that give one component each.
+
+use super::draft::{Section, Value};
+use super::sets::Sets;
+use super::translation::Translation;
+use super::tree::Node;
+use crate::error::{Result, excerpt};
+
+/// What a condition prescribes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Quantity {
+    /// Initial displacement or velocity: the key of `[initial.NAME]`.
+    Initial(&'static str),
+    /// Displacement or velocity of a support: the key of `[condition.NAME]`.
+    Support(&'static str),
+    /// Force density.
+    BodyForce,
+    /// Force on each point of the set, N.
+    ForceOfPoint,
+}
+
+/// An initial value of one component.
+struct Initial {
+    set: String,
+    key: &'static str,
+    component: usize,
+    value: Value,
+    /// Where the value stands.
+    node: Node,
+}
+
+/// Writes conditions one after the other.
+#[derive(Default)]
+pub struct Conditions {
+    initials: Vec<Initial>,
+    /// Names of the conditions in the new deck, with the number of their step.
+    pub written: Vec<(String, Option<u64>)>,
+}
+
+/// A condition as the deck has it.
+pub struct Given<'n> {
+    /// Its name.
+    pub name: &'n str,
+    /// Its table.
+    pub node: &'n Node,
+    /// What it prescribes.
+    pub quantity: Quantity,
+    /// Number of the step in which it acts; in all if not given.
+    pub step: Option<u64>,
+}
+
+impl Conditions {
+    /// Write a condition.
+    ///
+    /// # Errors
+    /// If a key is missing, or the node set is unknown.
+    pub fn add(
+        &mut self,
+        translation: &mut Translation,
+        sets: &mut Sets,
+        given: &Given,
+    ) -> Result<()> {
+        let (name, node) = (given.name, given.node);
+        let what = format!("the condition `{name}`");
+        let coordinate = translation.required(node, "Coordinate", &what)?;
+        let word = translation.text(coordinate, "Coordinate")?.to_lowercase();
+        let component = ["x", "y", "z"].iter().position(|axis| *axis == word);
+        let Some(component) = component else {
+            let message = format!("`Coordinate` must be x, y or z, is {}", excerpt(&word));
+            return Err(translation.error(coordinate.line, message));
+        };
+        if component >= translation.dimension {
+            let note = format!("the problem has no {word}");
+            translation.log.left_out(node, note);
+            return Ok(());
+        }
+        let value = translation.required(node, "Value", &what)?;
+        let text = translation.text(value, "Value")?.to_owned();
+        let is_initial = matches!(given.quantity, Quantity::Initial(_));
+        let expression = match translation.expression(&text, !is_initial) {
+            Ok(expression) => expression,
+            Err(message) => {
+                let note = format!("its value cannot be expressed: {message}");
+                translation.log.left_out(node, note);
+                return Ok(());
+            }
+        };
+        let set_node = translation.required(node, "Node Set", &what)?;
+        let set_name = translation.text(set_node, "Node Set")?.to_owned();
+        let mut names = set_name.split('+').map(str::trim);
+        let (first, others) = (names.next().unwrap_or(""), names.next());
+        if others.is_some() {
+            translation
+                .log
+                .left_out(node, "a sum of node sets; write one condition for each");
+            return Ok(());
+        }
+        let set = sets.find(translation, set_node, first)?;
+        translation.log.taken(set_node, format!("the set `{set}`"));
+        translation
+            .log
+            .taken(coordinate, format!("component {word}"));
+        let zero = Value::Number("0".to_owned());
+        let free = Value::text("free");
+        let (key, vector, factor) = match given.quantity {
+            Quantity::Initial(key) => {
+                translation
+                    .log
+                    .taken(value, format!("[initial.{set}] {key}"));
+                self.initials.push(Initial {
+                    set,
+                    key,
+                    component,
+                    value: expression,
+                    node: value.clone(),
+                });
+                return Ok(());
+            }
+            Quantity::Support(key) => (
+                key,
+                translation.component(component, expression, &free),
+                None,
+            ),
+            Quantity::BodyForce => (
+                "body_force",
+                translation.component(component, expression, &zero),
+                None,
+            ),
+            Quantity::ForceOfPoint => {
+                let Some(count) = sets.size(translation, first) else {
+                    let note = "a force on each point of a set whose number of points is not known";
+                    translation.log.left_out(node, note);
+                    return Ok(());
+                };
+                let total = match &expression {
+                    Value::Number(number) => match number.parse::<f64>() {
+                        Ok(number) => Value::number(count as f64 * number),
+                        Err(_) => expression.clone(),
+                    },
+                    Value::Text(text) => Value::text(format!("{count}*({text})")),
+                    other => other.clone(),
+                };
+                (
+                    "force",
+                    translation.component(component, total, &zero),
+                    Some(count),
+                )
+            }
+        };
+        let written = translation.name("condition", name);
+        let mut section = Section::new(format!("condition.{written}"));
+        section.set("set", Value::text(set)).set(key, vector);
+        translation.add(section);
+        match factor {
+            None => translation
+                .log
+                .taken(value, format!("[condition.{written}] {key}")),
+            Some(count) => {
+                let note = format!(
+                    "[condition.{written}] force: the total of {count} points, spread by volume"
+                );
+                translation.log.approximated(value, note);
+            }
+        }
+        self.written.push((written, given.step));
+        Ok(())
+    }
+
+    /// Write the initial values, one table a set.
+    pub fn finish(&mut self, translation: &mut Translation) {
+        for initial in &self.initials {
+            let others = self
+                .initials
+                .iter()
+                .filter(|other| other.key == initial.key);
+            let gives = |set: &str, component: usize| {
+                let mut all = self.initials.iter();
+                all.any(|o| o.key == initial.key && o.set == set && o.component == component)
+            };
+            let mut missing = others.filter(|other| !gives(&other.set, initial.component));
+            if let Some(other) = missing.next() {
+                let note = format!("0 in points that are in the set `{}` too", other.set);
+                translation.log.approximated(&initial.node, note);
+            }
+        }
+        for initial in std::mem::take(&mut self.initials) {
+            let header = format!("initial.{}", initial.set);
+            let is_new = !translation.draft.has(&header);
+            let dimension = translation.dimension;
+            let section = translation.draft.section(&header);
+            if is_new {
+                section.set("set", Value::text(initial.set.clone()));
+            }
+            let known = section.get(initial.key).cloned();
+            let mut components = match known {
+                Some(Value::List(values)) => values,
+                _ => vec![Value::Number("0".to_owned()); dimension],
+            };
+            components[initial.component] = initial.value;
+            section.set(initial.key, Value::List(components));
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! The deck that an import writes: sections with keys, and their text.
+
+use std::fmt::Write;
+
+use super::log::Entry;
+
+/// Order of the sections in the text, by the first word of their headers.
+const ORDER: [&str; 16] = [
+    "parameters",
+    "grid",
+    "interface",
+    "contact",
+    "rigid",
+    "material",
+    "damage",
+    "body",
+    "set",
+    "crack",
+    "initial",
+    "condition",
+    "time",
+    "stage",
+    "output",
+    "history",
+];
+
+/// A value of a deck.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A number as it is written.
+    Number(String),
+    /// A text, a name or an expression.
+    Text(String),
+    /// Whole numbers.
+    Ids(Vec<u64>),
+    /// Other values in order.
+    List(Vec<Value>),
+    /// An inline table.
+    Table(Vec<(String, Value)>),
+    /// `true` or `false`.
+    Flag(bool),
+}
+
+impl Value {
+    /// A text.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+
+    /// A computed number, with 15 digits, so that round-off does not show.
+    pub fn number(value: f64) -> Self {
+        let rounded = format!("{value:.14e}").parse::<f64>().unwrap_or(value);
+        Self::Number(match rounded.is_nan() {
+            true => "nan".to_owned(),
+            false => format!("{rounded:?}"),
+        })
+    }
+
+    /// A number as text where TOML writes it alike, an expression otherwise.
+    pub fn number_or_expression(text: &str) -> Self {
+        match text.parse::<f64>() {
+            Ok(_) if is_toml_number(text) => Self::Number(text.to_owned()),
+            Ok(value) if value.is_finite() => Self::number(value),
+            _ => Self::text(text),
+        }
+    }
+
+    /// A list.
+    pub fn list(values: impl IntoIterator<Item = Value>) -> Self {
+        Self::List(values.into_iter().collect())
+    }
+
+    /// A list of numbers.
+    pub fn numbers(values: &[f64]) -> Self {
+        Self::list(values.iter().map(|value| Self::number(*value)))
+    }
+}
+
+/// Test whether TOML reads a text as the number that it is elsewhere.
+fn is_toml_number(text: &str) -> bool {
+    let digits = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
+    let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, Some(exponent)),
+        None => (unsigned, None),
+    };
+    let (whole, fraction) = match mantissa.split_once('.') {
+        Some((whole, fraction)) => (whole, Some(fraction)),
+        None => (mantissa, None),
+    };
+    let exponent_digits = |text: &str| digits(text.strip_prefix(['+', '-']).unwrap_or(text));
+    digits(whole)
+        && (whole == "0" || !whole.starts_with('0'))
+        && whole.len() < 19
+        && fraction.is_none_or(digits)
+        && exponent.is_none_or(exponent_digits)
+}
+
+/// A section of the deck.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    header: String,
+    /// Lines of comment in front of it.
+    comments: Vec<String>,
+    lines: Vec<(String, Value)>,
+}
+
+impl Section {
+    /// A section without keys; the header is that between the brackets.
+    pub fn new(header: impl Into<String>) -> Self {
+        Self {
+            header: header.into(),
+            comments: Vec::new(),
+            lines: Vec::new(),
+        }
+    }
+
+    /// Add a comment in front.
+    pub fn comment(&mut self, comment: impl Into<String>) -> &mut Self {
+        self.comments.push(comment.into());
+        self
+    }
+
+    /// The value of a key.
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        let (_, value) = self.lines.iter().find(|(known, _)| known == key)?;
+        Some(value)
+    }
+
+    /// Set a key.
+    pub fn set(&mut self, key: impl Into<String>, value: Value) -> &mut Self {
+        let key = key.into();
+        match self.lines.iter_mut().find(|(known, _)| *known == key) {
+            Some(line) => line.1 = value,
+            None => self.lines.push((key, value)),
+        }
+        self
+    }
+}
+
+/// The deck that an import writes.
+#[derive(Debug, Default)]
+pub struct Draft {
+    /// Keys in front of all sections.
+    top: Vec<(String, Value)>,
+    sections: Vec<Section>,
+}
+
+impl Draft {
+    /// Set a key in front of all sections.
+    pub fn top(&mut self, key: &str, value: Value) {
+        self.top.push((key.to_owned(), value));
+    }
+
+    /// Test whether a key in front of all sections is set.
+    pub fn has_top(&self, key: &str) -> bool {
+        self.top.iter().any(|(known, _)| known == key)
+    }
+
+    /// Add a section.
+    pub fn add(&mut self, section: Section) {
+        self.sections.push(section);
+    }
+
+    /// The section with a header, which is added if it is missing.
+    pub fn section(&mut self, header: &str) -> &mut Section {
+        let found = self
+            .sections
+            .iter()
+            .position(|section| section.header == header);
+        let index = found.unwrap_or_else(|| {
+            self.sections.push(Section::new(header));
+            self.sections.len() - 1
+        });
+        &mut self.sections[index]
+    }
+
+    /// Test whether a section exists.
+    pub fn has(&self, header: &str) -> bool {
+        self.sections.iter().any(|section| section.header == header)
+    }
+
+    /// The text of the deck with comments in front: `heading`, then the list of keys.
+    pub fn text(&self, heading: &[String], entries: &[Entry]) -> String {
+        let mut text = String::new();
+        let comment = |text: &mut String, line: &str| {
+            let _ = writeln!(text, "{}", format!("# {line}").trim_end());
+        };
+        for line in heading {
+            comment(&mut text, &printable(line));
+        }
+        comment(&mut text, "");
+        comment(&mut text, " line  what became of it");
+        for entry in entries {
+            comment(&mut text, &printable(&entry.to_string()));
+        }
+        text.push('\n');
+        for (key, value) in &self.top {
+            let _ = writeln!(text, "{key} = {}", written(value));
+        }
+        let rank = |section: &&Section| {
+            let word = section.header.split('.').next().unwrap_or("");
+            ORDER.iter().position(|known| *known == word)
+        };
+        let mut sections: Vec<&Section> = self.sections.iter().collect();
+        sections.sort_by_key(rank);
+        for section in sections {
+            text.push('\n');
+            for line in &section.comments {
+                comment(&mut text, &printable(line));
+            }
+            let header = &section.header;
+            let _ = match header.as_str() {
+                "stage" => writeln!(text, "[[{header}]]"),
+                _ => writeln!(text, "[{header}]"),
+            };
+            for (key, value) in &section.lines {
+                let _ = writeln!(text, "{key} = {}", written(value));
+            }
+        }
+        text
+    }
+}
+
+/// A text without characters that a comment must not have.
+fn printable(text: &str) -> String {
+    text.replace(char::is_control, " ")
+}
+
+/// A value as TOML.
+fn written(value: &Value) -> String {
+    match value {
+        Value::Number(text) => text.clone(),
+        Value::Flag(flag) => flag.to_string(),
+        Value::Text(text) => quoted(text),
+        Value::Ids(ids) => {
+            let mut text = "[".to_owned();
+            for (index, id) in ids.iter().enumerate() {
+                match index {
+                    0 => {}
+                    _ if index % 20 == 0 => text.push_str(",\n    "),
+                    _ => text.push_str(", "),
+                }
+                text.push_str(&id.to_string());
+            }
+            text + "]"
+        }
+        Value::List(values) => {
+            let values: Vec<String> = values.iter().map(written).collect();
+            format!("[{}]", values.join(", "))
+        }
+        Value::Table(entries) => {
+            let entries = entries
+                .iter()
+                .map(|(key, value)| format!("{key} = {}", written(value)));
+            format!("{{ {} }}", entries.collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
+/// A text as a basic string of TOML.
+fn quoted(text: &str) -> String {
+    let mut quoted = "\"".to_owned();
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => {
+                let _ = write!(quoted, "\\u{:04X}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted + "\""
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_they_stand_where_toml_reads_them_alike() {
+        for (text, expected) in [
+            ("130.0e9", "130.0e9"),
+            ("5", "5"),
+            ("-1.5E-3", "-1.5E-3"),
+            ("1.", "1.0"),
+            (".5", "0.5"),
+            ("007", "7.0"),
+            ("1.e-01", "0.1"),
+            ("2.5e+3", "2.5e+3"),
+        ] {
+            let value = Value::number_or_expression(text);
+            assert_eq!(written(&value), expected);
+            let parsed: toml::Table = toml::from_str(&format!("a = {expected}")).unwrap();
+            let number = parsed["a"]
+                .as_float()
+                .or(parsed["a"].as_integer().map(|a| a as f64));
+            assert_eq!(number, text.parse().ok());
+        }
+        assert_eq!(written(&Value::number_or_expression("2*t")), "\"2*t\"");
+        assert_eq!(written(&Value::number_or_expression("nan")), "\"nan\"");
+    }
+
+    #[test]
+    fn the_text_of_a_draft_is_toml() {
+        let mut draft = Draft::default();
+        draft.top("title", Value::text("a \"b\"\n\\"));
+        draft.section("time").set("end", Value::number(1e-7));
+        draft
+            .section("set.a")
+            .set("ids", Value::Ids((0..45).collect()));
+        let points = vec![("block".to_owned(), Value::Number("1".to_owned()))];
+        draft.section("body.b").set("points", Value::Table(points));
+        let text = draft.text(&["from\nanother".to_owned()], &[]);
+        let table: toml::Table = toml::from_str(&text).unwrap();
+        assert_eq!(table["title"].as_str(), Some("a \"b\"\n\\"));
+        assert_eq!(table["set"]["a"]["ids"].as_array().map(Vec::len), Some(45));
+        assert_eq!(table["body"]["b"]["points"]["block"].as_integer(), Some(1));
+        assert!(text.find("[body.b]") < text.find("[set.a]"));
+        assert!(text.find("[set.a]") < text.find("[time]"));
+    }
+}

@@ -1,0 +1,127 @@
+//! Elastic constants of an imported material.
+
+use super::draft::{Section, Value};
+use super::translation::Translation;
+use super::tree::Node;
+use crate::error::Result;
+
+/// The names of the constants in other decks and here.
+const NAMES: [(&str, &str); 5] = [
+    ("Young's Modulus", "youngs_modulus"),
+    ("Poisson's Ratio", "poisson_ratio"),
+    ("Bulk Modulus", "bulk_modulus"),
+    ("Shear Modulus", "shear_modulus"),
+    ("Youngs Modulus", "youngs_modulus"),
+];
+
+/// The constants that a material gives.
+#[derive(Debug, Clone, Default)]
+pub struct Constants {
+    /// New key, value and text.
+    given: Vec<(&'static str, f64, Value)>,
+}
+
+impl Constants {
+    /// Read the constants of a material.
+    ///
+    /// # Errors
+    /// On a constant that is no number.
+    pub fn read(translation: &Translation, material: &Node) -> Result<Self> {
+        let mut given = Vec::new();
+        for (name, key) in NAMES {
+            if let Some(node) = material.get(name) {
+                let value = translation.number(node, name)?;
+                given.push((key, value, translation.number_value(node, name)?));
+                translation
+                    .log
+                    .taken(node, format!("{key} of the material"));
+            }
+        }
+        Ok(Self { given })
+    }
+
+    /// Constants by their values.
+    pub fn of(given: &[(&'static str, f64)]) -> Self {
+        let with_value = |(key, value): &(&'static str, f64)| (*key, *value, Value::number(*value));
+        Self {
+            given: given.iter().map(with_value).collect(),
+        }
+    }
+
+    /// The value of a constant.
+    fn get(&self, key: &str) -> Option<f64> {
+        let (_, value, _) = self.given.iter().find(|(known, ..)| *known == key)?;
+        Some(*value)
+    }
+
+    /// Number of constants.
+    pub fn count(&self) -> usize {
+        self.given.len()
+    }
+
+    /// Bulk and shear modulus of the solid in space, Pa, if two constants give them.
+    pub fn moduli(&self) -> Option<[f64; 2]> {
+        let get = |key| self.get(key);
+        let of_young = |e: f64, nu: f64| [e / (3.0 * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))];
+        let (bulk, shear) = (get("bulk_modulus"), get("shear_modulus"));
+        let (young, ratio) = (get("youngs_modulus"), get("poisson_ratio"));
+        Some(match (bulk, shear, young, ratio) {
+            (Some(k), Some(g), ..) => [k, g],
+            (_, _, Some(e), Some(nu)) => of_young(e, nu),
+            (Some(k), _, _, Some(nu)) => of_young(3.0 * k * (1.0 - 2.0 * nu), nu),
+            (_, Some(g), _, Some(nu)) => of_young(2.0 * g * (1.0 + nu), nu),
+            (Some(k), _, Some(e), _) => [k, 3.0 * k * e / (9.0 * k - e)],
+            (_, Some(g), Some(e), _) => [e * g / (3.0 * (3.0 * g - e)), g],
+            _ => return None,
+        })
+    }
+
+    /// Write two constants.
+    pub fn write_two(&self, section: &mut Section) {
+        for (key, _, value) in self.given.iter().take(2) {
+            section.set(*key, value.clone());
+        }
+    }
+
+    /// Write the one constant of a bond-based law: Young's modulus, or the bulk modulus. `factor` gives Young's
+    /// modulus from a bulk modulus, where this is not that of the solid in space.
+    pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
+        let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
+        if let Some((key, _, value)) = find("youngs_modulus") {
+            section.set(*key, value.clone());
+        } else if let Some([k, g]) = self.moduli() {
+            section.set("youngs_modulus", Value::number(9.0 * k * g / (3.0 * k + g)));
+        } else if let (Some((_, bulk, _)), Some(factor)) = (find("bulk_modulus"), factor) {
+            section.set("youngs_modulus", Value::number(factor * bulk));
+        } else if let Some((key, _, value)) = find("bulk_modulus") {
+            section.set(*key, value.clone());
+        } else {
+            return false;
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_two_constants_give_the_moduli() {
+        let (e, nu) = (200e9, 0.3);
+        let [k, g] = [e / (3.0 * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))];
+        let all = [
+            ("youngs_modulus", e),
+            ("poisson_ratio", nu),
+            ("bulk_modulus", k),
+            ("shear_modulus", g),
+        ];
+        for a in 0..4 {
+            for b in a + 1..4 {
+                let [bulk, shear] = Constants::of(&[all[a], all[b]]).moduli().unwrap();
+                assert!((bulk / k - 1.0).abs() < 1e-12 && (shear / g - 1.0).abs() < 1e-12);
+            }
+            assert_eq!(Constants::of(&[all[a]]).moduli(), None);
+        }
+    }
+}

@@ -1,0 +1,526 @@
+//! Expressions of other codes, rewritten in the grammar of this one.
+//!
+//! Peridigm has statements of C, such as `if(t<=1){value=2*t;} else{value=2;}`. PeriLab has Julia, and the short form
+//! `if t>2 0 else 20 end`. LAMMPS has formulas of variables.
+
+use crate::expression::{Expression, Variable};
+
+/// Maximum depth of parentheses and blocks.
+const DEEPEST: usize = 48;
+
+/// Maximum length of a result, bytes.
+const LONGEST: usize = 4096;
+
+/// How an expression is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dialect {
+    /// Statements of C that set `value`.
+    Peridigm,
+    /// Julia.
+    PeriLab,
+    /// A formula of a variable.
+    Lammps,
+}
+
+/// What the names of a code's expression become; `None` leaves a name as it is.
+pub type Names<'a> = &'a dyn Fn(&str) -> Option<String>;
+
+/// Rewrite an expression.
+///
+/// # Errors
+/// If the result would be no expression of these variables; the message says why.
+pub fn rewrite(
+    text: &str,
+    dialect: Dialect,
+    names: Names,
+    variables: &[Variable],
+) -> Result<String, String> {
+    if text.len() > LONGEST {
+        return Err("the expression is too long".to_owned());
+    }
+    let rewriter = Rewriter { dialect, names };
+    let tokens = tokens(text, dialect)?;
+    let result = match dialect {
+        Dialect::Peridigm if has_statements(&tokens) => rewriter.statements(&tokens)?,
+        Dialect::PeriLab => rewriter.choice(&tokens, 0)?,
+        _ => rewriter.formula(&tokens, 0)?,
+    };
+    if result.len() > LONGEST {
+        return Err("the expression is too long".to_owned());
+    }
+    match Expression::parse(&result, &|_| None, &[], variables) {
+        Ok(expression) => Ok(match expression.as_constant() {
+            // A plain number stays as it is written.
+            Some(value) if result.parse::<f64>().is_err() => format!("{value:?}"),
+            _ => result,
+        }),
+        Err(error) => Err(format!("`{result}`: {error}")),
+    }
+}
+
+/// A piece of an expression.
+#[derive(Debug, Clone, PartialEq)]
+enum Token {
+    Number(String),
+    Name(String),
+    Symbol(&'static str),
+}
+
+/// The symbols; a longer one precedes those that it starts with.
+const SYMBOLS: [&str; 27] = [
+    "<=", ">=", "==", "!=", "&&", "||", "**", "+", "-", "*", "/", "^", "(", ")", ",", "<", ">",
+    "!", "=", ";", "{", "}", "?", ":", "&", "|", "≤",
+];
+
+/// Split an expression.
+fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
+    let mut tokens = Vec::new();
+    let mut rest = text.trim_start();
+    while let Some(first) = rest.chars().next() {
+        let number = number_length(rest.as_bytes());
+        let length = if number > 0 {
+            tokens.push(Token::Number(rest[..number].to_owned()));
+            number
+        } else if first.is_alphabetic() || first == '_' {
+            let is_part = |c: char| c.is_alphanumeric() || c == '_';
+            let length = rest.find(|c| !is_part(c)).unwrap_or(rest.len());
+            tokens.push(Token::Name(rest[..length].to_owned()));
+            length
+        } else if let Some(symbol) = SYMBOLS.iter().find(|symbol| rest.starts_with(**symbol)) {
+            tokens.push(Token::Symbol(symbol));
+            symbol.len()
+        } else if first == '\\' || (first == '.' && dialect == Dialect::PeriLab) {
+            // Braces are escaped in parameter lists; Julia marks operations on arrays by dots.
+            1
+        } else {
+            return Err(format!("unexpected character `{}`", first.escape_debug()));
+        };
+        rest = rest[length..].trim_start();
+    }
+    Ok(tokens)
+}
+
+/// Length of the number that a text starts with, or 0.
+fn number_length(text: &[u8]) -> usize {
+    let digits = |from: usize| {
+        text[from.min(text.len())..]
+            .iter()
+            .take_while(|b| b.is_ascii_digit())
+    };
+    let whole = digits(0).count();
+    let mut length = whole;
+    if text.get(length) == Some(&b'.') {
+        let fraction = digits(length + 1).count();
+        if whole + fraction == 0 {
+            return 0;
+        }
+        length += 1 + fraction;
+    }
+    if length > 0 && matches!(text.get(length), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(text.get(length + 1), Some(b'+' | b'-')));
+        let exponent = digits(length + 1 + sign).count();
+        if exponent > 0 {
+            length += 1 + sign + exponent;
+        }
+    }
+    length
+}
+
+fn is_symbol(token: &Token, symbol: &str) -> bool {
+    matches!(token, Token::Symbol(text) if *text == symbol)
+}
+
+fn is_name(token: &Token, name: &str) -> bool {
+    matches!(token, Token::Name(text) if text == name)
+}
+
+/// Test whether an expression of Peridigm sets `value` by statements.
+fn has_statements(tokens: &[Token]) -> bool {
+    tokens.iter().any(|token| is_name(token, "value"))
+}
+
+/// Index of the symbol that closes the one at `start`.
+fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
+    let (open, close) = match &tokens[start] {
+        Token::Symbol("{") => ("{", "}"),
+        _ => ("(", ")"),
+    };
+    let mut depth = 0_usize;
+    for (index, token) in tokens.iter().enumerate().skip(start) {
+        if is_symbol(token, open) {
+            depth += 1;
+        } else if is_symbol(token, close) {
+            depth -= 1;
+            if depth == 0 {
+                return Ok(index);
+            }
+        }
+    }
+    Err(format!("`{open}` is not closed"))
+}
+
+/// What a function becomes: `$1`, `$2`, `$3` stand for its arguments.
+fn template(dialect: Dialect, name: &str, arguments: usize) -> Option<&'static str> {
+    Some(match (dialect, name, arguments) {
+        (_, "pow", 2) => "(($1)^($2))",
+        (Dialect::Peridigm, "fabs", 1) => "abs($1)",
+        (Dialect::PeriLab, "ifelse", 3) => "if($1, $2, $3)",
+        (Dialect::PeriLab, "atan", 2) => "atan2($1, $2)",
+        (Dialect::Lammps, "ln", 1) => "log($1)",
+        (Dialect::Lammps, "log", 1) => "log10($1)",
+        (Dialect::Lammps, "vdisplace", 2) => "($1 + ($2)*t)",
+        (Dialect::Lammps, "swiggle", 3) => "($1 + ($2)*sin(2*pi*t/($3)))",
+        (Dialect::Lammps, "cwiggle", 3) => "($1 + ($2)*(1 - cos(2*pi*t/($3))))",
+        _ => return None,
+    })
+}
+
+struct Rewriter<'a> {
+    dialect: Dialect,
+    names: Names<'a>,
+}
+
+impl Rewriter<'_> {
+    /// The value that statements leave in `value`.
+    fn statements(&self, tokens: &[Token]) -> Result<String, String> {
+        let (value, end) = self.block(tokens, 0, None, 0)?;
+        if end < tokens.len() {
+            return Err("a `}` is not opened".to_owned());
+        }
+        value.ok_or_else(|| "`value` is not set".to_owned())
+    }
+
+    /// The value after the statements from `at` to the end or a `}`, and the index behind them.
+    fn block(
+        &self,
+        tokens: &[Token],
+        mut at: usize,
+        mut value: Option<String>,
+        depth: usize,
+    ) -> Result<(Option<String>, usize), String> {
+        while at < tokens.len() && !is_symbol(&tokens[at], "}") {
+            if is_symbol(&tokens[at], ";") {
+                at += 1;
+                continue;
+            }
+            (value, at) = self.statement(tokens, at, value, depth)?;
+            if value.as_ref().is_some_and(|value| value.len() > LONGEST) {
+                return Err("the expression is too long".to_owned());
+            }
+        }
+        Ok((value, at))
+    }
+
+    /// The value after the statement at `at`, and the index behind it.
+    fn statement(
+        &self,
+        tokens: &[Token],
+        at: usize,
+        value: Option<String>,
+        depth: usize,
+    ) -> Result<(Option<String>, usize), String> {
+        if depth > DEEPEST {
+            return Err("the statements are too deep".to_owned());
+        }
+        if is_name(&tokens[at], "if") {
+            if !tokens
+                .get(at + 1)
+                .is_some_and(|token| is_symbol(token, "("))
+            {
+                return Err("`if` needs a condition in parentheses".to_owned());
+            }
+            let end = closing(tokens, at + 1)?;
+            let condition = self.with_value(&tokens[at + 2..end], value.as_deref(), depth)?;
+            let (then, next) = self.body(tokens, end + 1, value.clone(), depth + 1)?;
+            let has_else = tokens.get(next).is_some_and(|token| is_name(token, "else"));
+            let (otherwise, next) = match has_else {
+                true => self.body(tokens, next + 1, value, depth + 1)?,
+                false => (value, next),
+            };
+            let or_zero = |value: Option<String>| value.unwrap_or_else(|| "0".to_owned());
+            let chosen = format!("if({condition}, {}, {})", or_zero(then), or_zero(otherwise));
+            return Ok((Some(chosen), next));
+        }
+        let assigns = is_name(&tokens[at], "value")
+            && tokens
+                .get(at + 1)
+                .is_some_and(|token| is_symbol(token, "="));
+        if !assigns {
+            return Err("a statement must be `value = …;` or `if(…) …`".to_owned());
+        }
+        let ends = |token: &Token| is_symbol(token, ";") || is_symbol(token, "}");
+        let length = tokens[at + 2..].iter().position(ends);
+        let end = length.map_or(tokens.len(), |length| at + 2 + length);
+        let set = self.with_value(&tokens[at + 2..end], value.as_deref(), depth)?;
+        Ok((Some(set), end))
+    }
+
+    /// As [`statement`](Self::statement), of a block in braces or one statement.
+    fn body(
+        &self,
+        tokens: &[Token],
+        at: usize,
+        value: Option<String>,
+        depth: usize,
+    ) -> Result<(Option<String>, usize), String> {
+        let Some(first) = tokens.get(at) else {
+            return Err("a statement is missing at the end".to_owned());
+        };
+        if !is_symbol(first, "{") {
+            let (value, at) = self.statement(tokens, at, value, depth)?;
+            let ends = tokens.get(at).is_some_and(|token| is_symbol(token, ";"));
+            return Ok((value, at + usize::from(ends)));
+        }
+        let (value, end) = self.block(tokens, at + 1, value, depth)?;
+        match end < tokens.len() {
+            true => Ok((value, end + 1)),
+            false => Err("`{` is not closed".to_owned()),
+        }
+    }
+
+    /// A formula in which `value` has an earlier value.
+    fn with_value(
+        &self,
+        tokens: &[Token],
+        value: Option<&str>,
+        depth: usize,
+    ) -> Result<String, String> {
+        let names = |name: &str| match (name, value) {
+            ("value", value) => Some(value.map_or("0".to_owned(), |value| format!("({value})"))),
+            (name, _) => (self.names)(name),
+        };
+        let rewriter = Rewriter {
+            dialect: self.dialect,
+            names: &names,
+        };
+        rewriter.formula(tokens, depth)
+    }
+
+    /// A formula of Julia: `if a b else c end`, `a ? b : c`, or a plain one.
+    fn choice(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
+        if depth > DEEPEST {
+            return Err("the expression is too deep".to_owned());
+        }
+        let is_choice = tokens.first().is_some_and(|token| is_name(token, "if"))
+            && tokens.last().is_some_and(|token| is_name(token, "end"));
+        if is_choice {
+            let inner = &tokens[1..tokens.len() - 1];
+            let middle = inner.iter().rposition(|token| is_name(token, "else"));
+            let middle = middle.ok_or_else(|| "`if` without `else`".to_owned())?;
+            let (before, otherwise) = (&inner[..middle], &inner[middle + 1..]);
+            let end = self.condition_end(before);
+            let end = end.ok_or_else(|| "a value is missing after the condition".to_owned())?;
+            return Ok(format!(
+                "if({}, {}, {})",
+                self.formula(&before[..end], depth + 1)?,
+                self.choice(&before[end..], depth + 1)?,
+                self.choice(otherwise, depth + 1)?
+            ));
+        }
+        let mut level = 0_i64;
+        for (index, token) in tokens.iter().enumerate() {
+            match token {
+                Token::Symbol("(") => level += 1,
+                Token::Symbol(")") => level -= 1,
+                Token::Symbol("?") if level == 0 => {
+                    let rest = &tokens[index + 1..];
+                    let colon = rest.iter().rposition(|token| is_symbol(token, ":"));
+                    let colon = colon.ok_or_else(|| "`?` without `:`".to_owned())?;
+                    return Ok(format!(
+                        "if({}, {}, {})",
+                        self.formula(&tokens[..index], depth + 1)?,
+                        self.choice(&rest[..colon], depth + 1)?,
+                        self.choice(&rest[colon + 1..], depth + 1)?
+                    ));
+                }
+                _ => {}
+            }
+        }
+        self.formula(tokens, depth)
+    }
+
+    /// Where the condition of `if a b` ends: at the first operand that follows another one.
+    fn condition_end(&self, tokens: &[Token]) -> Option<usize> {
+        let mut level = 0_i64;
+        for (index, pair) in tokens.windows(2).enumerate() {
+            match &pair[0] {
+                Token::Symbol("(") => level += 1,
+                Token::Symbol(")") => level -= 1,
+                _ => {}
+            }
+            let ends = !matches!(pair[0], Token::Symbol(symbol) if symbol != ")");
+            let is_call = matches!(pair[0], Token::Name(_));
+            let starts = match &pair[1] {
+                Token::Symbol(symbol) => *symbol == "(" && !is_call,
+                _ => true,
+            };
+            if level == 0 && ends && starts {
+                return Some(index + 1);
+            }
+        }
+        None
+    }
+
+    /// A formula.
+    fn formula(&self, tokens: &[Token], depth: usize) -> Result<String, String> {
+        if depth > DEEPEST {
+            return Err("the expression is too deep".to_owned());
+        }
+        let mut text = String::new();
+        let mut at = 0;
+        while at < tokens.len() {
+            match &tokens[at] {
+                Token::Number(number) => text.push_str(number),
+                Token::Name(name) => {
+                    if tokens
+                        .get(at + 1)
+                        .is_some_and(|token| is_symbol(token, "("))
+                    {
+                        let end = closing(tokens, at + 1)?;
+                        text.push_str(&self.call(name, &tokens[at + 2..end], depth + 1)?);
+                        at = end;
+                    } else {
+                        let name = (self.names)(name).unwrap_or_else(|| name.clone());
+                        text.push_str(&name);
+                    }
+                }
+                Token::Symbol(symbol) => text.push_str(match *symbol {
+                    "**" => "^",
+                    "&" | "&&" => " && ",
+                    "|" | "||" => " || ",
+                    "≤" | "<=" => " <= ",
+                    ">=" => " >= ",
+                    "==" => " == ",
+                    "!=" => " != ",
+                    "<" => " < ",
+                    ">" => " > ",
+                    symbol => symbol,
+                }),
+            }
+            if text.len() > LONGEST {
+                return Err("the expression is too long".to_owned());
+            }
+            at += 1;
+        }
+        Ok(text)
+    }
+
+    /// A call of a function.
+    fn call(&self, name: &str, tokens: &[Token], depth: usize) -> Result<String, String> {
+        let mut arguments = vec![Vec::new()];
+        let mut level = 0_i64;
+        for token in tokens {
+            match token {
+                Token::Symbol("(") => level += 1,
+                Token::Symbol(")") => level -= 1,
+                Token::Symbol(",") if level == 0 => {
+                    arguments.push(Vec::new());
+                    continue;
+                }
+                _ => {}
+            }
+            arguments
+                .last_mut()
+                .expect("there is one")
+                .push(token.clone());
+        }
+        let rewritten = arguments
+            .iter()
+            .map(|argument| self.formula(argument, depth));
+        let arguments = rewritten.collect::<Result<Vec<_>, _>>()?;
+        let Some(template) = template(self.dialect, name, arguments.len()) else {
+            return Ok(format!("{name}({})", arguments.join(", ")));
+        };
+        let mut parts = template.split('$');
+        let mut text = parts.next().unwrap_or("").to_owned();
+        for part in parts {
+            let index = part.as_bytes()[0] - b'1';
+            text.push_str(&arguments[usize::from(index)]);
+            text.push_str(&part[1..]);
+        }
+        Ok(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expression::POSITION_AND_TIME;
+
+    fn rewritten(text: &str, dialect: Dialect) -> Result<String, String> {
+        rewrite(text, dialect, &|_| None, &POSITION_AND_TIME)
+    }
+
+    /// The value at x = 0.3, y = −2, z = 5, t = 1.5.
+    fn value(text: &str, dialect: Dialect) -> f64 {
+        let text = rewritten(text, dialect).unwrap();
+        Expression::of(&text)
+            .unwrap()
+            .evaluate([0.3, -2.0, 5.0], 1.5)
+    }
+
+    #[test]
+    fn formulas_keep_their_values() {
+        let (x, y, z, t): (f64, f64, f64, f64) = (0.3, -2.0, 5.0, 1.5);
+        for (text, expected) in [
+            ("0.0", 0.0),
+            ("value = 3*t", 3.0 * t),
+            (
+                "(200 - 50*((z/0.05)-1)^2)*cos(atan2(y,x))",
+                (200.0 - 50.0 * (z / 0.05 - 1.0) * (z / 0.05 - 1.0)) * libm::cos(libm::atan2(y, x)),
+            ),
+            ("pow(x, 2) + fabs(y)", x * x + 2.0),
+            (
+                "if(t<=1){value=-y*1.0e-6*t;} else{value=-y*1.0e-6*1;}",
+                -y * 1e-6,
+            ),
+            (
+                r" if(t <= 2.0)\{ value = 50.0; \} else\{ value = 0.015; \} ",
+                50.0,
+            ),
+            ("value = x; if (t > 1) value = value + 1;", x + 1.0),
+            (
+                "if(t<1){value=1;} else if(t<2){value=2;} else {value=3;}",
+                2.0,
+            ),
+        ] {
+            assert_eq!(value(text, Dialect::Peridigm), expected, "{text}");
+        }
+        for (text, expected) in [
+            ("-4.4*t", -4.4 * t),
+            ("0.1 .* x .+ sin.(t)", 0.1 * x + libm::sin(t)),
+            ("ifelse.(x .> y, 10, 20)", 10.0),
+            ("if t>2 0 else 20 end", 20.0),
+            ("if (t>1) (3) else 20 end", 3.0),
+            ("t < 1 ? 5 : 6", 6.0),
+            ("atan(y, x)", libm::atan2(y, x)),
+            ("2.*t", 3.0),
+            ("t > 1 & x < 1", 1.0),
+        ] {
+            assert_eq!(value(text, Dialect::PeriLab), expected, "{text}");
+        }
+        for (text, expected) in [
+            ("ln(10) + log(100)", libm::log(10.0) + 2.0),
+            ("vdisplace(1.0, -100)", 1.0 - 100.0 * t),
+        ] {
+            assert_eq!(value(text, Dialect::Lammps), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_expression_says_why() {
+        for (text, message) in [
+            ("0.01*q", "`0.01*q`: unknown name `q`"),
+            ("if(t<1){value=1;", "`{` is not closed"),
+            ("value", "a statement must be `value = …;` or `if(…) …`"),
+            ("rand(1)", "`rand(1)`: unknown function `rand`"),
+            ("2 $ 3", "unexpected character `$`"),
+            ("sin(t", "`(` is not closed"),
+        ] {
+            let error = rewritten(text, Dialect::Peridigm).unwrap_err();
+            assert!(error.starts_with(message), "{text}: {error}");
+        }
+        assert!(rewritten(&"(".repeat(1000), Dialect::PeriLab).is_err());
+        assert!(rewritten(&"sin(".repeat(1000), Dialect::Lammps).is_err());
+    }
+}

@@ -1,0 +1,203 @@
+//! What became of each key of an imported deck.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fmt;
+
+use super::tree::{Content, Node};
+use crate::error::excerpt;
+
+/// What became of a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// The new deck says the same.
+    Taken,
+    /// The new deck says something similar.
+    Approximated,
+    /// The new deck does not say it.
+    LeftOut,
+}
+
+impl fmt::Display for Fate {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(match self {
+            Self::Taken => "taken",
+            Self::Approximated => "approximated",
+            Self::LeftOut => "left out",
+        })
+    }
+}
+
+/// A key of the imported deck and what became of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// Line, from 1.
+    pub line: usize,
+    /// The keys from the top of the deck, or the command.
+    pub key: String,
+    /// Its value; empty for a table.
+    pub value: String,
+    /// What became of it.
+    pub fate: Fate,
+    /// The new key, or why it is left out.
+    pub note: String,
+}
+
+impl fmt::Display for Entry {
+    /// As one line.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            line,
+            key,
+            value,
+            fate,
+            note,
+        } = self;
+        write!(formatter, "{line:>5}  {fate:<12}  {key}")?;
+        if !value.is_empty() {
+            write!(formatter, ": {value}")?;
+        }
+        write!(formatter, " -> {note}")
+    }
+}
+
+/// The fates of the nodes of a tree, by their ids.
+#[derive(Debug, Default)]
+pub(super) struct Log {
+    fates: RefCell<HashMap<usize, (Fate, String)>>,
+}
+
+impl Log {
+    /// Note what became of a node. Notes about the same node are joined; a loss outweighs `Taken`.
+    pub(super) fn note(&self, node: &Node, fate: Fate, note: impl Into<String>) {
+        let mut fates = self.fates.borrow_mut();
+        match fates.get_mut(&node.id) {
+            Some((known, text)) => {
+                let note = note.into();
+                if *known == Fate::Taken {
+                    *known = fate;
+                }
+                if !text.split("; ").any(|part| part == note) {
+                    *text = format!("{text}; {note}");
+                }
+            }
+            None => {
+                fates.insert(node.id, (fate, note.into()));
+            }
+        }
+    }
+
+    /// Note that the new deck says the same as a node.
+    pub(super) fn taken(&self, node: &Node, note: impl Into<String>) {
+        self.note(node, Fate::Taken, note);
+    }
+
+    /// Note that the new deck says something similar.
+    pub(super) fn approximated(&self, node: &Node, note: impl Into<String>) {
+        self.note(node, Fate::Approximated, note);
+    }
+
+    /// Note that the new deck does not say what a node says.
+    pub(super) fn left_out(&self, node: &Node, note: impl Into<String>) {
+        self.note(node, Fate::LeftOut, note);
+    }
+
+    /// The fates of all keys of a tree in the order of the text. A key that nothing was noted about is left out.
+    pub(super) fn entries(&self, root: &Node) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        self.collect(root, "", &mut entries);
+        entries
+    }
+
+    fn collect(&self, node: &Node, key: &str, entries: &mut Vec<Entry>) {
+        let noted = self.fates.borrow().get(&node.id).cloned();
+        let children = node.entries();
+        let (fate, note) = match noted {
+            Some(noted) => noted,
+            None if !children.is_empty() || key.is_empty() => {
+                for (name, child) in children {
+                    let key = match key {
+                        "" => name.clone(),
+                        key => format!("{key} > {name}"),
+                    };
+                    self.collect(child, &key, entries);
+                }
+                return;
+            }
+            None => (Fate::LeftOut, reason(key).to_owned()),
+        };
+        entries.push(Entry {
+            line: node.line,
+            key: key.to_owned(),
+            value: value(node),
+            fate,
+            note,
+        });
+        for (name, child) in children {
+            let key = format!("{key} > {name}");
+            match fate {
+                Fate::LeftOut => self.leave_out(child, &key, entries),
+                _ => self.collect(child, &key, entries),
+            }
+        }
+    }
+
+    /// List the keys of a table that is left out as a whole.
+    fn leave_out(&self, node: &Node, key: &str, entries: &mut Vec<Entry>) {
+        for (name, child) in node.entries() {
+            self.leave_out(child, &format!("{key} > {name}"), entries);
+        }
+        if node.entries().is_empty() {
+            entries.push(Entry {
+                line: node.line,
+                key: key.to_owned(),
+                value: value(node),
+                fate: Fate::LeftOut,
+                note: "its table is left out".to_owned(),
+            });
+        }
+    }
+}
+
+/// Why keys that no translator reads are left out: a word of their keys, and the reason.
+const REASONS: [(&str, &str); 11] = [
+    ("verbose", "concerns what the code prints"),
+    ("pre calculation", "what a law needs is computed"),
+    ("specific heat", "there are no temperatures"),
+    ("thermal", "there are no temperatures"),
+    ("temperature", "there are no temperatures"),
+    ("additive", "points exist from the start"),
+    ("flaw", "a material is the same everywhere"),
+    ("fluid", "there are no fluids"),
+    ("permeability", "there are no fluids"),
+    ("external topology", "there are no finite elements"),
+    ("preconditioner", "concerns a solver of linear systems"),
+];
+
+/// Why a key that no translator reads is left out.
+fn reason(key: &str) -> &'static str {
+    let key = key.to_lowercase().replace('_', " ");
+    let known = REASONS.iter().find(|(word, _)| key.contains(word));
+    known.map_or("unknown, or without a counterpart", |(_, reason)| reason)
+}
+
+/// The value of a node for a list.
+fn value(node: &Node) -> String {
+    match &node.content {
+        Content::Text(text) => shown(text),
+        Content::List(nodes) => {
+            let texts = nodes.iter().filter_map(Node::text).collect::<Vec<_>>();
+            shown(&texts.join(", "))
+        }
+        Content::Table(_) => String::new(),
+    }
+}
+
+/// A value on one line, shortened.
+fn shown(text: &str) -> String {
+    let text = text.trim();
+    match text.is_empty() {
+        true => String::new(),
+        false => excerpt(text).trim_matches('`').to_owned(),
+    }
+}

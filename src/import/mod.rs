@@ -1,0 +1,166 @@
+//! Decks of other codes, translated into decks of this one: `fissure import`.
+//!
+//! A deck becomes a tree of parameters (`tree`), or a list of commands (`script`). A translator per code reads it,
+//! notes what becomes of every key in a [log], and fills a `draft`, which is written as TOML. A key that no translator
+//! knows is listed as left out.
+
+mod bodies;
+mod bond_filters;
+mod conditions;
+mod draft;
+mod elastic;
+mod expression;
+mod files;
+mod lammps;
+pub mod log;
+mod outputs;
+mod peridigm;
+mod perilab;
+mod regions;
+mod script;
+mod sets;
+mod solver;
+mod translation;
+mod tree;
+mod xml;
+mod yaml;
+
+use std::fmt;
+use std::path::Path;
+
+use crate::deck::{Deck, Source};
+use crate::error::{Error, Result};
+use expression::Dialect;
+use log::{Entry, Fate};
+use translation::{Translation, line_error};
+use tree::Node;
+
+/// A code whose decks are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Code {
+    /// Peridigm, in YAML or XML.
+    Peridigm,
+    /// PeriLab, in YAML.
+    PeriLab,
+    /// LAMMPS, an input script with `atom_style peri`.
+    Lammps,
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Peridigm => "Peridigm",
+            Self::PeriLab => "PeriLab",
+            Self::Lammps => "LAMMPS",
+        })
+    }
+}
+
+/// A translated deck.
+#[derive(Debug, Clone)]
+pub struct Import {
+    /// The code that the deck is of.
+    pub code: Code,
+    /// The text of the new deck.
+    pub text: String,
+    /// What became of each key.
+    pub entries: Vec<Entry>,
+    /// Why the new deck is not valid yet, if it is not.
+    pub fault: Option<Error>,
+}
+
+impl Import {
+    /// Number of keys with a fate.
+    pub fn count(&self, fate: Fate) -> usize {
+        self.entries
+            .iter()
+            .filter(|entry| entry.fate == fate)
+            .count()
+    }
+}
+
+/// Translate a deck; `target` is the path of the new one, from which its files are named. The code is found from the
+/// text if it is not given.
+///
+/// # Errors
+/// If the file cannot be read, is of no known code, or lacks what a run needs; the message gives file and line.
+pub fn import(path: &Path, code: Option<Code>, target: &Path) -> Result<Import> {
+    translate(&Source::read(path)?, code, target)
+}
+
+/// As [`import`], of a text.
+///
+/// # Errors
+/// As [`import`].
+pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<Import> {
+    if code.map_or_else(
+        || script::is_script(&source.text),
+        |code| code == Code::Lammps,
+    ) {
+        let script = script::parse(&source.text);
+        let script = script.map_err(|(line, message)| line_error(source, line, message))?;
+        let mut translation = Translation::new(source, target, Dialect::Lammps);
+        lammps::translate(&mut translation, &script)?;
+        return Ok(finish(
+            translation,
+            &lammps::tree(&script),
+            Code::Lammps,
+            target,
+        ));
+    }
+    let is_xml = source
+        .text
+        .trim_start_matches('\u{feff}')
+        .trim_start()
+        .starts_with('<');
+    let text = source.text.trim_start_matches('\u{feff}');
+    let parsed = match is_xml {
+        true => xml::parse(text),
+        // Braces of statements are escaped in decks of Peridigm, which is no escape of YAML.
+        false => yaml::parse(&text.replace("\\{", "{").replace("\\}", "}")),
+    };
+    let root = parsed.map_err(|(line, message)| line_error(source, line, message))?;
+    let found = match root.get("PeriLab") {
+        Some(_) => Some(Code::PeriLab),
+        None => (is_xml || root.get("Peridigm").is_some()).then_some(Code::Peridigm),
+    };
+    let Some(code) = code.or(found) else {
+        let message = "is no deck of Peridigm (`Peridigm:`, or a ParameterList in XML), PeriLab (`PeriLab:`) or LAMMPS \
+                       (`atom_style peri`); --from says which it is";
+        return Err(line_error(source, 1, message));
+    };
+    let dialect = match code {
+        Code::PeriLab => Dialect::PeriLab,
+        _ => Dialect::Peridigm,
+    };
+    let mut translation = Translation::new(source, target, dialect);
+    match code {
+        Code::PeriLab => perilab::translate(&mut translation, &root)?,
+        _ => peridigm::translate(&mut translation, &root)?,
+    }
+    Ok(finish(translation, &root, code, target))
+}
+
+/// Write the new deck and look whether it is valid.
+fn finish(translation: Translation, root: &Node, code: Code, target: &Path) -> Import {
+    let entries = translation.log.entries(root);
+    let name = translation.source.path.file_name().unwrap_or_default();
+    let name = name.to_string_lossy();
+    let heading = [
+        format!("Imported from {name}, a deck of {code}."),
+        "Numbers have the units of that deck; use one consistent system, such as SI.".to_owned(),
+        "Each of its keys is taken, approximated or left out:".to_owned(),
+    ];
+    let text = translation.draft.text(&heading, &entries);
+    let new = Source {
+        path: target.to_owned(),
+        text: text.clone(),
+    };
+    let fault = Deck::new(new).and_then(|deck| deck.problem()).err();
+    Import {
+        code,
+        text,
+        entries,
+        fault,
+    }
+}

@@ -1,0 +1,232 @@
+//! Regions of LAMMPS, which become shapes.
+
+use super::draft::Value;
+use super::script::Script;
+
+/// Fraction of the spacing by which a shape is larger than a region: LAMMPS counts atoms on the surface, which would
+/// be lost by round-off.
+const MARGIN: f64 = 1e-6;
+
+/// A region with numbers in distance units.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Region {
+    /// Lower and upper corner; infinite where the region has no end.
+    Block([f64; 3], [f64; 3]),
+    /// Axis, the other two coordinates of the axis, radius, lower and upper end.
+    Cylinder(usize, [f64; 2], f64, [f64; 2]),
+    /// Centre and radius.
+    Sphere([f64; 3], f64),
+    /// What lies in one of them.
+    Union(Vec<Region>),
+    /// What lies in the first and in none of the others.
+    Difference(Vec<Region>),
+}
+
+/// The region of the arguments behind its name; `spacing` is that of the lattice.
+///
+/// # Errors
+/// If it is of another style, or a number is none.
+pub fn region(
+    script: &Script,
+    arguments: &[&str],
+    spacing: f64,
+    known: &dyn Fn(&str) -> Option<Region>,
+) -> Result<Region, String> {
+    let style = *arguments.first().ok_or("a style is missing")?;
+    let rest = &arguments[1..];
+    let option = |name: &str| {
+        let at = rest.iter().position(|word| *word == name)?;
+        rest.get(at + 1).copied()
+    };
+    if option("side") == Some("out") {
+        return Err("what lies outside of a region has no shape".to_owned());
+    }
+    let unit = if option("units") == Some("box") {
+        1.0
+    } else {
+        spacing
+    };
+    let number = |k: usize| -> Result<f64, String> {
+        match *rest.get(k).ok_or("a number is missing")? {
+            "INF" | "EDGE" => {
+                // Lower ends stand at even places of a block, the last but one of a cylinder.
+                let is_lower = match style {
+                    "block" => k.is_multiple_of(2),
+                    _ => k == 4,
+                };
+                Ok(if is_lower {
+                    f64::NEG_INFINITY
+                } else {
+                    f64::INFINITY
+                })
+            }
+            word => Ok(unit * script.number(word)?),
+        }
+    };
+    match style {
+        "block" => {
+            let [a, b, c, d, e, f] = [
+                number(0)?,
+                number(1)?,
+                number(2)?,
+                number(3)?,
+                number(4)?,
+                number(5)?,
+            ];
+            Ok(Region::Block([a, c, e], [b, d, f]))
+        }
+        "sphere" => Ok(Region::Sphere(
+            [number(0)?, number(1)?, number(2)?],
+            number(3)?,
+        )),
+        "cylinder" => {
+            let axis = ["x", "y", "z"]
+                .iter()
+                .position(|axis| rest.first() == Some(axis));
+            let axis = axis.ok_or("the axis must be x, y or z")?;
+            Ok(Region::Cylinder(
+                axis,
+                [number(1)?, number(2)?],
+                number(3)?,
+                [number(4)?, number(5)?],
+            ))
+        }
+        "union" => {
+            let count = script.number(rest.first().ok_or("a number is missing")?)? as usize;
+            let names = rest.get(1..=count).ok_or("regions are missing")?;
+            let parts = names.iter().map(|name| {
+                known(name).ok_or_else(|| format!("the region `{name}` is not defined"))
+            });
+            Ok(Region::Union(parts.collect::<Result<_, _>>()?))
+        }
+        style => Err(format!("regions of style {style} have no shape")),
+    }
+}
+
+impl Region {
+    /// The corners of a box around it.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        match self {
+            Self::Block(lower, upper) => [*lower, *upper],
+            Self::Sphere(centre, radius) => {
+                [centre.map(|c| c - radius), centre.map(|c| c + radius)]
+            }
+            Self::Cylinder(axis, centre, radius, ends) => {
+                let mut bounds = [[0.0; 3]; 2];
+                let others = others(*axis);
+                for (k, other) in others.into_iter().enumerate() {
+                    bounds[0][other] = centre[k] - radius;
+                    bounds[1][other] = centre[k] + radius;
+                }
+                bounds[0][*axis] = ends[0];
+                bounds[1][*axis] = ends[1];
+                bounds
+            }
+            Self::Union(parts) => {
+                let all = parts.iter().map(Self::bounds);
+                all.reduce(|a, b| {
+                    [
+                        std::array::from_fn(|k| a[0][k].min(b[0][k])),
+                        std::array::from_fn(|k| a[1][k].max(b[1][k])),
+                    ]
+                })
+                .unwrap_or([[0.0; 3]; 2])
+            }
+            Self::Difference(parts) => parts.first().map_or([[0.0; 3]; 2], Self::bounds),
+        }
+    }
+
+    /// The region without infinite ends, cut to a box.
+    pub fn within(&self, bounds: [[f64; 3]; 2]) -> Self {
+        let clamp = |value: f64, k: usize| match value.is_finite() {
+            true => value,
+            false => bounds[usize::from(value > 0.0)][k],
+        };
+        let all = |parts: &[Self]| parts.iter().map(|part| part.within(bounds)).collect();
+        match self {
+            Self::Block(lower, upper) => Self::Block(
+                std::array::from_fn(|k| clamp(lower[k], k)),
+                std::array::from_fn(|k| clamp(upper[k], k)),
+            ),
+            Self::Cylinder(axis, centre, radius, ends) => {
+                Self::Cylinder(*axis, *centre, *radius, ends.map(|end| clamp(end, *axis)))
+            }
+            Self::Sphere(..) => self.clone(),
+            Self::Union(parts) => Self::Union(all(parts)),
+            Self::Difference(parts) => Self::Difference(all(parts)),
+        }
+    }
+
+    /// Test whether all its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Union(parts) | Self::Difference(parts) => parts.iter().all(Self::is_finite),
+            _ => self
+                .bounds()
+                .iter()
+                .flatten()
+                .all(|value| value.is_finite()),
+        }
+    }
+
+    /// The shape as a table with one key.
+    pub fn shape(&self, spacing: f64) -> Value {
+        let margin = MARGIN * spacing;
+        let (name, value) = match self {
+            Self::Block(lower, upper) => {
+                let table = vec![
+                    (
+                        "lower".to_owned(),
+                        Value::numbers(&lower.map(|x| x - margin)),
+                    ),
+                    (
+                        "upper".to_owned(),
+                        Value::numbers(&upper.map(|x| x + margin)),
+                    ),
+                ];
+                ("box", Value::Table(table))
+            }
+            Self::Sphere(centre, radius) => {
+                let table = vec![
+                    ("centre".to_owned(), Value::numbers(centre)),
+                    ("radius".to_owned(), Value::number(radius + margin)),
+                ];
+                ("sphere", Value::Table(table))
+            }
+            Self::Cylinder(axis, centre, radius, ends) => {
+                let end = |at: f64| {
+                    let mut point = [0.0; 3];
+                    for (k, other) in others(*axis).into_iter().enumerate() {
+                        point[other] = centre[k];
+                    }
+                    point[*axis] = at;
+                    Value::numbers(&point)
+                };
+                let table = vec![
+                    ("from".to_owned(), end(ends[0] - margin)),
+                    ("to".to_owned(), end(ends[1] + margin)),
+                    ("radius".to_owned(), Value::number(radius + margin)),
+                ];
+                ("cylinder", Value::Table(table))
+            }
+            Self::Union(parts) => {
+                let parts = parts.iter().map(|part| part.shape(spacing));
+                ("union", Value::list(parts))
+            }
+            Self::Difference(parts) => {
+                let parts = parts.iter().map(|part| part.shape(spacing));
+                ("difference", Value::list(parts))
+            }
+        };
+        Value::Table(vec![(name.to_owned(), value)])
+    }
+}
+
+/// The two directions beside an axis, in the order of LAMMPS.
+pub fn others(axis: usize) -> [usize; 2] {
+    match axis {
+        0 => [1, 2],
+        1 => [0, 2],
+        _ => [0, 1],
+    }
+}

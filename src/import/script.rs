@@ -1,0 +1,332 @@
+//! Commands and variables of an input script of LAMMPS.
+
+use std::collections::HashMap;
+
+use super::expression::{Dialect, rewrite};
+use super::tree::{Content, MOST_NODES, Mistake, Node};
+use crate::expression::{Expression, Variable};
+
+/// Maximum depth of variables that use others.
+const DEEPEST: usize = 32;
+
+/// Maximum length of a command after substitution, bytes.
+const LONGEST: usize = 1 << 16;
+
+/// A command with its words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Command {
+    /// Its words, variables replaced, without quotes.
+    pub words: Vec<String>,
+    /// Its node, to note what becomes of it.
+    pub node: Node,
+}
+
+impl Command {
+    /// The name of the command.
+    pub fn name(&self) -> &str {
+        &self.words[0]
+    }
+
+    /// Its arguments.
+    pub fn arguments(&self) -> Vec<&str> {
+        self.words[1..].iter().map(String::as_str).collect()
+    }
+}
+
+/// A script.
+#[derive(Debug, Default)]
+pub struct Script {
+    /// Its commands in order.
+    pub commands: Vec<Command>,
+    /// Formulas and values of variables.
+    variables: HashMap<String, String>,
+    /// The time step, s, of the last `timestep`.
+    pub step: Option<f64>,
+}
+
+/// Test whether a text is a script of peridynamics.
+pub fn is_script(text: &str) -> bool {
+    text.lines().any(|line| {
+        let mut words = line.split_whitespace();
+        words.next() == Some("atom_style") && words.any(|word| word.starts_with("peri"))
+    })
+}
+
+/// Split a script into commands and define its variables.
+///
+/// # Errors
+/// On a quote that is not closed, or a variable that is not defined.
+pub fn parse(text: &str) -> Result<Script, Mistake> {
+    let mut script = Script::default();
+    let mut pending: Option<(usize, String)> = None;
+    for (line, row) in (1..).zip(text.lines()) {
+        let row = without_comment(row);
+        let (start, mut joined) = pending.take().unwrap_or((line, String::new()));
+        joined.push_str(row.trim_end());
+        if let Some(continued) = joined.strip_suffix('&') {
+            pending = Some((start, format!("{continued} ")));
+            continue;
+        }
+        script.command(start, &joined)?;
+    }
+    if let Some((start, joined)) = pending {
+        script.command(start, &joined)?;
+    }
+    Ok(script)
+}
+
+/// A line without its comment.
+fn without_comment(row: &str) -> &str {
+    let mut quote = None;
+    for (index, c) in row.char_indices() {
+        match (c, quote) {
+            ('#', None) => return &row[..index],
+            ('"' | '\'', None) => quote = Some(c),
+            (c, Some(open)) if c == open => quote = None,
+            _ => {}
+        }
+    }
+    row
+}
+
+/// The words of a line; what stands in quotes is one word.
+fn words(text: &str) -> Result<Vec<String>, String> {
+    let mut words = Vec::new();
+    let mut rest = text.trim_start();
+    while let Some(first) = rest.chars().next() {
+        if first == '"' || first == '\'' {
+            let end = rest[1..].find(first).ok_or("a quote is not closed")?;
+            words.push(rest[1..1 + end].to_owned());
+            rest = rest[end + 2..].trim_start();
+        } else {
+            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+            words.push(rest[..end].to_owned());
+            rest = rest[end..].trim_start();
+        }
+    }
+    Ok(words)
+}
+
+impl Script {
+    /// Add the command of a line.
+    fn command(&mut self, line: usize, text: &str) -> Result<(), Mistake> {
+        let mistake = |message: String| (line, message);
+        let text = self.substitute(text).map_err(mistake)?;
+        let words = words(&text).map_err(mistake)?;
+        let Some(name) = words.first() else {
+            return Ok(());
+        };
+        if self.commands.len() >= MOST_NODES {
+            return Err((line, "the commands are too many".to_owned()));
+        }
+        match (name.as_str(), words.len()) {
+            ("timestep", 2) => {
+                let step = self.number(&words[1]).map_err(|message| (line, message))?;
+                self.step = Some(step);
+            }
+            ("variable", 4..) => {
+                let style = words[2].as_str();
+                let value = match style {
+                    "equal" | "internal" => Some(words[3..].join(" ")),
+                    "index" | "string" | "getenv" | "loop" | "world" => Some(words[3].clone()),
+                    _ => None,
+                };
+                // An index that has a value already keeps it.
+                let keeps = style == "index" && self.variables.contains_key(&words[1]);
+                if let (Some(value), false) = (value, keeps) {
+                    self.variables.insert(words[1].clone(), value);
+                }
+            }
+            _ => {}
+        }
+        // The command word is the key of its node.
+        let node = Node {
+            id: self.commands.len() + 1,
+            line,
+            content: Content::Text(words[1..].join(" ")),
+        };
+        self.commands.push(Command { words, node });
+        Ok(())
+    }
+
+    /// Replace `$x`, `${name}` and `$(formula)` outside of single quotes.
+    fn substitute(&self, text: &str) -> Result<String, String> {
+        let mut result = String::new();
+        let mut rest = text;
+        while let Some(at) = rest.find('$') {
+            result.push_str(&rest[..at]);
+            rest = &rest[at + 1..];
+            let value = if let Some(inner) = rest.strip_prefix('{') {
+                let end = inner.find('}').ok_or("`${` is not closed")?;
+                rest = &inner[end + 1..];
+                self.value(&inner[..end])?
+            } else if rest.starts_with('(') {
+                let mut depth = 0_usize;
+                let end = rest.char_indices().find(|(_, c)| {
+                    match c {
+                        '(' => depth += 1,
+                        ')' => depth -= 1,
+                        _ => {}
+                    }
+                    depth == 0
+                });
+                let (end, _) = end.ok_or("`$(` is not closed")?;
+                let formula = &rest[1..end];
+                rest = &rest[end + 1..];
+                // A format may follow a colon.
+                let formula = formula.split(":%").next().unwrap_or(formula);
+                self.constant(formula)?
+            } else {
+                let Some(name) = rest.chars().next().filter(|c| c.is_alphanumeric()) else {
+                    return Err("`$` without the name of a variable".to_owned());
+                };
+                rest = &rest[name.len_utf8()..];
+                self.value(&name.to_string())?
+            };
+            result.push_str(&value);
+            if result.len() > LONGEST {
+                return Err("the line is too long".to_owned());
+            }
+        }
+        result.push_str(rest);
+        Ok(result)
+    }
+
+    /// The value of a variable as text: of a formula, its value.
+    fn value(&self, name: &str) -> Result<String, String> {
+        let text = self.variables.get(name);
+        let text = text.ok_or_else(|| format!("the variable `{name}` is not defined"))?;
+        Ok(match self.constant(text) {
+            Ok(value) => value,
+            Err(_) => text.clone(),
+        })
+    }
+
+    /// The value of a formula that does not change.
+    fn constant(&self, formula: &str) -> Result<String, String> {
+        if formula.trim().parse::<f64>().is_ok() {
+            return Ok(formula.trim().to_owned());
+        }
+        let text = self.formula(formula, 1e-3, 0)?;
+        let expression = Expression::of(&text).map_err(|error| error.message)?;
+        let value = expression.as_constant();
+        let value = value.ok_or_else(|| format!("`{formula}` changes with time"))?;
+        Ok(format!("{value:?}"))
+    }
+
+    /// A number: written, or the constant value of a variable `v_name`.
+    ///
+    /// # Errors
+    /// If the word is none.
+    pub fn number(&self, word: &str) -> Result<f64, String> {
+        let number = word.parse::<f64>().ok().or_else(|| {
+            let name = word.strip_prefix("v_")?;
+            self.constant(self.variables.get(name)?).ok()?.parse().ok()
+        });
+        let number = number.filter(|number| number.is_finite());
+        number.ok_or_else(|| {
+            format!(
+                "must be a number, is `{}`",
+                crate::error::excerpt(word).trim_matches('`')
+            )
+        })
+    }
+
+    /// A number or the formula of a variable `v_name`, as an expression of time.
+    ///
+    /// # Errors
+    /// If the variable is unknown, or its formula has no counterpart.
+    pub fn of_time(&self, word: &str) -> Result<String, String> {
+        let Some(name) = word.strip_prefix("v_") else {
+            self.number(word)?;
+            return Ok(word.to_owned());
+        };
+        let formula = self.variables.get(name);
+        let formula = formula.ok_or_else(|| format!("the variable `{name}` is not defined"))?;
+        let step = self.step.ok_or("the script has no `timestep`")?;
+        self.formula(formula, step, 0)
+    }
+
+    /// A formula as an expression of time.
+    fn formula(&self, formula: &str, step: f64, depth: usize) -> Result<String, String> {
+        if depth > DEEPEST {
+            return Err("the variables are too deep, or use themselves".to_owned());
+        }
+        let mut text: String = formula.chars().filter(|c| !c.is_whitespace()).collect();
+        for elapsed in ["step", "elapsed", "elaplong"] {
+            text = text.replace(&format!("{elapsed}*dt"), "time");
+            text = text.replace(&format!("dt*{elapsed}"), "time");
+        }
+        let failed = std::cell::RefCell::new(None);
+        let names = |name: &str| match name {
+            "PI" => Some("pi".to_owned()),
+            "dt" => Some(format!("{step:?}")),
+            "time" => Some("t".to_owned()),
+            "step" | "elapsed" | "elaplong" => Some(format!("(t/{step:?})")),
+            name => {
+                let known = self.variables.get(name.strip_prefix("v_")?)?;
+                match self.formula(known, step, depth + 1) {
+                    Ok(text) => Some(match text.parse::<f64>() {
+                        Ok(value) if value >= 0.0 => text,
+                        _ => format!("({text})"),
+                    }),
+                    Err(message) => {
+                        *failed.borrow_mut() = Some(message);
+                        None
+                    }
+                }
+            }
+        };
+        let result = rewrite(&text, Dialect::Lammps, &names, &[Variable::T]);
+        match failed.into_inner() {
+            Some(message) => Err(message),
+            None => result,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_joined_and_variables_replaced() {
+        let text = "units si # metres\nvariable a equal 2*PI\nvariable n index 7\n\
+                    fix 1 all indent 1e17 sphere 0 &\n  ${a} $n v_y # to here\n\
+                    timestep 1e-7\nvariable y0 equal 0.5\nvariable y equal \"v_y0 - step*dt*100\"\nrun $(10*v_n)\n";
+        let script = parse(text).unwrap();
+        let names: Vec<&str> = script.commands.iter().map(Command::name).collect();
+        assert_eq!(
+            names,
+            [
+                "units", "variable", "variable", "fix", "timestep", "variable", "variable", "run"
+            ]
+        );
+        let fix = &script.commands[3];
+        assert_eq!(fix.node.line, 4);
+        assert_eq!(fix.words[6..], ["0", "6.283185307179586", "7", "v_y"]);
+        assert_eq!(script.of_time("v_y").unwrap(), "0.5-t*100");
+        assert_eq!(script.commands[7].words[1], "70.0");
+        assert_eq!(script.step, Some(1e-7));
+    }
+
+    #[test]
+    fn mistakes_have_a_line() {
+        for (text, line, message) in [
+            ("units si\nrun ${n}\n", 2, "the variable `n` is not defined"),
+            ("fix 1 all print \"a\nrun 1\n", 1, "a quote is not closed"),
+            ("run ${n\n", 1, "`${` is not closed"),
+            ("timestep x\n", 1, "must be a number, is `x`"),
+        ] {
+            assert_eq!(
+                parse(text).unwrap_err(),
+                (line, message.to_owned()),
+                "{text}"
+            );
+        }
+        let text = "timestep 1\nvariable a equal v_b\nvariable b equal v_a\n";
+        let script = parse(text).unwrap();
+        let message = "the variables are too deep, or use themselves";
+        assert_eq!(script.of_time("v_a"), Err(message.to_owned()));
+    }
+}

@@ -1,0 +1,155 @@
+//! Sets of points of an imported deck: node sets in the deck, in files and in the mesh.
+
+use super::draft::{Section, Value};
+use super::files::PointFile;
+use super::translation::Translation;
+use super::tree::{Node, is_key};
+use crate::error::{Result, excerpt};
+
+/// A node set that the deck defines.
+struct Defined<'n> {
+    name: String,
+    node: &'n Node,
+    /// Name of the set in the new deck, once it is used.
+    written: Option<String>,
+}
+
+/// The node sets of a deck.
+pub struct Sets<'n> {
+    defined: Vec<Defined<'n>>,
+    /// Names in the mesh and in the new deck.
+    of_mesh: Vec<(String, String)>,
+    /// The points come from a mesh, which has node sets too.
+    has_mesh: bool,
+}
+
+impl<'n> Sets<'n> {
+    /// No sets; `has_mesh` if the mesh can have some.
+    pub fn new(has_mesh: bool) -> Self {
+        Self {
+            defined: Vec::new(),
+            of_mesh: Vec::new(),
+            has_mesh,
+        }
+    }
+
+    /// Note a node set that the deck defines.
+    pub fn define(&mut self, name: &str, node: &'n Node) {
+        self.defined.push(Defined {
+            name: name.to_owned(),
+            node,
+            written: None,
+        });
+    }
+
+    /// The set of the new deck for a node set; it is written where it is first used.
+    ///
+    /// # Errors
+    /// If the deck defines no such set and the mesh cannot have it, or its definition is none.
+    pub fn find(
+        &mut self,
+        translation: &mut Translation,
+        user: &Node,
+        name: &str,
+    ) -> Result<String> {
+        let found = self.defined.iter_mut().find(|set| is_key(&set.name, name));
+        if let Some(set) = found {
+            if let Some(written) = &set.written {
+                return Ok(written.clone());
+            }
+            let written = define(translation, &set.name, set.node)?;
+            set.written = Some(written.clone());
+            return Ok(written);
+        }
+        if let Some((_, written)) = self.of_mesh.iter().find(|(known, _)| known == name) {
+            return Ok(written.clone());
+        }
+        if !self.has_mesh {
+            let message = format!("the deck defines no node set {}", excerpt(name));
+            return Err(translation.error(user.line, message));
+        }
+        let written = translation.new_name("set", name);
+        let mut section = Section::new(format!("set.{written}"));
+        section.set("mesh", Value::text(name));
+        translation.add(section);
+        self.of_mesh.push((name.to_owned(), written.clone()));
+        Ok(written)
+    }
+
+    /// Number of points of a set that the deck defines by their numbers.
+    pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
+        let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
+        let text = set.node.text()?;
+        match numbers(text) {
+            Some(ids) => Some(ids.len() as u64),
+            None => {
+                let ids = crate::points::id_file::read(&translation.path(text), 1).ok()?;
+                Some(ids.len() as u64)
+            }
+        }
+    }
+
+    /// Note the node sets that nothing uses.
+    pub fn finish(&self, translation: &Translation) {
+        for set in &self.defined {
+            if set.written.is_none() {
+                translation
+                    .log
+                    .left_out(set.node, "nothing uses this node set");
+            }
+        }
+    }
+}
+
+/// Write the definition of a node set; return its name.
+fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<String> {
+    let text = translation.text(node, name)?.to_owned();
+    if text.eq_ignore_ascii_case("all") {
+        translation.log.taken(node, "the set `all`");
+        return Ok("all".to_owned());
+    }
+    let written = translation.new_name("set", name);
+    let mut section = Section::new(format!("set.{written}"));
+    let header = format!("[set.{written}]");
+    if let Some(ids) = numbers(&text) {
+        if let Some(zero) = ids.iter().position(|id| *id == 0) {
+            let message = format!("`{name}`: number {} is 0; points count from 1", zero + 1);
+            return Err(translation.error(node.line, message));
+        }
+        section.set("ids", Value::Ids(ids.iter().map(|id| id - 1).collect()));
+        translation
+            .log
+            .taken(node, format!("{header} ids, which count from 0"));
+    } else if text.contains(['<', '>', '=']) {
+        let condition = translation
+            .expression(&text, false)
+            .map_err(|message| translation.error(node.line, format!("`{name}`: {message}")))?;
+        section.set("where", condition);
+        translation.log.taken(node, format!("{header} where"));
+    } else {
+        section.set("file", translation.file(&text));
+        section.set("first_id", Value::Number("1".to_owned()));
+        let note = match PointFile::read(&translation.path(&text), &[]) {
+            Some(_) => format!("{header} file"),
+            None => format!("{header} file, which cannot be read yet"),
+        };
+        translation.log.taken(node, note);
+    }
+    translation.add(section);
+    Ok(written)
+}
+
+/// The numbers of a list `1 2 3` or a range `1:27`.
+fn numbers(text: &str) -> Option<Vec<u64>> {
+    /// Most numbers of a range, which a deck should not list.
+    const MOST: u64 = 1_000_000;
+    if let Some((first, last)) = text.split_once(':') {
+        let (first, last) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+        return (first <= last && last - first < MOST).then(|| (first..=last).collect());
+    }
+    let words = text
+        .split([' ', '\t', '\n', '\r', ','])
+        .filter(|word| !word.is_empty());
+    let numbers: Option<Vec<u64>> = words.map(|word| word.parse().ok()).collect();
+    numbers.filter(|numbers| !numbers.is_empty())
+}

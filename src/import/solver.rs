@@ -1,0 +1,291 @@
+//! Solvers of Peridigm and PeriLab, which become stages.
+
+use super::draft::{Section, Value};
+use super::translation::Translation;
+use super::tree::{Node, is_key};
+use crate::error::{Result, excerpt};
+
+/// Load steps of a deck that has none.
+const LOAD_STEPS: u64 = 1;
+
+/// Solvers that find equilibria.
+const STATIC: [&str; 4] = [
+    "QuasiStatic",
+    "NOXQuasiStatic",
+    "Static",
+    "Linear Static Matrix Based",
+];
+
+/// Solvers with explicit steps.
+const EXPLICIT: [&str; 2] = ["Verlet", "Verlet Matrix Based"];
+
+/// Solvers with implicit steps.
+const IMPLICIT: [&str; 2] = ["Implicit", "Newmark"];
+
+/// How a part of the run is solved.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Method {
+    /// Explicit steps.
+    Explicit {
+        /// Fixed step, s.
+        step: Option<Value>,
+        /// Fraction of the stable step.
+        safety: Option<Value>,
+    },
+    /// A sequence of this many equilibria.
+    Relaxation(u64),
+}
+
+/// A part of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// Its end, s, in the time of the deck that is read.
+    pub end: f64,
+    /// How it is solved.
+    pub method: Method,
+    /// Number of the step, by which conditions refer to it.
+    pub step_id: Option<u64>,
+    /// The solver's damping per step over the step, 1/s, where the step is known.
+    pub damping: Option<f64>,
+    /// Damage models act.
+    pub breaks: bool,
+}
+
+/// Read a solver that starts at a time, s. A default is that damage models act unless the deck says otherwise.
+///
+/// # Errors
+/// If the end is missing or a key is no number.
+pub fn stage(
+    translation: &Translation,
+    node: &Node,
+    start: f64,
+    damage_by_default: bool,
+) -> Result<Vec<Stage>> {
+    let log = &translation.log;
+    let step_id = match node.get("Step ID") {
+        None => None,
+        Some(id) => {
+            log.taken(id, "the number of a stage");
+            Some(translation.count(id, "Step ID")?)
+        }
+    };
+    let breaks = node.get("Damage Models");
+    let breaks = breaks.map_or(damage_by_default, |breaks| {
+        log.taken(breaks, "whether bodies have damage");
+        translation.is_true(breaks)
+    });
+    let mut solver = None;
+    for (name, table) in node.entries() {
+        let is = |names: &[&str]| names.iter().any(|known| is_key(name, known));
+        if is(&STATIC) || is(&EXPLICIT) || is(&IMPLICIT) {
+            if solver.is_some() {
+                log.left_out(table, "only the first solver counts");
+                continue;
+            }
+            solver = Some((name, table));
+        }
+    }
+    let Some((name, solver)) = solver else {
+        let message = "the solver is none of Verlet, QuasiStatic, NOXQuasiStatic, Implicit, Static, Newmark and \
+                       the matrix-based ones";
+        return Err(translation.error(node.line, message));
+    };
+    let is = |names: &[&str]| names.iter().any(|known| is_key(name, known));
+    let end = |steps: &[f64]| -> Result<f64> {
+        if let Some(last) = steps.last() {
+            return Ok(*last);
+        }
+        if let Some(additional) = node.get("Additional Time") {
+            log.taken(additional, "end of a stage");
+            return Ok(start + translation.number(additional, "Additional Time")?);
+        }
+        let end = translation.required(node, "Final Time", "the solver")?;
+        log.taken(end, "[time] end");
+        translation.number(end, "Final Time")
+    };
+    let later = |end: f64, line: usize| match end > start {
+        true => Ok(end),
+        false => {
+            let message = format!("the end {end} must be later than the start {start}");
+            Err(translation.error(line, message))
+        }
+    };
+    let new = |end: f64, method: Method| Stage {
+        end,
+        method,
+        step_id,
+        damping: None,
+        breaks,
+    };
+    if is(&STATIC) {
+        tolerances(translation, solver);
+        if let Some(times) = solver.get("Time Steps") {
+            let text = translation.text(times, "Time Steps")?;
+            let times_read: Option<Vec<f64>> =
+                text.split_whitespace().map(|t| t.parse().ok()).collect();
+            let is_rising =
+                |times: &Vec<f64>| times.len() > 1 && times.windows(2).all(|w| w[0] < w[1]);
+            let Some(list) = times_read.filter(is_rising) else {
+                let message = format!("`Time Steps` must be rising numbers, is {}", excerpt(text));
+                return Err(translation.error(times.line, message));
+            };
+            log.taken(times, "one stage for each load step");
+            if let Some(end) = node.get("Final Time") {
+                log.taken(end, "the last of the time steps");
+            }
+            let after = list.iter().filter(|end| **end > start);
+            let stages: Vec<Stage> = after.map(|end| new(*end, Method::Relaxation(1))).collect();
+            later(*list.last().expect("two at least"), times.line)?;
+            return Ok(stages);
+        }
+        let steps = ["Number of Load Steps", "Number of Steps"];
+        let given = steps
+            .iter()
+            .find_map(|key| Some((*key, solver.get(key).or(node.get(key))?)));
+        let load_steps = match given {
+            None => LOAD_STEPS,
+            Some((key, steps)) => {
+                log.taken(steps, "load_steps of the relaxation");
+                translation.count(steps, key)?.max(1)
+            }
+        };
+        return Ok(vec![new(
+            later(end(&[])?, node.line)?,
+            Method::Relaxation(load_steps),
+        )]);
+    }
+    let fixed = solver.get("Fixed dt");
+    let mut step = None;
+    let mut safety = None;
+    if is(&IMPLICIT) {
+        let note = "implicit steps become explicit ones of the stable size";
+        log.approximated(solver, note);
+        if let Some(fixed) = fixed {
+            log.left_out(fixed, note);
+        }
+        safety = Some(Value::Number("0.8".to_owned()));
+    } else if let Some(fixed) =
+        fixed.filter(|dt| translation.number(dt, "Fixed dt").is_ok_and(|dt| dt > 0.0))
+    {
+        log.taken(fixed, "[time] step");
+        step = Some(translation.number_value(fixed, "Fixed dt")?);
+        if let Some(factor) = solver.get("Safety Factor") {
+            log.left_out(factor, "the step is fixed");
+        }
+    } else {
+        if let Some(fixed) = fixed {
+            translation.number(fixed, "Fixed dt")?;
+        }
+        safety = match solver.get("Safety Factor") {
+            None => Some(Value::Number("1.0".to_owned())),
+            Some(factor) => {
+                let value = translation.number(factor, "Safety Factor")?;
+                if value > 0.0 && value <= 1.0 {
+                    let note = "[time] safety, of another estimate of the stable step";
+                    log.approximated(factor, note);
+                    Some(translation.number_value(factor, "Safety Factor")?)
+                } else {
+                    log.approximated(factor, "[time] safety is at most 1");
+                    Some(Value::Number("1.0".to_owned()))
+                }
+            }
+        };
+        if is_key(name, EXPLICIT[1]) {
+            log.approximated(solver, "explicit steps without a matrix");
+        }
+    }
+    let mut stage = new(
+        later(end(&[])?, node.line)?,
+        Method::Explicit { step, safety },
+    );
+    if let Some(damping) = solver.get("Numerical Damping") {
+        let per_step = translation.number(damping, "Numerical Damping")?;
+        match fixed.map(|dt| translation.number(dt, "Fixed dt")).transpose()? {
+            Some(dt) if per_step > 0.0 && dt > 0.0 => {
+                log.taken(damping, "damping of the materials: the factor over the step");
+                stage.damping = Some(per_step / dt);
+            }
+            _ if per_step == 0.0 => log.taken(damping, "no damping"),
+            _ => log.left_out(
+                damping,
+                "damps each step by this factor; the damping of a material is this over the step, which is not \
+                 fixed here",
+            ),
+        }
+    }
+    Ok(vec![stage])
+}
+
+/// Note the keys of a static solver that relaxation does not have.
+fn tolerances(translation: &Translation, solver: &Node) {
+    for (name, node) in solver.entries() {
+        let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
+        if is(&[
+            "Absolute Tolerance",
+            "Relative Tolerance",
+            "Residual tolerance",
+            "Solution tolerance",
+        ]) {
+            let note = "the tolerance is the default, unbalanced force over loads and reactions";
+            translation.log.approximated(node, note);
+        } else if !is(&["Time Steps", "Number of Load Steps", "Number of Steps"]) {
+            let note = "concerns a solver of linear systems; equilibria are found by relaxation";
+            translation.log.left_out(node, note);
+        }
+    }
+}
+
+/// Write the stages of a run; `conditions` are the names of conditions with the number of the step that they act in.
+pub fn write(
+    translation: &mut Translation,
+    stages: &[Stage],
+    conditions: &[(String, Option<u64>)],
+) {
+    let start = translation.start;
+    let Some(last) = stages.last() else {
+        return;
+    };
+    let mut time = Section::new("time");
+    time.set("end", Value::number(last.end - start));
+    if let [only] = stages {
+        method(&mut time, &only.method);
+        translation.add(time);
+        return;
+    }
+    translation.add(time);
+    for (index, stage) in stages.iter().enumerate() {
+        let mut section = Section::new("stage");
+        if index + 1 < stages.len() {
+            section.set("end", Value::number(stage.end - start));
+        }
+        method(&mut section, &stage.method);
+        let rests = conditions
+            .iter()
+            .filter(|(_, step)| step.is_some() && *step != stage.step_id);
+        let off: Vec<Value> = rests.map(|(name, _)| Value::text(name.clone())).collect();
+        if !off.is_empty() {
+            section.set("off", Value::List(off));
+        }
+        translation.add(section);
+    }
+}
+
+fn method(section: &mut Section, method: &Method) {
+    match method {
+        Method::Explicit { step, safety } => {
+            if let Some(step) = step {
+                section.set("step", step.clone());
+            }
+            if let Some(safety) = safety {
+                section.set("safety", safety.clone());
+            }
+        }
+        Method::Relaxation(steps) => {
+            let steps = Value::Number(steps.to_string());
+            section.set("method", Value::text("relaxation")).set(
+                "relaxation",
+                Value::Table(vec![("load_steps".to_owned(), steps)]),
+            );
+        }
+    }
+}

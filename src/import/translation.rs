@@ -1,0 +1,272 @@
+//! An import under way: the deck that is read, what became of its keys, and the deck that is written.
+
+use std::path::{Path, PathBuf};
+
+use super::draft::{Draft, Section, Value};
+use super::expression::{Dialect, rewrite};
+use super::files::relative;
+use super::log::Log;
+use super::tree::Node;
+use crate::deck::Source;
+use crate::error::{Error, Result, excerpt};
+use crate::expression::{POSITION, POSITION_AND_TIME};
+
+/// Longest name of a table; names of decks have at most 64 characters.
+const LONGEST_NAME: usize = 56;
+
+/// An import under way.
+pub struct Translation<'a> {
+    /// The deck that is read.
+    pub source: &'a Source,
+    /// Folder of the deck that is written.
+    target: PathBuf,
+    /// How expressions are written.
+    pub dialect: Dialect,
+    /// What became of the keys.
+    pub log: Log,
+    /// The deck that is written.
+    pub draft: Draft,
+    /// Number of dimensions.
+    pub dimension: usize,
+    /// Time of the deck that is read at which the run starts, s.
+    pub start: f64,
+    /// Time of the run at which the step of the present condition starts, s.
+    pub step_start: f64,
+    /// Sections and names of tables: as they are read, and as they are written.
+    names: Vec<(&'static str, String, String)>,
+}
+
+impl<'a> Translation<'a> {
+    /// An import in which nothing is read yet; `target` is the path of the deck that is written.
+    pub fn new(source: &'a Source, target: &Path, dialect: Dialect) -> Self {
+        Self {
+            source,
+            target: target.parent().unwrap_or("".as_ref()).to_owned(),
+            dialect,
+            log: Log::default(),
+            draft: Draft::default(),
+            dimension: 3,
+            start: 0.0,
+            step_start: 0.0,
+            names: Vec::new(),
+        }
+    }
+
+    /// An error about a line of the deck.
+    pub fn error(&self, line: usize, message: impl AsRef<str>) -> Error {
+        line_error(self.source, line, message)
+    }
+
+    /// The value of a required key.
+    ///
+    /// # Errors
+    /// If it is missing.
+    pub fn required<'n>(&self, table: &'n Node, key: &str, name: &str) -> Result<&'n Node> {
+        let missing = || self.error(table.line, format!("{name} has no `{key}`"));
+        table.get(key).ok_or_else(missing)
+    }
+
+    /// The text of a value.
+    ///
+    /// # Errors
+    /// If it is a list or a table.
+    pub fn text<'n>(&self, node: &'n Node, key: &str) -> Result<&'n str> {
+        let wrong = || self.error(node.line, format!("`{key}` must be a number or a text"));
+        node.text().ok_or_else(wrong)
+    }
+
+    /// A number, possibly given by an expression without variables.
+    ///
+    /// # Errors
+    /// If the value is none.
+    pub fn number(&self, node: &Node, key: &str) -> Result<f64> {
+        let text = self.text(node, key)?;
+        let number = text.parse::<f64>().ok().or_else(|| {
+            let constant = rewrite(text, self.dialect, &|_| None, &[]).ok()?;
+            constant.parse().ok()
+        });
+        let number = number.filter(|number| number.is_finite());
+        number.ok_or_else(|| {
+            let message = format!("`{key}` must be a number, is {}", excerpt(text));
+            self.error(node.line, message)
+        })
+    }
+
+    /// A number as a value of the new deck.
+    ///
+    /// # Errors
+    /// As [`number`](Self::number).
+    pub fn number_value(&self, node: &Node, key: &str) -> Result<Value> {
+        let number = self.number(node, key)?;
+        let text = self.text(node, key)?;
+        Ok(match text.parse::<f64>() {
+            Ok(_) => Value::number_or_expression(text),
+            Err(_) => Value::number(number),
+        })
+    }
+
+    /// A whole number.
+    ///
+    /// # Errors
+    /// If the value is none.
+    pub fn count(&self, node: &Node, key: &str) -> Result<u64> {
+        let number = self.number(node, key)?;
+        let is_whole = (0.0..1e15).contains(&number) && number.fract() == 0.0;
+        match is_whole {
+            true => Ok(number as u64),
+            false => {
+                let message = format!("`{key}` must be a whole number, is {number}");
+                Err(self.error(node.line, message))
+            }
+        }
+    }
+
+    /// `true` or `false`; anything else counts as `false`.
+    pub fn is_true(&self, node: &Node) -> bool {
+        node.text().is_some_and(|text| {
+            ["true", "yes", "on", "1"]
+                .iter()
+                .any(|word| text.eq_ignore_ascii_case(word))
+        })
+    }
+
+    /// An expression of position and time, or of position alone; `Err` says why it is none here.
+    pub fn expression(&self, text: &str, of_time: bool) -> std::result::Result<Value, String> {
+        let start = self.start;
+        let names = |name: &str| match name {
+            "t" if start != 0.0 => Some(format!("(t + {start:?})")),
+            // Time since the start of a step of PeriLab.
+            "st" if self.dialect == Dialect::PeriLab => Some(match self.step_start == 0.0 {
+                true => "t".to_owned(),
+                false => format!("(t - {:?})", self.step_start),
+            }),
+            _ => None,
+        };
+        let variables = match of_time {
+            true => &POSITION_AND_TIME[..],
+            false => &POSITION[..],
+        };
+        let variables: Vec<_> = (0..variables.len())
+            .filter(|k| *k < self.dimension || *k == 3)
+            .map(|k| variables[k])
+            .collect();
+        let text = rewrite(text, self.dialect, &names, &variables)?;
+        Ok(Value::number_or_expression(&text))
+    }
+
+    /// The name of a table in the new deck, unique in its section.
+    pub fn name(&mut self, section: &'static str, name: &str) -> String {
+        let same = |(s, read, _): &&(&str, String, String)| *s == section && read == name;
+        if let Some((.., written)) = self.names.iter().find(same) {
+            return written.clone();
+        }
+        let written = self.new_name(section, name);
+        self.names.push((section, name.to_owned(), written.clone()));
+        written
+    }
+
+    /// As [`name`](Self::name), of a table that nothing else refers to by the same name. Bodies are sets too, so they
+    /// have their names in the section `set`.
+    pub fn new_name(&mut self, section: &'static str, name: &str) -> String {
+        let plain = slug(name);
+        let taken = |written: &str| {
+            let mut names = self.names.iter();
+            (section == "set" && written == "all")
+                || names.any(|(s, _, known)| *s == section && known == written)
+        };
+        let free = (1..).map(|k| match k {
+            1 => plain.clone(),
+            k => format!("{plain}_{k}"),
+        });
+        let written = free
+            .into_iter()
+            .find(|name| !taken(name))
+            .expect("numbers have no end");
+        self.names.push((section, String::new(), written.clone()));
+        written
+    }
+
+    /// The path of a file of the deck, from the working directory.
+    pub fn path(&self, file: &str) -> PathBuf {
+        let folder = self.source.path.parent().unwrap_or("".as_ref());
+        folder.join(file)
+    }
+
+    /// The path of a file of the deck as the new deck names it.
+    pub fn file(&self, file: &str) -> Value {
+        let path = self.path(file);
+        let path = match Path::new(file).is_absolute() {
+            true => path,
+            false => relative(&path, &self.target),
+        };
+        Value::text(path.display().to_string().replace('\\', "/"))
+    }
+
+    /// A vector with one component; the others have a default.
+    pub fn component(&self, component: usize, value: Value, others: &Value) -> Value {
+        Value::list((0..self.dimension).map(|k| match k == component {
+            true => value.clone(),
+            false => others.clone(),
+        }))
+    }
+
+    /// Add a section to the new deck.
+    pub fn add(&mut self, section: Section) {
+        self.draft.add(section);
+    }
+}
+
+/// An error about a line of a deck.
+pub fn line_error(source: &Source, line: usize, message: impl AsRef<str>) -> Error {
+    let start = match line {
+        0 | 1 => 0,
+        line => {
+            let breaks = source.text.match_indices('\n').map(|(at, _)| at + 1);
+            breaks.take(line - 1).last().unwrap_or(0)
+        }
+    };
+    let rest = &source.text[start..];
+    let text = rest.lines().next().unwrap_or("");
+    let indent = text.len() - text.trim_start().len();
+    source.error(
+        start + indent..start + text.trim_end().len().max(indent),
+        message,
+    )
+}
+
+/// A name in lower case, of letters, digits and underscores.
+fn slug(name: &str) -> String {
+    let mut slug = String::new();
+    for c in name.trim().chars().take(LONGEST_NAME) {
+        let c = c.to_ascii_lowercase();
+        if c.is_ascii_alphanumeric() {
+            slug.push(c);
+        } else if !slug.ends_with('_') && !slug.is_empty() {
+            slug.push('_');
+        }
+    }
+    match slug.trim_end_matches('_') {
+        "" => "unnamed".to_owned(),
+        slug => slug.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_plain_and_unique() {
+        let source = Source {
+            path: "a.yaml".into(),
+            text: String::new(),
+        };
+        let mut translation = Translation::new(&source, "b.toml".as_ref(), Dialect::Peridigm);
+        assert_eq!(translation.name("set", "My Set (left)"), "my_set_left");
+        assert_eq!(translation.name("set", "my set left"), "my_set_left_2");
+        assert_eq!(translation.name("set", "My Set (left)"), "my_set_left");
+        assert_eq!(translation.name("body", "my set left"), "my_set_left");
+        assert_eq!(translation.new_name("set", "All"), "all_2");
+        assert_eq!(translation.name("set", "é"), "unnamed");
+    }
+}

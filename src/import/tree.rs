@@ -1,0 +1,73 @@
+//! Parameter trees: what YAML decks and XML parameter lists have in common.
+
+/// Maximum number of nodes of a tree, which bounds the memory of a deck.
+pub const MOST_NODES: usize = 1 << 20;
+
+/// Maximum depth of a tree.
+pub const DEEPEST: usize = 64;
+
+/// A mistake in a deck: its line, from 1, and the message.
+pub type Mistake = (usize, String);
+
+/// A value of a deck with the line where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// Number of the node in its tree, in the order of the text.
+    pub id: usize,
+    /// Line, from 1.
+    pub line: usize,
+    /// What it holds.
+    pub content: Content,
+}
+
+/// What a node holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Content {
+    /// A number, a word or a text.
+    Text(String),
+    /// Values in order.
+    List(Vec<Node>),
+    /// Values by name, in the order of the text.
+    Table(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// The value of a key. Keys are compared without case, and `_` is a space.
+    pub fn get(&self, key: &str) -> Option<&Self> {
+        let (_, node) = self.entries().iter().find(|(name, _)| is_key(name, key))?;
+        Some(node)
+    }
+
+    /// The names and values of a table; empty for others.
+    pub fn entries(&self) -> &[(String, Self)] {
+        match &self.content {
+            Content::Table(entries) => entries,
+            _ => &[],
+        }
+    }
+
+    /// The tables among the values of a table.
+    pub fn tables(&self) -> impl Iterator<Item = (&str, &Self)> {
+        let entries = self.entries().iter();
+        entries
+            .filter(|(_, node)| matches!(node.content, Content::Table(_)))
+            .map(|(name, node)| (name.as_str(), node))
+    }
+
+    /// The text of a value that is neither list nor table.
+    pub fn text(&self) -> Option<&str> {
+        match &self.content {
+            Content::Text(text) => Some(text.trim()),
+            _ => None,
+        }
+    }
+}
+
+/// Test whether a name stands for a key.
+pub fn is_key(name: &str, key: &str) -> bool {
+    let plain = |text: &str| {
+        let words = text.split([' ', '_']).filter(|word| !word.is_empty());
+        words.collect::<Vec<_>>().join(" ").to_lowercase()
+    };
+    plain(name) == plain(key)
+}

@@ -1,0 +1,241 @@
+//! Columns of a point file: named by its header or by the deck, or in the default order.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+use crate::error::excerpt;
+
+/// Coordinates in the order of their directions.
+const COORDINATES: [&str; 3] = ["x", "y", "z"];
+
+/// Names of the column of volumes.
+const VOLUME: [&str; 2] = ["volume", "vol"];
+
+/// Names of the column of block numbers.
+const BLOCK: [&str; 3] = ["block", "block_id", "block id"];
+
+/// First word of the header of a file of PeriLab.
+const PERILAB_HEADER: &str = "header:";
+
+/// Optional first bytes of a UTF-8 file.
+pub const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// Maximum length of a row, bytes.
+pub const LONGEST_ROW: u64 = 1 << 16;
+
+/// Where the columns of a point stand in a row.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Columns {
+    /// All columns of a row, by name.
+    pub names: Vec<String>,
+    /// Columns of the coordinates.
+    pub position: Vec<usize>,
+    /// Column of the volume.
+    pub volume: usize,
+    /// Column of the block number; without it all rows have block 0.
+    pub block: Option<usize>,
+}
+
+impl Columns {
+    /// The default order: coordinates, volume, block.
+    pub fn default_order(dimension: usize) -> Self {
+        let coordinates = COORDINATES[..dimension].iter().copied();
+        let names = coordinates.chain(["volume", "block"]);
+        Self {
+            names: names.map(str::to_owned).collect(),
+            position: (0..dimension).collect(),
+            volume: dimension,
+            block: Some(dimension + 1),
+        }
+    }
+
+    /// Columns by name; upper and lower case are equal.
+    ///
+    /// # Errors
+    /// If a coordinate or the volume is missing, or a name occurs twice.
+    pub fn named(names: &[String], dimension: usize) -> Result<Self, String> {
+        let find = |known: &[&str]| {
+            let is_known = |name: &String| known.iter().any(|k| name.eq_ignore_ascii_case(k));
+            let mut found = (0..names.len()).filter(|k| is_known(&names[*k]));
+            match (found.next(), found.next()) {
+                (Some(_), Some(_)) => Err(format!("has two columns `{}`", known[0])),
+                (column, _) => Ok(column),
+            }
+        };
+        let required = |known: &[&str]| {
+            let missing = || {
+                let has = match names {
+                    [] => "none".to_owned(),
+                    names => excerpt(&names.join(" ")),
+                };
+                format!(
+                    "has no column `{}`; the columns are {has}, the known names {} volume block",
+                    known[0],
+                    COORDINATES[..dimension].join(" ")
+                )
+            };
+            find(known)?.ok_or_else(missing)
+        };
+        let position = COORDINATES[..dimension]
+            .iter()
+            .map(|name| required(&[name]));
+        Ok(Self {
+            position: position.collect::<Result<_, _>>()?,
+            volume: required(&VOLUME)?,
+            block: find(&BLOCK)?,
+            names: names.to_vec(),
+        })
+    }
+
+    /// Names of the columns that are not read.
+    pub fn ignored(&self) -> Vec<&str> {
+        let is_read = |column: &usize| {
+            self.position.contains(column) || *column == self.volume || Some(*column) == self.block
+        };
+        let ignored = (0..self.names.len()).filter(|column| !is_read(column));
+        ignored.map(|column| self.names[column].as_str()).collect()
+    }
+}
+
+/// How the rows of a file are read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Layout {
+    /// The columns.
+    pub columns: Columns,
+    /// First byte of the heading, which holds no point.
+    pub heading: Option<u64>,
+}
+
+/// An invalid heading.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HeadingError {
+    /// Its line, from 1.
+    pub line: u64,
+    /// What is wrong.
+    pub message: String,
+}
+
+/// The layout of a file; `given` are the columns that the deck names.
+///
+/// A heading with a column `x` names the columns. Another one is skipped.
+///
+/// # Errors
+/// If the file cannot be read; within, if its heading names too few columns.
+pub fn layout(
+    path: &Path,
+    given: Option<&Columns>,
+    dimension: usize,
+) -> std::io::Result<Result<Layout, HeadingError>> {
+    let mut layout = Layout {
+        columns: given.cloned().unwrap_or(Columns::default_order(dimension)),
+        heading: None,
+    };
+    let Some(heading) = heading(path)? else {
+        return Ok(Ok(layout));
+    };
+    layout.heading = Some(heading.offset);
+    if given.is_none()
+        && heading
+            .names
+            .iter()
+            .any(|name| name.eq_ignore_ascii_case("x"))
+    {
+        match Columns::named(&heading.names, dimension) {
+            Ok(columns) => layout.columns = columns,
+            Err(message) => {
+                let line = heading.line;
+                return Ok(Err(HeadingError { line, message }));
+            }
+        }
+    }
+    Ok(Ok(layout))
+}
+
+/// The heading of a file: its first row, if that has no number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Heading {
+    /// Its entries, without quotes.
+    pub names: Vec<String>,
+    /// Its first byte.
+    pub offset: u64,
+    /// Its line, from 1.
+    pub line: u64,
+}
+
+/// Read the heading of a file, if it has one.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
+    // Opening a pipe would block until its other end is opened.
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    let mut reader = BufReader::new(File::open(path)?);
+    let (mut row, mut offset, mut line) = (Vec::new(), 0, 0);
+    loop {
+        row.clear();
+        let read = (&mut reader)
+            .take(LONGEST_ROW)
+            .read_until(b'\n', &mut row)? as u64;
+        line += 1;
+        if read == 0 {
+            return Ok(None);
+        }
+        let bytes = match offset {
+            0 => row.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&row),
+            _ => &row[..],
+        };
+        // A row that is too long or not text is reported where it is read.
+        let Some(text) = std::str::from_utf8(bytes).ok().map(str::trim) else {
+            return Ok(None);
+        };
+        if !text.is_empty() && !is_comment(text) {
+            return Ok(names(text).map(|names| Heading {
+                names,
+                offset,
+                line,
+            }));
+        }
+        offset += read;
+    }
+}
+
+/// Test whether a row holds no point: one that starts with `#`, or with `/` or `*` as in Peridigm.
+pub fn is_comment(row: &str) -> bool {
+    row.trim_start().starts_with(['#', '/', '*'])
+}
+
+/// The names of a heading; `None` of a row with numbers.
+fn names(row: &str) -> Option<Vec<String>> {
+    let row = row.strip_prefix(PERILAB_HEADER).unwrap_or(row);
+    let entries = entries(row).ok()?;
+    let is_heading = !entries.iter().any(|entry| resembles_number(entry));
+    let bare = |entry: &&str| entry.trim_matches(['"', '\'']).to_owned();
+    is_heading.then(|| entries.iter().map(bare).collect())
+}
+
+/// Split a row into entries.
+///
+/// # Errors
+/// If there is nothing between two separators.
+pub fn entries(row: &str) -> Result<Vec<&str>, String> {
+    let row = row.trim();
+    let mut entries = Vec::new();
+    for part in row.split([',', ';']) {
+        let before = entries.len();
+        entries.extend(part.split_whitespace());
+        if entries.len() == before && !row.is_empty() {
+            return Err(format!("entry {} is empty", before + 1));
+        }
+    }
+    Ok(entries)
+}
+
+/// Test whether an entry is a number, possibly mistyped or in quotes.
+fn resembles_number(entry: &str) -> bool {
+    let bare = entry.trim_matches(['"', '\'']);
+    let digits = bare.trim_start_matches(['+', '-', '.']);
+    bare.parse::<f64>().is_ok() || digits.starts_with(|c: char| c.is_ascii_digit())
+}

@@ -1,0 +1,55 @@
+//! Sets of points from a text file of their numbers, as Peridigm and PeriLab have for node sets.
+
+use std::path::Path;
+
+use super::columns::{BYTE_ORDER_MARK, heading, is_comment};
+use crate::error::excerpt;
+
+/// Maximum length of a file, bytes.
+const LONGEST: u64 = 1 << 32;
+
+/// Read the ids of a file, from 0, sorted and each once; `first` is the number of the first point in the file.
+///
+/// Numbers are separated by white space or commas. Skipped are comments and a heading.
+///
+/// # Errors
+/// If the file cannot be read, has no number, or an entry is none; the message names file and line.
+pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
+    let name = path.display();
+    let unreadable = |error: std::io::Error| format!("cannot read {name}: {error}");
+    let heading = heading(path).map_err(unreadable)?;
+    let length = std::fs::metadata(path).map_err(unreadable)?.len();
+    if length > LONGEST {
+        return Err(format!(
+            "{name}: is longer than {LONGEST} bytes; is this a set?"
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let text = std::str::from_utf8(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes));
+    let text = text.map_err(|_| format!("{name}: is not UTF-8 text"))?;
+    let mut ids = Vec::new();
+    for (line, row) in (1..).zip(text.lines()) {
+        if is_comment(row) || heading.as_ref().is_some_and(|heading| heading.line == line) {
+            continue;
+        }
+        for entry in row
+            .split([',', ';', ' ', '\t', '\r'])
+            .filter(|entry| !entry.is_empty())
+        {
+            let id = entry.parse::<u64>().ok().filter(|id| *id >= first);
+            let id = id.ok_or_else(|| {
+                format!(
+                    "{name}:{line}: must be whole numbers of points, from {first}, is {}",
+                    excerpt(entry)
+                )
+            })?;
+            ids.push(id - first);
+        }
+    }
+    if ids.is_empty() {
+        return Err(format!("{name}: has no number of a point"));
+    }
+    ids.sort_unstable();
+    ids.dedup();
+    Ok(ids)
+}

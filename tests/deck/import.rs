@@ -1,0 +1,720 @@
+//! Decks of other codes: what their numbers become, what is left out, wrong ones, and mutants.
+
+use std::path::PathBuf;
+
+use fissure::comm::threads;
+use fissure::deck::{Deck, Source};
+use fissure::import::log::Fate;
+use fissure::import::{Code, Import, translate};
+use fissure::problem::Problem;
+use fissure::solver::Simulation;
+use fissure::survey::dry_run;
+
+use crate::support::{displace, force};
+
+/// A folder of its own, which is removed in the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path =
+            std::env::temp_dir().join(format!("fissure-import-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.0.join(name), text).unwrap();
+    }
+
+    /// Import a deck of this folder into the same folder.
+    fn import(&self, name: &str, text: &str) -> Result<Import, String> {
+        let source = Source {
+            path: self.0.join(name),
+            text: text.to_owned(),
+        };
+        let place = format!("{}/", self.0.display());
+        let imported = translate(&source, None, &self.0.join("new.toml"));
+        imported.map_err(|error| error.message.replace(&place, ""))
+    }
+
+    /// The problem of a new deck of this folder.
+    fn problem(&self, imported: &Import) -> Problem {
+        assert!(
+            imported.fault.is_none(),
+            "{:?}\n{}",
+            imported.fault,
+            imported.text
+        );
+        let source = Source {
+            path: self.0.join("new.toml"),
+            text: imported.text.clone(),
+        };
+        Deck::new(source).unwrap().problem().unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).unwrap();
+    }
+}
+
+/// The fate of a key and its note.
+fn fate<'a>(imported: &'a Import, key: &str) -> (Fate, &'a str) {
+    let entry = imported.entries.iter().find(|entry| entry.key == key);
+    let entry = entry.unwrap_or_else(|| panic!("no {key} in {:#?}", imported.entries));
+    (entry.fate, &entry.note)
+}
+
+fn with<const D: usize, T>(problem: &Problem, body: impl FnOnce(Simulation<D>) -> T) -> T {
+    let comm = threads::alone();
+    body(Simulation::new(problem, &comm).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Two points that move towards one another.
+const TWO_POINTS: &str = r#"
+Peridigm:
+  Discretization:
+    Type: PdQuickGrid
+    NeighborhoodType: Spherical
+    TensorProduct3DMeshGenerator:
+      Type: PdQuickGrid
+      X Origin: -1.5
+      Y Origin: -0.5
+      Z Origin: -0.5
+      X Length: 3.0
+      Y Length: 1.0
+      Z Length: 1.0
+      Number Points X: 2
+      Number Points Y: 1
+      Number Points Z: 1
+  Materials:
+    Soft Solid:
+      Material Model: "Elastic"
+      Density: 1000.0
+      Bulk Modulus: 12.0e6
+      Shear Modulus: 5.0e6
+      Apply Shear Correction Factor: false
+  Blocks:
+    All:
+      Block Names: block_1
+      Material: Soft Solid
+      Horizon: 1.6
+  Boundary Conditions:
+    Left Node Set: "1"
+    Right Node Set: "2"
+    Spare Node Set: "1 2"
+    Go Right:
+      Type: Initial Velocity
+      Node Set: Left Node Set
+      Coordinate: x
+      Value: "0.5"
+    Go Left:
+      Type: Initial Velocity
+      Node Set: Right Node Set
+      Coordinate: x
+      Value: "value = -0.5"
+  Solver:
+    Verbose: false
+    Initial Time: 0.0
+    Final Time: 4.0e-3
+    Enable Magic: true
+    Verlet:
+      Fixed dt: 2.0e-5
+  Output:
+    Output Filename: two_points
+    Output Frequency: 10
+    Output Variables:
+      Displacement: true
+      Force: true
+      Proc_Num: false
+      Radius: true
+"#;
+
+/// Peridigm's two points: one bond of the solid has the force state of its dilatation and deviatoric extension.
+#[test]
+fn two_points_of_peridigm_oscillate() {
+    let folder = Folder::new("two-points");
+    let imported = folder.import("two.yaml", TWO_POINTS).unwrap();
+    assert_eq!(imported.code, Code::Peridigm);
+    let problem = folder.problem(&imported);
+    // One neighbour at x = 1.5 m with V = 1.5 m³: m = x² V, θ = 3 x e V/m = 3 e/x. The deviatoric extension e − θ x/3 is 0,
+    // so the force state is 3 k θ x/m = 9 k e/m, and the acceleration of the extension −2·2·9 k V/(m ρ) e.
+    let (x, bulk, density) = (1.5_f64, 12e6, 1000.0);
+    let frequency = (4.0 * 9.0 * bulk / (x * x * density)).sqrt();
+    let end = 4e-3;
+    let expected = -(1.0 / frequency) * (frequency * end).sin();
+    let found = with::<3, _>(&problem, |mut simulation| {
+        while simulation.clock.number() < simulation.clock.last() {
+            simulation.advance();
+        }
+        let u = &simulation.fields.displacement[0];
+        u[1] - u[0]
+    });
+    // Amplitudes are so small that the bond is linear; the step is 1/115 of a period.
+    assert!(
+        (found - expected).abs() < 2e-3 / frequency,
+        "{found} {expected}"
+    );
+
+    let taken = |key: &str| fate(&imported, key).0;
+    let materials = "Peridigm > Materials > Soft Solid";
+    assert_eq!(taken(&format!("{materials} > Bulk Modulus")), Fate::Taken);
+    assert_eq!(
+        taken(&format!("{materials} > Apply Shear Correction Factor")),
+        Fate::Taken
+    );
+    assert_eq!(
+        fate(&imported, "Peridigm > Boundary Conditions > Spare Node Set"),
+        (Fate::LeftOut, "nothing uses this node set")
+    );
+    let variables = "Peridigm > Output > Output Variables";
+    assert_eq!(taken(&format!("{variables} > Force")), Fate::Approximated);
+    assert_eq!(
+        fate(&imported, &format!("{variables} > Radius")),
+        (Fate::LeftOut, "there is no such field")
+    );
+    assert_eq!(
+        fate(&imported, "Peridigm > Solver > Verbose"),
+        (Fate::LeftOut, "concerns what the code prints")
+    );
+    assert_eq!(
+        fate(&imported, "Peridigm > Solver > Enable Magic"),
+        (Fate::LeftOut, "unknown, or without a counterpart")
+    );
+    // Every key has one fate, and the deck lists all of them.
+    let values = TWO_POINTS
+        .lines()
+        .filter(|line| line.contains(": "))
+        .count();
+    assert_eq!(imported.entries.len(), values);
+    let listed = imported
+        .text
+        .lines()
+        .filter(|line| line.contains(" -> "))
+        .count();
+    assert_eq!(listed, values, "{}", imported.text);
+}
+
+/// A bar of points with two pre-cracks, given by a text file.
+const BAR: &str = r#"<ParameterList>
+  <ParameterList name="Discretization">
+    <Parameter name="Type" type="string" value="Text File"/>
+    <Parameter name="Input Mesh File" type="string" value="bar.txt"/>
+    <ParameterList name="Bond Filters">
+      <ParameterList name="Cut">
+        <Parameter name="Type" type="string" value="Rectangular_Plane"/>
+        <Parameter name="Normal_X" type="double" value="1.0"/>
+        <Parameter name="Normal_Y" type="double" value="0.0"/>
+        <Parameter name="Normal_Z" type="double" value="0.0"/>
+        <Parameter name="Lower_Left_Corner_X" type="double" value="1.5"/>
+        <Parameter name="Lower_Left_Corner_Y" type="double" value="-5.0"/>
+        <Parameter name="Lower_Left_Corner_Z" type="double" value="5.0"/>
+        <Parameter name="Bottom_Unit_Vector_X" type="double" value="0.0"/>
+        <Parameter name="Bottom_Unit_Vector_Y" type="double" value="1.0"/>
+        <Parameter name="Bottom_Unit_Vector_Z" type="double" value="0.0"/>
+        <Parameter name="Bottom_Length" type="double" value="10.0"/>
+        <Parameter name="Side_Length" type="double" value="10.0"/>
+      </ParameterList>
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Materials">
+    <ParameterList name="Steel">
+      <Parameter name="Material Model" type="string" value="Elastic Correspondence"/>
+      <Parameter name="Density" type="double" value="8.0"/>
+      <Parameter name="Young's Modulus" type="double" value="2.0e12"/>
+      <Parameter name="Poisson's Ratio" type="double" value="0.25"/>
+      <Parameter name="Hourglass Coefficient" type="double" value="0.02"/>
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Damage Models">
+    <ParameterList name="Stretch">
+      <Parameter name="Damage Model" type="string" value="Critical Stretch"/>
+      <Parameter name="Critical Stretch" type="double" value="0.01"/>
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Blocks">
+    <ParameterList name="Ends">
+      <Parameter name="Block Names" type="string" value="block_2"/>
+      <Parameter name="Material" type="string" value="Steel"/>
+      <Parameter name="Horizon" type="double" value="2.1"/>
+    </ParameterList>
+    <ParameterList name="Rest">
+      <Parameter name="Block Names" type="string" value="default"/>
+      <Parameter name="Material" type="string" value="Steel"/>
+      <Parameter name="Damage Model" type="string" value="Stretch"/>
+      <Parameter name="Horizon" type="double" value="2.1"/>
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Boundary Conditions">
+    <Parameter name="Node Set One" type="string" value="set.txt"/>
+    <ParameterList name="Pull">
+      <Parameter name="Type" type="string" value="Prescribed Displacement"/>
+      <Parameter name="Node Set" type="string" value="Node Set One"/>
+      <Parameter name="Coordinate" type="string" value="x"/>
+      <Parameter name="Value" type="string" value="if(t&lt;=1){value=x*1.0e-3*t;} else {value=x*1.0e-3;}"/>
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Solver1">
+    <Parameter name="Initial Time" type="double" value="0.0"/>
+    <Parameter name="Final Time" type="double" value="1.0"/>
+    <ParameterList name="QuasiStatic">
+      <Parameter name="Number of Load Steps" type="int" value="2"/>
+      <Parameter name="Absolute Tolerance" type="double" value="1.0"/>
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Solver2">
+    <Parameter name="Initial Time" type="double" value="1.0"/>
+    <Parameter name="Final Time" type="double" value="2.0"/>
+    <ParameterList name="Verlet">
+      <Parameter name="Safety Factor" type="double" value="0.5"/>
+    </ParameterList>
+  </ParameterList>
+</ParameterList>
+"#;
+
+/// A file of Peridigm without header: 4 × 2 × 2 points of two blocks.
+fn bar_points() -> String {
+    let mut text = "# x y z block volume\n".to_owned();
+    for index in 0..16 {
+        let (x, y, z) = (index % 4, index / 4 % 2, index / 8);
+        let block = if x == 0 { 2 } else { 1 };
+        text += &format!("{x}. {y}. {z}. {block} 0.5\n");
+    }
+    text
+}
+
+#[test]
+fn an_xml_deck_of_peridigm_has_its_points_and_sets_from_files() {
+    let folder = Folder::new("bar");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "# ends\n1 5\n9\n13\n");
+    let imported = folder.import("bar.xml", BAR).unwrap();
+    let problem = folder.problem(&imported);
+    assert_eq!(problem.bodies.len(), 2);
+    assert_eq!(problem.cracks.len(), 1);
+    let found = dry_run(&problem, 1, false).unwrap();
+    assert_eq!(found.points, 16);
+    for line in [
+        "[body.block_2]",
+        "[body.block_1]",
+        "columns = [\"x\", \"y\", \"z\", \"block\", \"volume\"]",
+        "first_id = 1",
+        "zero_energy = \"silling2017\"",
+        "if(t <= 1, x*1.0e-3*t, x*1.0e-3)",
+        "edge_b = [0.0, 0.0, -10.0]",
+    ] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+    // A correspondence law breaks by energy: s0² δ (3 G + (3/4)⁴ (k − 5 G/3)), with k = 5 G/3 for ν = 1/4.
+    let energy = 0.01_f64.powi(2) * 2.1 * 3.0 * 0.8e12;
+    let written = imported
+        .text
+        .lines()
+        .find_map(|line| line.strip_prefix("fracture_energy = "));
+    let written: f64 = written.unwrap().parse().unwrap();
+    assert!((written / energy - 1.0).abs() < 1e-12, "{written} {energy}");
+    let key = "Damage Models > Stretch > Critical Stretch";
+    assert_eq!(fate(&imported, key).0, Fate::Approximated);
+    assert_eq!(problem.stages.len(), 2);
+    // The pre-crack between x = 1 and x = 2 cuts the bar: no bond crosses it.
+    with::<3, _>(&problem, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| {
+            [if x > 1.5 { x + 0.01 } else { x }, y, z]
+        });
+        for point in 0..16 {
+            let f = force(&simulation, point);
+            assert!(f.iter().all(|f| f.abs() < 1e-3), "{f:?}");
+        }
+    });
+}
+
+/// A bond-based strip of PeriLab with a bond, a contact and a force.
+const STRIP: &str = r#"
+PeriLab:
+  Discretization:
+    Type: "Text File"
+    Input Mesh File: "strip.txt"
+    Node Sets:
+      Left: 1
+      Right: x>0.5
+      Ends: ends.txt
+  Models:
+    Pre Calculation Global:
+      Deformed Bond Geometry: true
+    Material Models:
+      Alu:
+        Material Model: "Bond-based Elastic"
+        Symmetry: "isotropic plane stress"
+        Young's Modulus: 7.0e+4
+        Poisson's Ratio: 0.34
+    Damage Models:
+      Tough:
+        Damage Model: Critical Energy
+        Critical Value: 12.5
+    Thermal Models:
+      Heat:
+        Thermal Model: "Thermal Flow"
+        Thermal Conductivity: 5.0
+  Blocks:
+    block_1:
+      Block ID: 1
+      Material Model: "Alu"
+      Damage Model: Tough
+      Density: 2.7e-9
+      Horizon: 1.2
+  Boundary Conditions:
+    Hold:
+      Variable: "Displacements"
+      Node Set: "Left"
+      Coordinate: "x"
+      Value: 0
+      Type: Dirichlet
+    Push:
+      Variable: "Forces"
+      Node Set: "Ends"
+      Coordinate: "y"
+      Value: -3*t
+      Type: Dirichlet
+    Warm:
+      Variable: "Temperature"
+      Node Set: "Ends"
+      Value: 20
+      Type: Dirichlet
+  Solver:
+    Material Models: True
+    Damage Models: True
+    Initial Time: 0.0
+    Final Time: 1.0e-6
+    Verlet:
+      Fixed dt: 1.0e-8
+      Numerical Damping: 0.002
+  Outputs:
+    Output1:
+      Output Filename: strip
+      Output File Type: Exodus
+      Number of Output Steps: 20
+      Output Variables:
+        Displacements: True
+        Damage: True
+        Temperature: True
+"#;
+
+#[test]
+fn a_bond_of_perilab_has_its_micromodulus() {
+    let folder = Folder::new("strip");
+    folder.write(
+        "strip.txt",
+        "# a strip\n\nheader: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let imported = folder.import("strip.yaml", STRIP).unwrap();
+    assert_eq!(imported.code, Code::PeriLab);
+    let problem = folder.problem(&imported);
+    // c = 9 E/(π δ³ h) and the force density c s V of the one bond.
+    let stretch = 1e-6;
+    let expected = 9.0 * 7e4 / (std::f64::consts::PI * 1.2_f64.powi(3)) * stretch * 0.5;
+    with::<2, _>(&problem, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| [x * (1.0 + stretch), y, z]);
+        let [f, _] = force(&simulation, 0);
+        assert!((f / expected - 1.0).abs() < 1e-6, "{f} {expected}");
+    });
+    for line in [
+        "dimension = \"plane-stress\"",
+        "calibration = \"perilab\"",
+        "damping = 200000.0",
+        "force = [0, \"2*(-3*t)\"]",
+        "where = \"x > 0.5\"",
+    ] {
+        let expected = line != "where = \"x > 0.5\"";
+        assert_eq!(
+            imported.text.contains(line),
+            expected,
+            "{line}\n{}",
+            imported.text
+        );
+    }
+    let key = |name: &str| fate(&imported, &format!("PeriLab > {name}")).0;
+    assert_eq!(
+        key("Models > Material Models > Alu > Poisson's Ratio"),
+        Fate::Approximated
+    );
+    assert_eq!(
+        key("Models > Thermal Models > Heat > Thermal Conductivity"),
+        Fate::LeftOut
+    );
+    assert_eq!(key("Boundary Conditions > Warm"), Fate::LeftOut);
+    assert_eq!(key("Boundary Conditions > Warm > Value"), Fate::LeftOut);
+    assert_eq!(
+        key("Boundary Conditions > Push > Value"),
+        Fate::Approximated
+    );
+    assert_eq!(
+        key("Outputs > Output1 > Number of Output Steps"),
+        Fate::Taken
+    );
+}
+
+/// A disc of LAMMPS that a sphere hits.
+const DISC: &str = "# a disc
+units           si
+boundary        s s s
+atom_style      peri
+atom_modify     map array
+neighbor        0.002 bin
+variable        a equal 0.001
+lattice         sc $a
+region          target cylinder y 0.0 0.0 $(10*v_a) -0.010 0.0 units box
+create_box      1 target
+create_atoms    1 region target
+pair_style      peri/pmb
+pair_coeff      * * 1.0e21 0.0030003 0.001 0.25
+set             group all density 2000
+set             group all volume 1e-9
+velocity        all set 0.0 0.0 0.0 sum no units box
+fix             1 all nve
+variable        y0 equal 0.004
+variable        vy equal -50
+variable        y equal \"v_y0 + step*dt*v_vy\"
+fix             2 all indent 1e17 sphere 0.0 v_y 0.0 &
+                0.003 units box
+compute         1 all damage/atom
+timestep        1.0e-7
+thermo          100
+dump            1 all custom 50 dump.peri id type x y z c_1
+fix             3 all deform 1 x scale 2
+run             200
+";
+
+/// The lattice of LAMMPS's example: its log counts 3487 atoms and 335 966 bonds, each at both ends.
+#[test]
+fn a_lattice_of_lammps_has_its_atoms_and_bonds() {
+    let folder = Folder::new("disc");
+    let imported = folder.import("in.disc", DISC).unwrap();
+    assert_eq!(imported.code, Code::Lammps);
+    let problem = folder.problem(&imported);
+    let found = dry_run(&problem, 1, false).unwrap();
+    assert_eq!(found.points, 3487);
+    assert_eq!(2 * found.bonds, 335_966);
+    assert_eq!(found.steps, [(1e-7, 200.0)]);
+    for line in [
+        "origin = [-0.0005, -0.0005, -0.0005]",
+        "motion = [0, \"0.004+t*(-50) - (0.004)\", 0]",
+        "alpha = 0.25",
+        "every_steps = 50",
+    ] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+    assert_eq!(imported.entries.len(), DISC.lines().count() - 2);
+    let deform = imported
+        .entries
+        .iter()
+        .find(|entry| entry.value.contains("deform"));
+    assert_eq!(deform.map(|entry| entry.fate), Some(Fate::LeftOut));
+}
+
+#[test]
+fn a_bond_of_lammps_has_its_force() {
+    let folder = Folder::new("pair");
+    let pair = "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 0 0 0\ncreate_box 1 r\n\
+                create_atoms 1 region r\npair_style peri/pmb\npair_coeff * * 3.0e4 2.5 0.1 0.0\n\
+                set type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n";
+    let imported = folder.import("in.pair", pair).unwrap();
+    let problem = folder.problem(&imported);
+    // The bond is shorter than the horizon less half a spacing, so LAMMPS's force density is c s V.
+    let stretch = 1e-6;
+    with::<3, _>(&problem, |mut simulation| {
+        displace(&mut simulation, |[x, y, z]| [x * (1.0 + stretch), y, z]);
+        let [f, ..] = force(&simulation, 0);
+        let expected = 3.0e4 * stretch * 8.0;
+        assert!((f / expected - 1.0).abs() < 1e-6, "{f} {expected}");
+    });
+}
+
+#[test]
+fn a_wrong_deck_names_file_and_line() {
+    let folder = Folder::new("wrong");
+    let peridigm = |from: &str, to: &str| TWO_POINTS.replacen(from, to, 1);
+    let perilab = |from: &str, to: &str| STRIP.replacen(from, to, 1);
+    let lammps = |from: &str, to: &str| DISC.replacen(from, to, 1);
+    for (text, message) in [
+        (
+            peridigm("Density: 1000.0", "Density: heavy"),
+            "20:7: `Density` must be a number, is `heavy`",
+        ),
+        (
+            peridigm("      Density: 1000.0\n", ""),
+            "18:5: the material `Soft Solid` has no `Density`",
+        ),
+        (
+            peridigm("Material: Soft Solid", "Material: Air"),
+            "27:7: the material `Air` is not defined, or has no counterpart",
+        ),
+        (
+            peridigm("Coordinate: x", "Coordinate: r"),
+            "36:7: `Coordinate` must be x, y or z, is `r`",
+        ),
+        (
+            peridigm("Node Set: Left Node Set", "Node Set: Top"),
+            "35:7: the deck defines no node set `Top`",
+        ),
+        (
+            peridigm("Left Node Set: \"1\"", "Left Node Set: \"0\""),
+            "30:5: `Left Node Set`: number 1 is 0; points count from 1",
+        ),
+        (
+            peridigm("Final Time: 4.0e-3", "Final Time: 0"),
+            "43:3: the end 0 must be later than the start 0",
+        ),
+        (
+            peridigm("    Verlet:", "    Leapfrog:"),
+            "43:3: the solver is none of Verlet, QuasiStatic, NOXQuasiStatic, Implicit, Static, Newmark and the matrix-based ones",
+        ),
+        (
+            peridigm("Type: PdQuickGrid", "Type: Albany"),
+            "4:5: the discretization `Albany` is not read; known are Text File, Exodus and PdQuickGrid",
+        ),
+        (
+            perilab("Young's Modulus: 7.0e+4", "Z: 1"),
+            "14:7: the material `Alu` has too few elastic constants",
+        ),
+        (
+            perilab("  Models:\n", "  Modules:\n"),
+            "2:1: the deck has no `Models`",
+        ),
+        (
+            lammps("lattice         sc", "lattice         fcc"),
+            "8:1: lattice: points need a simple cubic lattice, `lattice sc`",
+        ),
+        (
+            lammps("pair_coeff      * * 1.0e21", "pair_coeff      * *"),
+            "13:1: pair_coeff: needs 4 numbers behind the types: c horizon s00 alpha",
+        ),
+        (
+            lammps("run             200", "run             soon"),
+            "28:1: run: must be a number, is `soon`",
+        ),
+        (
+            lammps("$(10*v_a)", "${b}"),
+            "9:1: the variable `b` is not defined",
+        ),
+        ("a: [1\n".to_owned(), "2:1: is no YAML: "),
+        (
+            "a: 1\n".to_owned(),
+            "1:1: is no deck of Peridigm (`Peridigm:`, or a ParameterList in XML), PeriLab (`PeriLab:`) or LAMMPS (`atom_style peri`); --from says which it is",
+        ),
+        (
+            "<a/>".to_owned(),
+            "1:1: the root element must be ParameterList, is a",
+        ),
+    ] {
+        let error = folder.import("deck", &text).unwrap_err();
+        let first = error.lines().next().unwrap();
+        assert!(
+            first.starts_with(&format!("deck:{message}")),
+            "{error}\nexpected {message}"
+        );
+    }
+}
+
+/// Every mutant of a deck is a deck or an error with its place, and never a panic.
+#[test]
+fn mutants_are_decks_or_errors() {
+    let folder = Folder::new("mutants");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n5\n");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let mutants = std::env::var("FISSURE_MUTANTS").map_or(400, |count| count.parse().unwrap());
+    let mut state = 7_u64;
+    let mut random = |below: usize| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below.max(1)
+    };
+    let words = [
+        "-1",
+        "0",
+        "1e400",
+        "nan",
+        "x",
+        "\"",
+        "'",
+        ":",
+        "- ",
+        "{",
+        "}",
+        "(",
+        "[",
+        "]",
+        "&",
+        "*a",
+        "$(",
+        "${",
+        "<",
+        ">",
+        "é",
+        "\t",
+        "\n",
+        "\0",
+        "if(",
+        "t>2 0 else",
+        "value",
+        "block_1",
+        "default",
+        "INF",
+    ];
+    for (name, deck) in [
+        ("a.yaml", TWO_POINTS),
+        ("b.xml", BAR),
+        ("c.yaml", STRIP),
+        ("in.d", DISC),
+    ] {
+        let mut sound = 0;
+        for _ in 0..mutants {
+            let mut text = deck.to_owned();
+            for _ in 0..1 + random(3) {
+                let at = text.floor_char_boundary(random(text.len()));
+                let end = text.floor_char_boundary((at + random(12)).min(text.len()));
+                match random(4) {
+                    0 => text.insert_str(at, words[random(words.len())]),
+                    1 => text.replace_range(at..end, words[random(words.len())]),
+                    2 => text.replace_range(at..end, ""),
+                    _ => {
+                        let mut lines: Vec<&str> = text.lines().collect();
+                        let (a, b) = (random(lines.len()), random(lines.len()));
+                        match random(3) {
+                            0 => lines.swap(a, b),
+                            1 => {
+                                lines.remove(a);
+                            }
+                            _ => lines.insert(a, lines[b]),
+                        }
+                        text = lines.join("\n");
+                    }
+                }
+            }
+            match folder.import(name, &text) {
+                Ok(imported) => {
+                    sound += 1;
+                    // Values may be wrong, but the text is always TOML.
+                    let table = toml::from_str::<toml::Table>(&imported.text);
+                    assert!(table.is_ok(), "{text}\n{}", imported.text);
+                }
+                Err(message) => assert!(
+                    message.starts_with(&format!("{name}:")),
+                    "{text}\n{message}"
+                ),
+            }
+        }
+        assert!(
+            sound > 0 && sound < mutants,
+            "{name}: {sound} of {mutants} are sound"
+        );
+    }
+}
