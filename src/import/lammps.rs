@@ -489,8 +489,8 @@ fn write_bodies(
     grid.set("spacing", Value::number(spacing));
     let origin = model.origin.map(|fraction| (fraction - 0.5) * spacing);
     grid.set("origin", Value::numbers(&origin));
-    grid.comment("LAMMPS tapers volumes from half a spacing below the horizon to it. Here points count whole.");
-    grid.set("volume_correction", Value::text("none"));
+    grid.comment("LAMMPS tapers volumes from half a spacing below the horizon up to it.");
+    grid.set("volume_correction", Value::text("linear-inside"));
     let mut bodies = Vec::new();
     let mut names = Vec::new();
     let mut materials: Vec<(u32, Material, Option<String>, Value)> = Vec::new();

@@ -517,19 +517,24 @@ fn a_lattice_of_lammps_has_its_atoms_and_bonds() {
 #[test]
 fn a_bond_of_lammps_has_its_force() {
     let folder = Folder::new("pair");
-    let pair = "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 0 0 0\ncreate_box 1 r\n\
-                create_atoms 1 region r\npair_style peri/pmb\npair_coeff * * 3.0e4 2.5 0.1 0.0\n\
-                set type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n";
-    let imported = folder.import("in.pair", pair).unwrap();
-    let problem = folder.problem(&imported);
-    // The bond is shorter than the horizon less half a spacing, so LAMMPS's force density is c s V.
-    let stretch = 1e-6;
-    with::<3, _>(&problem, |mut simulation| {
-        displace(&mut simulation, |[x, y, z]| [x * (1.0 + stretch), y, z]);
-        let [f, ..] = force(&simulation, 0);
-        let expected = 3.0e4 * stretch * 8.0;
-        assert!((f / expected - 1.0).abs() < 1e-6, "{f} {expected}");
-    });
+    // A bond of length 2; the volume of a neighbour is scaled by 1 + (δ − 1 − 2)/2 where it is within half a spacing of the
+    // horizon δ (`vfrac_scale` of `pair_peri_pmb`).
+    for (horizon, share) in [(3.5, 1.0), (2.5, 0.75)] {
+        let pair = format!(
+            "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 0 0 0\ncreate_box 1 r\n\
+             create_atoms 1 region r\npair_style peri/pmb\npair_coeff * * 3.0e4 {horizon} 0.1 0.0\n\
+             set type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n"
+        );
+        let imported = folder.import("in.pair", &pair).unwrap();
+        let problem = folder.problem(&imported);
+        let stretch = 1e-6;
+        with::<3, _>(&problem, |mut simulation| {
+            displace(&mut simulation, |[x, y, z]| [x * (1.0 + stretch), y, z]);
+            let [f, ..] = force(&simulation, 0);
+            let expected = share * 3.0e4 * stretch * 8.0;
+            assert!((f / expected - 1.0).abs() < 1e-6, "{f} {expected}");
+        });
+    }
 }
 
 #[test]
