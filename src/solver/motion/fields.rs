@@ -612,6 +612,6 @@ mod tests {
                 offered += 1;
             }
         }
-        assert_eq!(offered, 7);
+        assert_eq!(offered, 8);
     }
 }
