@@ -113,12 +113,12 @@ class Results(unittest.TestCase):
                 self.assertEqual(list(stored), list(read))
                 for name in stored:
                     numpy.testing.assert_array_equal(stored[name], read[name])
-                units = stored.units if isinstance(stored, fissure.History) else stored.attrs["units"]
+                units = stored.attrs["units"]
                 self.assertEqual(units["time"], "s")
                 self.assertGreater(numpy.array(stored["kinetic_energy"])[-1], 0)
         with without_pandas():
             self.assertIsInstance(self.result.history, fissure.History)
-            self.assertEqual(self.result.history.units["reaction_left_x"], "N")
+            self.assertEqual(self.result.history.attrs["units"]["reaction_left_x"], "N")
 
     def test_rows_that_were_cut_off_are_skipped(self):
         text = (self.folder / "out/history.csv").read_text()

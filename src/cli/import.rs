@@ -20,7 +20,7 @@ Examples:
   fissure import disk_impact.yaml               writes disk_impact.toml beside it
   fissure import WaveInBar.xml -o bar.toml
   fissure import in.peri                        writes in.peri.toml
-  fissure import model.yaml --from peridigm     do not look which code the deck is of")]
+  fissure import model.yaml --from peridigm     skip the detection")]
 pub struct ImportArguments {
     /// The deck: YAML, XML or an input script.
     deck: PathBuf,
@@ -29,7 +29,7 @@ pub struct ImportArguments {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 
-    /// The code that the deck is of [default: as its text says].
+    /// Code that the deck was written for [default: detected].
     #[arg(long, value_enum, value_name = "CODE")]
     from: Option<From>,
 

@@ -192,7 +192,7 @@ struct CheckArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
 
-    /// Print the figures in SI units as JSON, one line a deck; of a wrong deck its error.
+    /// Print the figures in SI units as JSON, one line a deck; for an invalid deck, its error.
     #[arg(long)]
     json: bool,
 }

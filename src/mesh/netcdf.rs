@@ -175,7 +175,7 @@ struct Variable {
     kind: u32,
     begin: usize,
     attributes: FxHashMap<String, String>,
-    /// It has an entry in each record, between those of other variables.
+    /// A record variable: its entries are interleaved with those of others.
     is_record: bool,
 }
 
@@ -241,7 +241,7 @@ impl<'a> Cursor<'a> {
         Ok(String::from_utf8_lossy(self.padded(length)?).into_owned())
     }
 
-    /// The number of entries of a list. Each takes bytes, so a wrong number ends with the file.
+    /// Number of entries of a list. Too large a number fails at the end of the file, because each entry takes bytes.
     fn list(&mut self) -> Fault<usize> {
         self.word()?;
         self.count()

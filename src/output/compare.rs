@@ -216,7 +216,7 @@ struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// Compare some of the fields, a block of points after the other.
+    /// Compare some of the fields, one block of points at a time.
     fn compare(&self, fields: &[usize], comparison: &mut Comparison) -> Result<()> {
         let counts = [0, 1].map(|side: usize| self.readers[side].points(self.indices[side]));
         let mut next = [0; 2];

@@ -8,7 +8,7 @@ use crate::error::excerpt;
 /// Maximum length of a file, bytes.
 const LONGEST: u64 = 1 << 32;
 
-/// Read the ids of a file, from 0, sorted and each once; `first` is the number of the first point in the file.
+/// Read ids from a file: from 0, sorted, without repeats. `first` is the number of the first point in the file.
 ///
 /// Numbers are separated by white space or commas. Skipped are comments and a heading.
 ///

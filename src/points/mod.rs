@@ -179,7 +179,7 @@ fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
             && let Some(id) = ids.last().filter(|id| **id >= total)
         {
             let message = format!(
-                "[set.{}] {key}: no point has the id {id}; those of the {total} points are 0 to {}",
+                "[set.{}] {key}: no point has the id {id}, counted from 0; those of the {total} points are 0 to {}",
                 set.name,
                 total - 1
             );

@@ -54,7 +54,7 @@ pub enum RigidShape {
 /// How a rigid body moves.
 #[derive(Debug, Clone)]
 pub enum RigidMotion {
-    /// By this displacement (m), an expression of t a component, without rotation.
+    /// By this displacement (m): one expression of t for each component; no rotation.
     Driven(Vec<Expression>),
     /// By the forces on it.
     Free {

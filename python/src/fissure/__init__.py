@@ -4,7 +4,7 @@
 
     result = fissure.open("out/plate")
     damage = result.field("damage")              # at the last output, by point
-    stress = result.field("stress", time=25e-6)  # at the output nearest to a time (s)
+    speed = result.field("velocity", time=25e-6) # at the output nearest to a time (s)
     energy = result.history["fracture_energy"]
 
     result = fissure.run("plate.toml", ranks=2, threads=4, tension=20e6)

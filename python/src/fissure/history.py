@@ -19,8 +19,7 @@ class History(dict):
 def read_history(path):
     """Read a history.csv, or the one in a folder: a pandas.DataFrame, or without pandas a History.
 
-    An incomplete last row, as a killed run leaves it, is skipped. Units are in `table.attrs["units"]` of a DataFrame and
-    in `table.units` of a History.
+    An incomplete last row, as a killed run leaves it, is skipped. Units are in `table.attrs["units"]`.
     """
     path = pathlib.Path(path)
     if path.is_dir():
@@ -45,5 +44,5 @@ def table_of(names, units, values):
         table.attrs["units"] = by_name
         return table
     table = History(zip(names, values.T))
-    table.units = by_name
+    table.attrs = {"units": by_name}
     return table

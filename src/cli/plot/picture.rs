@@ -20,10 +20,10 @@ const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 /// Percentiles between which the automatic range lies where outliers would hide the rest.
 const PERCENTILES: [f64; 2] = [0.5, 99.5];
 
-/// The range of all values over that of the percentiles from which the latter is used.
+/// If the full range exceeds the percentile range by this factor, the percentile range is shown.
 const OUTLIERS: f64 = 4.0;
 
-/// Distance from the first and last output, as a share of the interval there, at which a time is still theirs.
+/// A time this share of an interval before the first or after the last output still selects it.
 const TIME_REACH: f64 = 0.5;
 
 /// Fields that are drawn unless one is named, the most wanted first.

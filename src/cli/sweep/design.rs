@@ -225,7 +225,7 @@ impl Design {
         Ok(Some(axis))
     }
 
-    /// Rows that differ in one axis, or with `zip` all rows: name of the group and rows in their order.
+    /// Groups of rows that differ in one axis only; with `zip`, one group of all rows. Each has a name, and rows in order.
     pub fn groups(&self, abscissa: usize) -> Vec<(String, Vec<usize>)> {
         if self.zip {
             return vec![(String::new(), (0..self.rows.len()).collect())];

@@ -35,9 +35,9 @@ Examples:
 
 A value with commas, such as [1, 2] or max(a, b), is one value.
 
-With a reference, the error of a value f is (f - reference)/|reference|, and its rate p over a parameter h
-that of |f - reference| ~ h^p from two successive runs. Without one, the rate is that of f - f0 ~ h^p from
-three runs, with any f0.
+With a reference, the error of a value f is (f - reference)/|reference|, and its rate p over a
+parameter h is that of |f - reference| ~ h^p, from each run and the one before it. Without one, the
+rate is that of f - f0 ~ h^p from three successive runs, where f0 is unknown.
 
 Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 stopped by a signal; the same
 command continues.")]
@@ -166,6 +166,8 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
         );
     }
     let (mut failed, mut ended) = (Vec::new(), 0);
+    // A wrong column shows in the first history; the other runs are of use all the same.
+    let mut unread = None;
     let stopped = program.run_all(&runs, &due, |number, state, seconds| {
         let run = &runs[number];
         ended += 1;
@@ -179,7 +181,9 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
                         due.len()
                     );
                 }
-                table.read(number, &run.folder)?;
+                if let Err(error) = table.read(number, &run.folder) {
+                    unread.get_or_insert(error);
+                }
             }
             State::Failed(how) => {
                 errln!("{}: {how}: {}", run.label, run.last_words());
@@ -188,6 +192,9 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
         }
         Ok(())
     })?;
+    if let Some(error) = unread {
+        return Err(error);
+    }
     table.write(&folder, prints)?;
     if stopped {
         let message = "the sweep was stopped by a signal; the same command continues it";

@@ -48,7 +48,7 @@ pub struct Rigid {
     pub restitution: Option<Number>,
 }
 
-/// All that lies behind a plane, in the plane behind a line.
+/// The half space behind a plane; in plane problems, behind a line.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {

@@ -48,7 +48,7 @@ pub use state::ContactState;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// Steps in which what approaches counts as touching already: it is seen one step before a step too long is made.
+/// Steps ahead: pairs that will touch within so many steps count as touching, so the step is shortened in time.
 const LOOK_AHEAD: f64 = 2.0;
 
 /// Contact on one rank.
@@ -87,7 +87,7 @@ pub struct Contact<const D: usize> {
 pub struct Occasion {
     /// In a relaxation nothing has a velocity, and what touches adds to the fictitious density.
     pub is_relaxing: bool,
-    /// The end of a step, or of a load step that has come to its equilibrium, if it is one.
+    /// Set at the end of a step, or when a load step has reached equilibrium.
     pub end: Option<StepEnd>,
 }
 

@@ -84,7 +84,7 @@ impl Rows {
         }
     }
 
-    /// Takes note that no bond joins an owned point to any of its row.
+    /// Note that an owned point has no bond to any point of its row.
     pub fn set_unbonded(&mut self, point: usize) {
         self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
     }

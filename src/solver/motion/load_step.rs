@@ -240,7 +240,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// How forces follow from the present place without a change of the state: during a load step from the history that
+    /// How to evaluate forces at the present positions without changing the state: during a load step with the history that
     /// bonds would have if this were its equilibrium.
     pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
         if self.load_step.is_settled {

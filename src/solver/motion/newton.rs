@@ -47,7 +47,7 @@ const MOST_GRADIENTS: u64 = 500;
 /// Most places that are looked at along a direction.
 const MOST_PLACES: usize = 8;
 
-/// A place along a direction is good where its power x·f is at most this share of the one at its begin.
+/// The search along a direction ends where |x·f| is at most this share of its initial value.
 const POWER_LEFT: f64 = 0.9;
 
 /// η of the first iteration of a run, and the largest η.
