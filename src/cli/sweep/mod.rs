@@ -166,8 +166,6 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
         );
     }
     let (mut failed, mut ended) = (Vec::new(), 0);
-    // A wrong column shows in the first history; the other runs are of use all the same.
-    let mut unread = None;
     let stopped = program.run_all(&runs, &due, |number, state, seconds| {
         let run = &runs[number];
         ended += 1;
@@ -181,9 +179,7 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
                         due.len()
                     );
                 }
-                if let Err(error) = table.read(number, &run.folder) {
-                    unread.get_or_insert(error);
-                }
+                table.read(number, &run.folder)?;
             }
             State::Failed(how) => {
                 errln!("{}: {how}: {}", run.label, run.last_words());
@@ -192,9 +188,6 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
         }
         Ok(())
     })?;
-    if let Some(error) = unread {
-        return Err(error);
-    }
     table.write(&folder, prints)?;
     if stopped {
         let message = "the sweep was stopped by a signal; the same command continues it";
