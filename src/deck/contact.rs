@@ -106,11 +106,7 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
                        regions from the start, or remove [contact] and [rigid]";
         return Err(scope.error(trigger.span(), message));
     }
-    let of_time = ("[time]", &deck.time.get_ref().method);
-    let of_stages = deck.stage.iter();
-    let of_stages =
-        of_stages.filter_map(|stage| Some(("[[stage]]", stage.get_ref().method.as_ref()?)));
-    for (section, method) in std::iter::once(of_time).chain(of_stages) {
+    for (section, method) in methods(deck) {
         if *method.get_ref() == grammar::Method::Static {
             let message = format!(
                 "{section} method: \"static\" is not available with contact; use \"relaxation\" or \"explicit\", or remove [contact] and [rigid]"
@@ -121,12 +117,26 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
     Ok(())
 }
 
+/// The method of each stage, and the section that gives it.
+fn methods(deck: &Deck) -> Vec<(&'static str, &Spanned<grammar::Method>)> {
+    let of_time = ("[time]", &deck.time.get_ref().method);
+    if deck.stage.is_empty() {
+        return vec![of_time];
+    }
+    let each = deck
+        .stage
+        .iter()
+        .map(|stage| match &stage.get_ref().method {
+            Some(method) => ("[[stage]]", method),
+            None => of_time,
+        });
+    each.collect()
+}
+
 /// Whether any stage of a run is a relaxation.
 pub(super) fn relaxes(deck: &Deck) -> bool {
-    let of_stages = deck.stage.iter();
-    let of_stages = of_stages.filter_map(|stage| stage.get_ref().method.as_ref());
-    let mut all = std::iter::once(&deck.time.get_ref().method).chain(of_stages);
-    all.any(|method| *method.get_ref() == grammar::Method::Relaxation)
+    let mut all = methods(deck).into_iter();
+    all.any(|(_, method)| *method.get_ref() == grammar::Method::Relaxation)
 }
 
 /// Validates a rule of a run that may have relaxations; `None` where there is no contact.

@@ -20,8 +20,12 @@ use crate::lanes::{LaneTuple, Lanes, Simd};
 /// Smallest eigenvalue of H: bodies of two or three points across would have bonds that push when they are pulled.
 const SMALLEST: f64 = 0.2;
 
-/// Share of the largest singular value below which a component of H is left at its smallest norm.
-const RANK: f64 = 1e-10;
+/// Largest eigenvalue of H: points with few neighbours, nearly in one plane, would have bonds of any stiffness.
+const LARGEST: f64 = 30.0;
+
+/// Share of the largest singular value below which a component of H is left at its smallest norm: 0.23 at a corner of a
+/// block, 0.1 in a strip of two points, below 1e-4 in a strip of one that is not quite straight.
+const RANK: f64 = 1e-2;
 
 /// Number of monomials of degree 6 in three variables.
 const MONOMIALS: usize = 28;
@@ -137,25 +141,28 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     tensor
 }
 
-/// With eigenvalues of at least [`SMALLEST`].
+/// With eigenvalues from [`SMALLEST`] to [`LARGEST`].
 fn limited<const D: usize>(tensor: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let whole = DMatrix::from_fn(D, D, |a, b| tensor[(a, b)]);
     let SymmetricEigen {
         eigenvectors,
         eigenvalues,
     } = SymmetricEigen::new(whole);
-    if eigenvalues.iter().all(|value| *value >= SMALLEST) {
+    let range = SMALLEST..=LARGEST;
+    if eigenvalues.iter().all(|value| range.contains(value)) {
         return tensor;
     }
     SMatrix::from_fn(|a, b| {
         let each = eigenvalues.iter().enumerate();
-        each.map(|(k, value)| eigenvectors[(a, k)] * value.max(SMALLEST) * eigenvectors[(b, k)])
-            .sum()
+        each.map(|(k, value)| {
+            eigenvectors[(a, k)] * value.clamp(SMALLEST, LARGEST) * eigenvectors[(b, k)]
+        })
+        .sum()
     })
 }
 
 impl<const D: usize> Law<D> for TensorPmb {
-    /// ½ c H, N/m⁶.
+    /// ½ H.
     type Point = Symmetric<D>;
     type BondHistory = [Lanes; 0];
     /// Σ |ξ| Ṽ times the monomials of degree 6 of n, m⁴.
@@ -184,33 +191,34 @@ impl<const D: usize> Law<D> for TensorPmb {
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
         let tensor = fit::<D>(sums, self.micromodulus, self.shear_modulus);
-        let micromoduli = limited(tensor) * (0.5 * self.micromodulus);
-        to_entries(&micromoduli, numbers);
+        to_entries(&(limited(tensor) * 0.5), numbers);
     }
 
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
-        Along(bond.extension_over_deformed * (bond.inverse * along(bond, end)))
+        let micromodulus = along(bond, end) * self.micromodulus;
+        Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
     }
 
     #[inline(always)]
     fn bond_force<S: Simd>(
         _: S,
-        _: &[Self; 2],
+        laws: &[Self; 2],
         bond: &Bond<D>,
         [i, j]: [&Symmetric<D>; 2],
         _: &[[Lanes; 0]; 2],
         weights: Weights,
     ) -> Along {
-        let diagonal = LaneTuple::each(|d| weights.sum(i.0[d], j.0[d]));
-        let others = LaneTuple::each(|d| weights.sum(i.1[d], j.1[d]));
+        let [c_i, c_j] = [laws[0].micromodulus, laws[1].micromodulus];
+        let diagonal = LaneTuple::each(|d| weights.sum(i.0[d] * c_i, j.0[d] * c_j));
+        let others = LaneTuple::each(|d| weights.sum(i.1[d] * c_i, j.1[d] * c_j));
         let micromodulus = along(bond, &(diagonal, others));
         Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
     }
 
     #[inline(always)]
     fn bond_energy(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Lanes {
-        bond.stretch * bond.stretch * bond.length * along(bond, end) * 0.5
+        bond.stretch * bond.stretch * bond.length * along(bond, end) * (0.5 * self.micromodulus)
     }
 
     /// With the largest sum over a row of H, which no eigenvalue exceeds.
@@ -224,7 +232,7 @@ impl<const D: usize> Law<D> for TensorPmb {
         let largest = rows
             .iter()
             .fold(Lanes::splat(0.0), |most, row| most.max(*row));
-        largest / length
+        largest * self.micromodulus / length
     }
 
     #[inline(always)]
@@ -237,8 +245,59 @@ impl<const D: usize> Law<D> for TensorPmb {
         if !self.is_scaled || !other.is_scaled {
             return Lanes::splat(1.0);
         }
-        let micromodulus = along(bond, here) + along(bond, there);
+        let micromodulus =
+            along(bond, here) * self.micromodulus + along(bond, there) * other.micromodulus;
         let whole = 0.5 * (self.micromodulus + other.micromodulus);
         (Lanes::splat(whole) / micromodulus).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// H of a point with neighbours at these offsets, all of the same volume, and a micromodulus that is right for a disc.
+    fn tensor(offsets: &[[f64; 2]]) -> SMatrix<f64, 2, 2> {
+        let mut sums = [0.0; MONOMIALS];
+        for [x, y] in offsets {
+            let length = x.hypot(*y);
+            for (sum, [a, b, c]) in sums.iter_mut().zip(exponents(6)) {
+                if c == 0 {
+                    let power = |value: f64, n: usize| (value / length).powi(n as i32);
+                    *sum += length * power(*x, a) * power(*y, b);
+                }
+            }
+        }
+        limited(fit::<2>(&sums, 1.0, 5.0))
+    }
+
+    #[test]
+    fn it_turns_with_the_family() {
+        let half: Vec<[f64; 2]> = (-3..=3)
+            .flat_map(|a| (0..=3).map(move |b| [f64::from(a), f64::from(b)]))
+            .filter(|[a, b]| a.hypot(*b) < 3.1 && (*a, *b) != (0.0, 0.0))
+            .collect();
+        let (sin, cos) = 0.7_f64.sin_cos();
+        let turned: Vec<[f64; 2]> = (half.iter())
+            .map(|[x, y]| [cos * x - sin * y, sin * x + cos * y])
+            .collect();
+        let turn = nalgebra::Matrix2::new(cos, -sin, sin, cos);
+        let wanted = turn * tensor(&half) * turn.transpose();
+        assert!((tensor(&turned) - wanted).norm() < 1e-9 * wanted.norm());
+        // Stiffer across the surface than along it.
+        let of_half = tensor(&half);
+        assert!(of_half[(1, 1)] > of_half[(0, 0)], "{of_half}");
+    }
+
+    #[test]
+    fn nearly_straight_families_have_no_huge_micromoduli() {
+        for height in [0.0, 1e-6, 1e-3, 0.03, 0.1] {
+            let offsets: Vec<[f64; 2]> = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]
+                .map(|x: f64| [x + 0.3 * height, height * libm::sin(5.0 * x)])
+                .to_vec();
+            let values = tensor(&offsets).symmetric_eigenvalues();
+            let is_bounded = values.iter().all(|value| (0.0..=LARGEST).contains(value));
+            assert!(is_bounded, "{height}: {values}");
+        }
     }
 }

@@ -110,7 +110,9 @@ impl Law {
                 (|law| law.breaks_by_energy, "by their energy")
             }
         };
-        if damage.weibull.is_some() && (self.declaration.scales_thresholds)(&self.values) {
+        let is_given = matches!(damage.toughness, super::Toughness::CriticalStretch(_));
+        let scales = !is_given && (self.declaration.scales_thresholds)(&self.values);
+        if damage.weibull.is_some() && scales {
             return Some(format!(
                 "`weibull_modulus` is not available for `{}`, which scales the critical stretch of each bond itself",
                 self.declaration.name

@@ -282,13 +282,26 @@ fn criterion(
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
     let of_blocks = ends.map(|block| problem.block(block).horizon);
-    let conversion = horizons
-        .iter()
-        .any(|horizon| of_blocks.iter().any(|of_block| of_block != horizon))
-        .then(|| StretchConversion {
-            ratios: horizons.map(|horizon| of_blocks.map(|of_block| (of_block / horizon).sqrt())),
-            stiffness,
-        });
+    // A critical stretch that is given holds for bonds of any horizon.
+    let is_given = ends.map(|block| {
+        let damage = problem.block(block).body.damage.as_ref();
+        damage.is_some_and(|damage| matches!(damage.toughness, Toughness::CriticalStretch(_)))
+    });
+    let ratios_of_stretches = horizons.map(|horizon| {
+        std::array::from_fn(|k| {
+            if is_given[k] {
+                1.0
+            } else {
+                (of_blocks[k] / horizon).sqrt()
+            }
+        })
+    });
+    let all_ratios: [[f64; 2]; 2] = ratios_of_stretches;
+    let converts = all_ratios.iter().flatten().any(|ratio| *ratio != 1.0);
+    let conversion = converts.then_some(StretchConversion {
+        ratios: all_ratios,
+        stiffness,
+    });
     match (rules.reduce(WorkRule::of_both), per_point) {
         (Some(rule), true) => Criterion::WorkThresholds(ratios, rule),
         (Some(rule), false) => {

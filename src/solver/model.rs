@@ -40,6 +40,11 @@ pub struct Expansion {
 }
 
 impl Expansion {
+    /// Free stretch at a temperature.
+    pub fn stretch_at(self, temperature: f64) -> f64 {
+        self.stretch_per_kelvin * (temperature - self.reference_temperature)
+    }
+
     fn of(material: &Material, dimension: Dimension) -> Self {
         let (expansion, ratio) = (material.expansion, material.elastic.poisson_ratio);
         Self {

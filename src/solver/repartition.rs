@@ -56,7 +56,9 @@ impl BalanceWatch {
         let Some(rule) = self.rule else {
             return Ok(None);
         };
-        if !stepper.clock().number().is_multiple_of(rule.every_steps) {
+        let is_due = stepper.clock().number().is_multiple_of(rule.every_steps);
+        // Iterations of a load step have its number.
+        if !is_due || !stepper.load_step().is_settled {
             return Ok(None);
         }
         let now = stepper.times().forces.bonds;

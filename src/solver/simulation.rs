@@ -14,7 +14,7 @@ use crate::{families, points};
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
 use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
-use super::contact::{Contact, Occasion, StepEnd};
+use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
 use super::motion::adaptive::StepControl;
@@ -400,7 +400,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// As [`Self::evaluate`], after [`Part::write_bond_inputs`] of all parts of the points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
-        let is_relaxing = self.is_quasi_static();
+        let is_quasi_static = self.is_quasi_static();
         let fields = &mut self.fields;
         let acting = Acting {
             displacement: &mut fields.displacement,
@@ -429,8 +429,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
                 }),
                 BondUpdate::None | BondUpdate::Trial(_) => None,
             };
-            let occasion = Occasion { is_relaxing, end };
-            contact.add_forces(self.comm, &self.model, &self.forces, fields, occasion);
+            let evaluation = ContactEvaluation {
+                is_quasi_static,
+                end,
+            };
+            contact.add_forces(self.comm, &self.model, &self.forces, fields, evaluation);
             self.times.contact += start.elapsed();
         }
     }
@@ -581,7 +584,10 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
 /// Whether bonds may break in the place where the points begin.
 fn starts_deformed(problem: &Problem) -> bool {
     let displaced = |initial: &Initial| initial.displacement.is_some();
-    let placed = |condition: &Condition| matches!(condition.action, Action::Displacement(_));
+    let placed = |condition: &Condition| {
+        let action = &condition.action;
+        matches!(action, Action::Displacement(_) | Action::Temperature(_))
+    };
     problem.bodies.iter().any(|body| body.damage.is_some())
         && (problem.initials.iter().any(displaced) || problem.conditions.iter().any(placed))
 }

@@ -112,7 +112,18 @@ fn without_effect<const D: usize>(
             Action::Force(values) => (0..D)
                 .filter(|d| values[*d].as_constant() != Some(0.0))
                 .collect(),
-            Action::Displacement(_) | Action::Velocity(_) | Action::Temperature(_) => continue,
+            Action::Temperature(_) => {
+                let expands = |point: &u32| {
+                    let expansion = simulation.model.expansion_of(*point as usize);
+                    expansion.stretch_per_kelvin != 0.0
+                };
+                if !own.iter().any(expands) {
+                    let words = "acts on bodies without `thermal_expansion`, so it does nothing";
+                    warn(condition, words, warnings);
+                }
+                continue;
+            }
+            Action::Displacement(_) | Action::Velocity(_) => continue,
         };
         if acts.is_empty() {
             warn(condition, "is 0, so it does nothing", warnings);

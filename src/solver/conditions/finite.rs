@@ -68,6 +68,7 @@ pub fn are_finite<const D: usize>(
             Action::Temperature(value) => {
                 let values = std::iter::once((Some(value), 1.0));
                 looker.look(&key, &["is"], place, set, values)?;
+                looker.look_at_stretches(&key, place, set, value)?;
             }
         }
     }
@@ -83,6 +84,44 @@ struct FiniteCheck<'a, const D: usize> {
 }
 
 impl<const D: usize> FiniteCheck<'_, D> {
+    /// An error if points of a set have no length left at a temperature.
+    fn look_at_stretches(
+        &self,
+        key: &str,
+        place: &Range<usize>,
+        set: usize,
+        temperature: &Expression,
+    ) -> Result<()> {
+        let stretch = |point: &usize| {
+            let value = temperature.evaluate(self.model.position(*point), self.time);
+            self.model.expansion_of(*point).stretch_at(value)
+        };
+        let members = members(self.problem, self.model, set);
+        let members = members.into_iter().map(|point| point as usize);
+        let wrong = members.filter(|point| stretch(point) <= -1.0);
+        let own = wrong.min_by_key(|point| self.model.ids[*point]);
+        let own = own.map(|point| Found {
+            key: 0.0,
+            ids: [self.model.ids[point]],
+            payload: [stretch(&point)],
+        });
+        let Some(Found {
+            ids: [id],
+            payload: [stretch],
+            ..
+        }) = least(self.comm, own)
+        else {
+            return Ok(());
+        };
+        let message = format!(
+            "{key}: the thermal stretch is {} at t = {} s at point {id}, and must be above -1; `thermal_expansion` is by \
+             one unit of temperature, such as 1e-5",
+            format_number(stretch),
+            format_number(self.time),
+        );
+        Err(Error::input(message).at(place))
+    }
+
     /// An error if a component, times its factor, is not finite at a point of a set. `names` begin the message for each.
     fn look<'e>(
         &self,

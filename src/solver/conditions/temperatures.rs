@@ -78,8 +78,9 @@ impl Temperatures {
             }
         }
         for (k, (stretch, value)) in stretch.iter_mut().zip(temperature.iter()).enumerate() {
-            let expansion = model.expansion_of(first + k);
-            *stretch = expansion.stretch_per_kelvin * (value - expansion.reference_temperature);
+            let free = model.expansion_of(first + k).stretch_at(*value);
+            // Without a length there is no bond: the run ends, and says why.
+            *stretch = if free > -1.0 { free } else { f64::NAN };
         }
     }
 }

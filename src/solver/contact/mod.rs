@@ -84,9 +84,9 @@ pub struct Contact<const D: usize> {
 
 /// When forces of contact are evaluated.
 #[derive(Debug, Clone, Copy)]
-pub struct Occasion {
+pub struct ContactEvaluation {
     /// In a relaxation nothing has a velocity, and what touches adds to the fictitious density.
-    pub is_relaxing: bool,
+    pub is_quasi_static: bool,
     /// Set at the end of a step, or when a load step has reached equilibrium.
     pub end: Option<StepEnd>,
 }
@@ -225,7 +225,10 @@ impl<const D: usize> Contact<D> {
         model: &Model<D>,
         forces: &Forces<D>,
         fields: &mut Fields<D>,
-        Occasion { is_relaxing, end }: Occasion,
+        ContactEvaluation {
+            is_quasi_static,
+            end,
+        }: ContactEvaluation,
     ) {
         if self.largest > 0.0 {
             let is_finite = self.search_where_due(comm, model, forces, fields);
@@ -236,7 +239,7 @@ impl<const D: usize> Contact<D> {
             self.ghosts.update(comm, fields);
         }
         let look_ahead = match end {
-            Some(end) if !is_relaxing => LOOK_AHEAD * end.next,
+            Some(end) if !is_quasi_static => LOOK_AHEAD * end.next,
             _ => 0.0,
         };
         let mut active = std::mem::take(&mut self.active);
@@ -267,7 +270,7 @@ impl<const D: usize> Contact<D> {
             } else {
                 fields.clear_contact(point);
             }
-            if is_relaxing {
+            if is_quasi_static {
                 let square = sum.of_rigid.iter().map(|component| component * component);
                 self.rigid_forces.add(square.sum());
                 if let Some(density) = &mut fields.contact_density {

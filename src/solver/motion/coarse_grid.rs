@@ -58,17 +58,17 @@ pub struct CoarseGrid<const D: usize> {
     values: Vec<f64>,
 }
 
-/// What a point is to the grid.
+/// Contribution of a point to the stiffness of the grid.
 #[derive(Debug, Clone, Copy)]
-pub struct Share<const D: usize> {
+pub struct PointStiffness<const D: usize> {
     /// λ V and G V, N m.
     pub moduli: [f64; 2],
     /// Stiffness of its supported components, N/m; 0 for those that are free.
     pub springs: [f64; D],
 }
 
-/// Where a point is.
-struct Place<const D: usize> {
+/// Cell of a point and its coordinates there.
+struct CellPosition<const D: usize> {
     cell: usize,
     /// The first node of the cell.
     node: usize,
@@ -122,12 +122,12 @@ impl<const D: usize> CoarseGrid<D> {
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
-        share: impl Fn(usize) -> Share<D>,
+        share: impl Fn(usize) -> PointStiffness<D>,
     ) {
         let owned = model.owned();
         let mut largest = [0.0_f64; 2];
         for point in 0..owned {
-            let Share { moduli, springs } = share(point);
+            let PointStiffness { moduli, springs } = share(point);
             let most = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             largest = [
                 largest[0].max(most(&moduli)),
@@ -140,7 +140,7 @@ impl<const D: usize> CoarseGrid<D> {
         let width = 2 + D * PAIRS;
         let mut words = vec![0_u64; cells * width];
         for point in 0..owned {
-            let Share { moduli, springs } = share(point);
+            let PointStiffness { moduli, springs } = share(point);
             let place = self.place(model, point);
             let own = &mut words[place.cell * width..][..width];
             let mut add = |index: usize, unit: Option<Unit>, value: f64| {
@@ -242,8 +242,8 @@ impl<const D: usize> CoarseGrid<D> {
     }
 
     /// The place of an owned point.
-    fn place(&self, model: &Model<D>, point: usize) -> Place<D> {
-        let mut place = Place {
+    fn place(&self, model: &Model<D>, point: usize) -> CellPosition<D> {
+        let mut place = CellPosition {
             cell: 0,
             node: 0,
             along: [0.0; D],
@@ -276,7 +276,7 @@ impl<const D: usize> CoarseGrid<D> {
         let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
         let share = 1.0 / f64::from(1_u32 << D);
         for number in 0..1_usize << D {
-            let at = Place::<D> {
+            let at = CellPosition::<D> {
                 cell: 0,
                 node: 0,
                 along: std::array::from_fn(|d| gauss[number >> d & 1]),
@@ -301,7 +301,7 @@ impl<const D: usize> CoarseGrid<D> {
     }
 }
 
-impl<const D: usize> Place<D> {
+impl<const D: usize> CellPosition<D> {
     /// The weight of a node of the cell.
     fn weight(&self, corner: usize) -> f64 {
         let along = self.along.iter().enumerate();
@@ -395,7 +395,7 @@ mod tests {
             let parts = threads::run(ranks, |comm| {
                 let (model, own) = bar(comm.rank(), comm.size());
                 let mut grid = CoarseGrid::new(comm, &model, 4.0);
-                grid.assemble(comm, &model, |point| Share {
+                grid.assemble(comm, &model, |point| PointStiffness {
                     moduli: [0.0, 0.5 * modulus],
                     springs: [if own[point] == 0 { spring } else { 0.0 }],
                 });

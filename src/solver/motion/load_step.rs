@@ -315,6 +315,8 @@ impl<const D: usize> Simulation<'_, D> {
             format!(
                 "are still {residual:.1e} of loads and reactions{worst}. More load than the body bears?"
             )
+        } else if residual.is_nan() {
+            "are not finite.".to_owned()
         } else {
             "are more than round-off, without loads and reactions.".to_owned()
         };

@@ -34,7 +34,7 @@ use crate::elastic::Isotropic;
 use crate::problem::Static;
 use crate::solver::Simulation;
 
-use super::coarse_grid::{CoarseGrid, Share};
+use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
 use super::load_step::{CHUNK, sums};
 
@@ -42,20 +42,20 @@ use super::load_step::{CHUNK, sums};
 const SHIFT: f64 = 1e-6;
 
 /// Most conjugate gradients of an iteration.
-const MOST_GRADIENTS: u64 = 500;
+const MAX_CG_ITERATIONS: u64 = 500;
 
-/// Most places that are looked at along a direction.
-const MOST_PLACES: usize = 8;
+/// Most step lengths that are tried along a direction.
+const MAX_LINE_SEARCH_STEPS: usize = 8;
 
 /// The search along a direction ends where |x·f| is at most this share of its initial value.
-const POWER_LEFT: f64 = 0.9;
+const LINE_SEARCH_TOLERANCE: f64 = 0.9;
 
 /// η of the first iteration of a run, and the largest η.
 const FIRST_FORCING: f64 = 0.01;
 const MOST_FORCING: f64 = 0.1;
 
 /// Share of the tolerance to which the linear problem is solved at most.
-const OF_TOLERANCE: f64 = 0.5;
+const LINEAR_TOLERANCE_SHARE: f64 = 0.5;
 
 /// The least share of intact bonds that counts in the diagonal.
 const LEAST_INTACT: f64 = 1e-3;
@@ -151,7 +151,7 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
         } else if simulation.load_step.residual.is_nan()
             || simulation.load_step.since_breaking >= rule.max_iterations
         {
-            vectors.halve_or_fail(simulation, &rule);
+            vectors.bisect_or_fail(simulation, &rule);
         }
         let forces = simulation.times.forces.whole() - forces;
         simulation.times.motion += start.elapsed().saturating_sub(forces);
@@ -282,10 +282,10 @@ impl<const D: usize> Vectors<D> {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
         let wanted = simulation.newton.forcing * first;
-        let wanted = wanted.max(OF_TOLERANCE * allowed);
+        let wanted = wanted.max(LINEAR_TOLERANCE_SHARE * allowed);
         // Power of the residual along the last direction, and the length of the step along it.
         let (mut power, mut length) = (f64::NAN, 0.0);
-        for number in 0..MOST_GRADIENTS {
+        for number in 0..MAX_CG_ITERATIONS {
             if linear.last.is_nan() || linear.last <= wanted {
                 break;
             }
@@ -388,9 +388,9 @@ impl<const D: usize> Vectors<D> {
             simulation.evaluate_at_rest();
             let force = simulation.find_residual();
             let power = self.power(simulation);
-            let is_good = power.abs() <= POWER_LEFT * at_base
+            let is_good = power.abs() <= LINE_SEARCH_TOLERANCE * at_base
                 || simulation.load_step.residual <= rule.tolerance;
-            if is_good || place == MOST_PLACES || at_base <= 0.0 {
+            if is_good || place == MAX_LINE_SEARCH_STEPS || at_base <= 0.0 {
                 return force;
             }
             if power.is_nan() {
@@ -471,7 +471,7 @@ impl<const D: usize> Vectors<D> {
         self.coarse.assemble(simulation.comm, model, |point| {
             let weight = model.volume[point] * intact[point];
             let stiffness = density[point] * diagonal * weight;
-            Share {
+            PointStiffness {
                 moduli: moduli[usize::from(model.block[point])].map(|modulus| weight * modulus),
                 springs: std::array::from_fn(|d| {
                     if is_free[d][point] == 1.0 || !stiffness.is_finite() {
@@ -522,7 +522,7 @@ impl<const D: usize> Vectors<D> {
     }
 
     /// Repeat the load step with half its size, or let it fail. Collective.
-    fn halve_or_fail(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
+    fn bisect_or_fail(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let can_be_halved = !simulation.load_step.has_broken
             && simulation.newton.halvings < rule.max_halvings
             && simulation.check_pieces_are_held("").is_ok();

@@ -68,15 +68,23 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
         );
         return Err(Error::input(message).at(&body.span));
     }
-    let is_load = |action: &Action| matches!(action, Action::BodyForce(..) | Action::Force(_));
+    let by_new_points = |action: &Action| match action {
+        Action::BodyForce(..) | Action::Force(_) => Some("a load"),
+        Action::Temperature(_) => Some("a temperature"),
+        Action::Displacement(_) | Action::Velocity(_) => None,
+    };
     let is_by_ids = |set: usize| {
         let selector = &problem.sets[set].selector;
         matches!(selector, Selector::Ids { .. } | Selector::Mesh(_))
     };
     let mut conditions = problem.conditions.iter();
-    if let Some(condition) = conditions.find(|c| is_load(&c.action) && is_by_ids(c.set)) {
+    let found = conditions.find_map(|condition| {
+        let what = by_new_points(&condition.action)?;
+        is_by_ids(condition.set).then_some((condition, what))
+    });
+    if let Some((condition, what)) = found {
         let message = format!(
-            "[condition.{}] set: a load on points given by their ids cannot follow a refined grid; give \
+            "[condition.{}] set: {what} on points given by their ids cannot follow a refined grid; give \
              the set by `where`",
             condition.name
         );
