@@ -68,6 +68,17 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
         );
         Error::input(message)
     };
+    let is_source = match (arguments.deck.canonicalize(), target.canonicalize()) {
+        (Ok(deck), Ok(target)) => deck == target,
+        _ => false,
+    };
+    if is_source {
+        let message = format!(
+            "{} is the deck to import; choose another name with --output",
+            target.display()
+        );
+        return Err(Error::input(message));
+    }
     if target.exists() && !arguments.overwrite {
         return Err(exists());
     }
@@ -104,6 +115,10 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
             None => outln!("next: fissure check {name}, then fissure run {name}"),
             Some(_) => outln!("next: correct {name}"),
         }
+    }
+    let losses = imported.losses();
+    if !losses.is_empty() {
+        errln!("warning: {losses}");
     }
     if let Some(fault) = &imported.fault {
         errln!("warning: the new deck is not valid yet: {fault}");

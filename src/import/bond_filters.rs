@@ -5,6 +5,9 @@ use super::translation::Translation;
 use super::tree::Node;
 use crate::error::Result;
 
+/// Smallest cosine between a bottom edge and the normal at which they are not perpendicular.
+const SLANT: f64 = 1e-9;
+
 /// Write the pre-cracks of a table of bond filters.
 ///
 /// # Errors
@@ -83,14 +86,32 @@ fn plane(translation: &mut Translation, name: &str, filter: &Node, kind: &Node) 
     let header = format!("[crack.{written}.{shape}]");
     let normal = unit(vector(translation, filter, "Normal", &header)?);
     let corner = vector(translation, filter, "Lower Left Corner", &header)?;
-    let bottom = unit(vector(translation, filter, "Bottom Unit Vector", &header)?);
+    let given = unit(vector(translation, filter, "Bottom Unit Vector", &header)?);
     let bottom_length = length(translation, filter, "Bottom Length", &header)?;
-    let edge = scaled(bottom, bottom_length);
+    // Intersections are compared along the given vector and its cross product with the normal: where the vector leaves
+    // the plane, both extents are longer by 1 over its part in the plane.
+    let along: f64 = given.iter().zip(&normal).map(|(g, n)| g * n).sum();
+    let (mut bottom, mut stretch) = (given, 1.0);
+    if along.abs() > SLANT {
+        let part: [f64; 3] = std::array::from_fn(|k| given[k] - along * normal[k]);
+        let share = (1.0 - along * along).max(0.0).sqrt();
+        if share <= SLANT {
+            let note = "the bottom unit vector is parallel to the normal";
+            translation.log.left_out(filter, note);
+            return Ok(());
+        }
+        bottom = unit(part);
+        stretch = 1.0 / share;
+        let note = "the part of the bottom unit vector along the normal is removed, and both lengths grow by 1 over \
+                    what remains of it";
+        translation.log.approximated(kind, note);
+    }
+    let edge = scaled(bottom, stretch * bottom_length);
     translation.log.taken(kind, &header);
     let mut section = Section::new(format!("crack.{written}.{shape}"));
     if translation.dimension == 3 {
         let side_length = length(translation, filter, "Side Length", &header)?;
-        let side = scaled(cross(bottom, normal), side_length);
+        let side = scaled(cross(bottom, normal), stretch * side_length);
         section
             .set("corner", Value::numbers(&corner))
             .set("edge_a", Value::numbers(&edge))

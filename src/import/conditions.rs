@@ -7,7 +7,7 @@ use super::tree::Node;
 use crate::error::{Result, excerpt};
 
 /// What a condition prescribes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Quantity {
     /// Initial displacement or velocity: the key of `[initial.NAME]`.
     Initial(&'static str),
@@ -17,6 +17,8 @@ pub enum Quantity {
     BodyForce,
     /// Force on each point of the set, N.
     ForceOfPoint,
+    /// Temperature minus another one, which is 0 if not given.
+    Temperature(Option<Value>),
 }
 
 /// An initial value of one component.
@@ -33,8 +35,10 @@ struct Initial {
 #[derive(Default)]
 pub struct Conditions {
     initials: Vec<Initial>,
-    /// Names of the conditions in the new deck, with the number of their step.
-    pub written: Vec<(String, Option<u64>)>,
+    /// Names of the conditions in the new deck, with the numbers of their steps.
+    pub written: Vec<(String, Vec<u64>)>,
+    /// Temperatures are among them.
+    pub has_temperature: bool,
 }
 
 /// A condition as the deck has it.
@@ -45,8 +49,26 @@ pub struct Given<'n> {
     pub node: &'n Node,
     /// What it prescribes.
     pub quantity: Quantity,
-    /// Number of the step in which it acts; in all if not given.
-    pub step: Option<u64>,
+    /// Numbers of the steps in which it acts; in all if there are none.
+    pub steps: Vec<u64>,
+}
+
+/// The coordinate of a condition: its node, its name and its number.
+fn component<'n>(
+    translation: &Translation,
+    node: &'n Node,
+    what: &str,
+) -> Result<(&'n Node, &'static str, usize)> {
+    let coordinate = translation.required(node, "Coordinate", what)?;
+    let word = translation.text(coordinate, "Coordinate")?.to_lowercase();
+    let axes = ["x", "y", "z"];
+    match axes.iter().position(|axis| *axis == word) {
+        Some(index) => Ok((coordinate, axes[index], index)),
+        None => {
+            let message = format!("`Coordinate` must be x, y or z, is {}", excerpt(&word));
+            Err(translation.error(coordinate.line, message))
+        }
+    }
 }
 
 impl Conditions {
@@ -62,16 +84,24 @@ impl Conditions {
     ) -> Result<()> {
         let (name, node) = (given.name, given.node);
         let what = format!("the condition `{name}`");
-        let coordinate = translation.required(node, "Coordinate", &what)?;
-        let word = translation.text(coordinate, "Coordinate")?.to_lowercase();
-        let component = ["x", "y", "z"].iter().position(|axis| *axis == word);
-        let Some(component) = component else {
-            let message = format!("`Coordinate` must be x, y or z, is {}", excerpt(&word));
-            return Err(translation.error(coordinate.line, message));
+        let component = match given.quantity {
+            Quantity::Temperature(_) => None,
+            _ => Some(component(translation, node, &what)?),
         };
-        if component >= translation.dimension {
+        if let Some((_, word, index)) = component
+            && index >= translation.dimension
+        {
+            let value = node
+                .get("Value")
+                .map(|value| translation.number(value, "Value"));
             let note = format!("the problem has no {word}");
-            translation.log.left_out(node, note);
+            if matches!(value, Some(Ok(0.0))) {
+                for (_, key) in node.entries() {
+                    translation.log.taken(key, note.clone());
+                }
+            } else {
+                translation.log.left_out(node, note);
+            }
             return Ok(());
         }
         let value = translation.required(node, "Value", &what)?;
@@ -97,19 +127,34 @@ impl Conditions {
         }
         let set = sets.find(translation, set_node, first)?;
         translation.log.taken(set_node, format!("the set `{set}`"));
-        translation
-            .log
-            .taken(coordinate, format!("component {word}"));
+        if let Some((coordinate, word, _)) = component {
+            translation
+                .log
+                .taken(coordinate, format!("component {word}"));
+        }
+        let component = component.map_or(0, |(.., index)| index);
         let zero = Value::Number("0".to_owned());
         let free = Value::text("free");
-        let (key, vector, factor) = match given.quantity {
+        let (key, vector, factor) = match &given.quantity {
+            Quantity::Temperature(reference) => {
+                let difference = match reference {
+                    None => expression,
+                    Some(reference) => Value::text(format!(
+                        "({}) - ({})",
+                        expression.plain(),
+                        reference.plain()
+                    )),
+                };
+                self.has_temperature = true;
+                ("temperature", difference, None)
+            }
             Quantity::Initial(key) => {
                 translation
                     .log
                     .taken(value, format!("[initial.{set}] {key}"));
                 self.initials.push(Initial {
                     set,
-                    key,
+                    key: *key,
                     component,
                     value: expression,
                     node: value.clone(),
@@ -117,7 +162,7 @@ impl Conditions {
                 return Ok(());
             }
             Quantity::Support(key) => (
-                key,
+                *key,
                 translation.component(component, expression, &free),
                 None,
             ),
@@ -162,7 +207,7 @@ impl Conditions {
                 translation.log.approximated(value, note);
             }
         }
-        self.written.push((written, given.step));
+        self.written.push((written, given.steps.clone()));
         Ok(())
     }
 

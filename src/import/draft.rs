@@ -65,6 +65,14 @@ impl Value {
         }
     }
 
+    /// A number or expression without quotes.
+    pub fn plain(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            other => written(other),
+        }
+    }
+
     /// A list.
     pub fn list(values: impl IntoIterator<Item = Value>) -> Self {
         Self::List(values.into_iter().collect())
@@ -113,6 +121,11 @@ impl Section {
             comments: Vec::new(),
             lines: Vec::new(),
         }
+    }
+
+    /// The header.
+    pub fn header(&self) -> &str {
+        &self.header
     }
 
     /// Add a comment in front.

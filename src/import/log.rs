@@ -61,6 +61,79 @@ impl fmt::Display for Entry {
     }
 }
 
+/// Styles of the fixes of a script that are loads or supports.
+const LOADS_OF_SCRIPTS: [&str; 8] = [
+    "addforce", "aveforce", "efield", "gravity", "indent", "move", "setforce", "spring",
+];
+
+/// Loads, supports and damage models that are left out, by their lines.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Lines of initial values, loads and supports.
+    pub conditions: Vec<usize>,
+    /// Lines of damage models.
+    pub damages: Vec<usize>,
+}
+
+impl Losses {
+    /// Those among the keys of a deck.
+    pub(super) fn of(entries: &[Entry]) -> Self {
+        let mut losses = Self::default();
+        let lost = entries
+            .iter()
+            .filter(|entry| entry.fate == Fate::LeftOut && entry.note != OF_ITS_TABLE);
+        for entry in lost {
+            // A fix of a script: its name, group and style.
+            let style = entry.value.split_whitespace().nth(2).unwrap_or("");
+            if entry.key == "fix" && LOADS_OF_SCRIPTS.contains(&style) {
+                losses.conditions.push(entry.line);
+            }
+            let words: Vec<&str> = entry.key.split(" > ").collect();
+            let below = |table: &str| {
+                let at = words.iter().position(|word| *word == table)?;
+                Some(words.len() - 1 - at)
+            };
+            // A node set among the conditions has a value; a condition is a table.
+            if below("Boundary Conditions") == Some(1) && entry.value.is_empty() {
+                losses.conditions.push(entry.line);
+            }
+            let is_criterion =
+                ["Critical Stretch", "Critical Value"].contains(&words[words.len() - 1]);
+            match below("Damage Models") {
+                Some(1) => losses.damages.push(entry.line),
+                Some(2) if is_criterion => losses.damages.push(entry.line),
+                _ => {}
+            }
+        }
+        losses
+    }
+
+    /// Test whether nothing is lost.
+    pub fn is_empty(&self) -> bool {
+        self.conditions.is_empty() && self.damages.is_empty()
+    }
+}
+
+impl fmt::Display for Losses {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut lines: Vec<usize> = self
+            .conditions
+            .iter()
+            .chain(&self.damages)
+            .copied()
+            .collect();
+        lines.sort_unstable();
+        let lines: Vec<String> = lines.iter().map(usize::to_string).collect();
+        write!(
+            formatter,
+            "{} loads or supports and {} damage models are left out: lines {}",
+            self.conditions.len(),
+            self.damages.len(),
+            lines.join(", ")
+        )
+    }
+}
+
 /// The fates of the nodes of a tree, by their ids.
 #[derive(Debug, Default)]
 pub(super) struct Log {
@@ -153,19 +226,22 @@ impl Log {
                 key: key.to_owned(),
                 value: value(node),
                 fate: Fate::LeftOut,
-                note: "its table is left out".to_owned(),
+                note: OF_ITS_TABLE.to_owned(),
             });
         }
     }
 }
 
+/// The note of a key in a table that is left out as a whole.
+const OF_ITS_TABLE: &str = "its table is left out";
+
 /// Why keys that no translator reads are left out: a word of their keys, and the reason.
 const REASONS: [(&str, &str); 11] = [
     ("verbose", "concerns what the code prints"),
     ("pre calculation", "what a law needs is computed"),
-    ("specific heat", "there are no temperatures"),
-    ("thermal", "there are no temperatures"),
-    ("temperature", "there are no temperatures"),
+    ("specific heat", "heat is not conducted"),
+    ("thermal", "heat is not conducted"),
+    ("temperature", "heat is not conducted"),
     ("additive", "points exist from the start"),
     ("flaw", "a material is the same everywhere"),
     ("fluid", "there are no fluids"),

@@ -31,7 +31,7 @@ use std::path::Path;
 use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
 use expression::Dialect;
-use log::{Entry, Fate};
+use log::{Entry, Fate, Losses};
 use translation::{Translation, line_error};
 use tree::Node;
 
@@ -76,6 +76,11 @@ impl Import {
             .iter()
             .filter(|entry| entry.fate == fate)
             .count()
+    }
+
+    /// Loads, supports and damage models that are left out.
+    pub fn losses(&self) -> Losses {
+        Losses::of(&self.entries)
     }
 }
 

@@ -8,7 +8,7 @@ use super::tree::{Node, is_key};
 use crate::error::Result;
 
 /// Output variables: their names, the field, and how the field differs.
-const FIELDS: [(&str, &str, &str); 32] = [
+const FIELDS: [(&str, &str, &str); 33] = [
     ("Displacement", "displacement", ""),
     ("Displacements", "displacement", ""),
     ("Velocity", "velocity", ""),
@@ -20,6 +20,7 @@ const FIELDS: [(&str, &str, &str); 32] = [
     ("Contact Force Density", "contact_force_density", ""),
     ("Contact Force", "contact_force_density", "times the volume"),
     ("Damage", "damage", ""),
+    ("Temperature", "temperature", ""),
     ("Dilatation", "dilatation", ""),
     ("Weighted Volume", "weighted_volume", ""),
     ("Number Of Neighbors", "neighbours", "without broken bonds"),
@@ -107,13 +108,24 @@ pub enum Interval {
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
-    interval: Option<(Interval, bool)>,
+    /// The interval of each output, its key, and whether the output has fields.
+    intervals: Vec<(Interval, Node, bool)>,
+    /// Materials expand, so points have temperatures.
+    has_temperature: bool,
     /// Names of computed quantities and what became of them.
     computed: Vec<(String, Fate, String)>,
     reactions: Vec<String>,
 }
 
 impl Outputs {
+    /// No outputs; `has_temperature` if points have temperatures.
+    pub fn new(has_temperature: bool) -> Self {
+        Self {
+            has_temperature,
+            ..Self::default()
+        }
+    }
+
     /// Read a table of computed quantities; `label` is the key with the name of a quantity, which else is that of its table.
     ///
     /// # Errors
@@ -250,23 +262,13 @@ impl Outputs {
                 0 => Interval::Steps(count),
                 _ => Interval::Number(count),
             };
-            match self.interval {
-                Some((known, fields)) if known != read && (fields || !has_fields) => {
-                    log.approximated(
-                        interval,
-                        "there is one interval for all fields; the first counts",
-                    );
-                }
-                _ => {
-                    self.interval = Some((read, has_fields));
-                    let note = match (index, text.contains(' ')) {
-                        (_, true) => "[output] every; the first number counts for all steps",
-                        (0, _) => "[output] every_steps",
-                        _ => "[output] every: the length of the run over it",
-                    };
-                    log.taken(interval, note);
-                }
-            }
+            let note = match (index, text.contains(' ')) {
+                (_, true) => "[output] every; the first number counts for all steps",
+                (0, _) => "[output] every_steps",
+                _ => "[output] every: the length of the run over it",
+            };
+            log.taken(interval, note);
+            self.intervals.push((read, interval.clone(), has_fields));
         }
         for (name, setting) in node.entries() {
             let files = [
@@ -289,6 +291,32 @@ impl Outputs {
         Ok(())
     }
 
+    /// The largest interval of the outputs, of those with fields if any has. The others are listed.
+    fn interval(&self, translation: &Translation) -> Option<Interval> {
+        let with_fields = self.intervals.iter().any(|(.., fields)| *fields);
+        let candidates = self.intervals.iter();
+        let mut candidates = candidates.filter(|(.., fields)| *fields || !with_fields);
+        let first = candidates.next()?;
+        let (largest, node, _) = candidates.fold(first, |known, next| match (known.0, next.0) {
+            (Interval::Steps(a), Interval::Steps(b)) if b > a => next,
+            (Interval::Number(a), Interval::Number(b)) if b < a => next,
+            _ => known,
+        });
+        let mut others = Vec::new();
+        for (interval, other, _) in &self.intervals {
+            if interval != largest {
+                let note = "there is one interval for all fields; the largest counts";
+                translation.log.approximated(other, note);
+                others.push(other.text().unwrap_or("").trim());
+            }
+        }
+        if !others.is_empty() {
+            let note = format!("the other outputs have {}", others.join(", "));
+            translation.log.approximated(node, note);
+        }
+        Some(*largest)
+    }
+
     /// Note an output variable; return what becomes of it.
     fn variable(&mut self, name: &str, has_fields: &mut bool) -> (Fate, String) {
         if let Some((_, fate, note)) = self.computed.iter().find(|(label, ..)| is_key(label, name))
@@ -297,6 +325,10 @@ impl Outputs {
         }
         if let Some((_, note)) = ALWAYS.iter().find(|(known, _)| is_key(name, known)) {
             return (Fate::Taken, (*note).to_owned());
+        }
+        if is_key(name, "Temperature") && !self.has_temperature {
+            let note = "no material expands, so points have no temperature";
+            return (Fate::LeftOut, note.to_owned());
         }
         let part = TENSOR_PARTS.iter().find_map(|part| name.strip_suffix(part));
         let tensor = part.map(|name| name.trim_end_matches('_')).unwrap_or(name);
@@ -318,12 +350,13 @@ impl Outputs {
 
     /// Write the sections; `length` is that of the run, s.
     pub fn finish(self, translation: &mut Translation, length: f64) {
+        let interval = self.interval(translation);
         let output = translation.draft.section("output");
-        match self.interval {
-            Some((Interval::Steps(steps), _)) => {
+        match interval {
+            Some(Interval::Steps(steps)) => {
                 output.set("every_steps", Value::Number(steps.to_string()));
             }
-            Some((Interval::Number(number), _)) => {
+            Some(Interval::Number(number)) => {
                 output.set("every", Value::number(length / number as f64));
             }
             None => {}

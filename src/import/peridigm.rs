@@ -80,6 +80,12 @@ const MATERIALS: [(&str, &str, &str); 20] = [
     ),
 ];
 
+/// The key of the thermal expansion of materials and damage models.
+const EXPANSION: &str = "Thermal Expansion Coefficient";
+
+/// The type of a condition that prescribes temperatures.
+const PRESCRIBED_TEMPERATURE: &str = "Prescribed Temperature";
+
 /// Where the points of the blocks come from.
 enum Points {
     /// A text file, and what is known of it.
@@ -112,13 +118,13 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let stages = stages(translation, root, &solvers)?;
     let points = points(translation, discretization)?;
     let influence = influence(translation, discretization)?;
-    let read = read_materials(translation, materials, influence)?;
+    let (read, expanding) = read_materials(translation, materials, influence)?;
     let damages = damages(translation, root)?;
     let names = read_blocks(translation, blocks, &points, &read, &damages)?;
     let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
-    conditions(translation, root, &mut sets, &stages)?;
+    let has_temperature = conditions(translation, root, &mut sets, &stages, &expanding)?;
     contact(translation, root, discretization, &names)?;
-    let mut outputs = Outputs::default();
+    let mut outputs = Outputs::new(has_temperature);
     if let Some(computed) = root.get("Compute Class Parameters") {
         outputs.computed(translation, &mut sets, &names, computed)?;
     }
@@ -348,13 +354,13 @@ fn influence(translation: &mut Translation, node: &Node) -> Result<Option<&'stat
     })
 }
 
-/// Write the materials.
+/// Write the materials; return them and the headers of those that expand.
 fn read_materials(
     translation: &mut Translation,
     node: &Node,
     influence: Option<&'static str>,
-) -> Result<Vec<Material>> {
-    let mut materials = Vec::new();
+) -> Result<(Vec<Material>, Vec<String>)> {
+    let (mut materials, mut expanding) = (Vec::new(), Vec::new());
     for (name, table) in node.tables() {
         let what = format!("the material `{name}`");
         let model = translation.required(table, "Material Model", &what)?;
@@ -403,6 +409,16 @@ fn read_materials(
             return Err(translation.error(table.line, message));
         }
         law_keys(translation, table, law, &mut section)?;
+        if let Some(node) = table.get(EXPANSION) {
+            section.set(
+                "thermal_expansion",
+                translation.number_value(node, EXPANSION)?,
+            );
+            translation
+                .log
+                .taken(node, "thermal_expansion of the material");
+            expanding.push(section.header().to_owned());
+        }
         if let (Some(influence), "ordinary" | "ordinary_viscoelastic") = (influence, *law) {
             section.set("influence", Value::text(influence));
         }
@@ -414,7 +430,7 @@ fn read_materials(
             constants,
         });
     }
-    Ok(materials)
+    Ok((materials, expanding))
 }
 
 /// Write the keys that only some laws have.
@@ -484,7 +500,6 @@ fn law_keys(
             "concerns a solver of linear systems",
         ),
         ("Hourglass Coefficient", "concerns correspondence laws only"),
-        ("Thermal Expansion Coefficient", "there are no temperatures"),
     ] {
         if let Some(node) = table.get(name)
             && !(law == "correspondence" && name.starts_with("Hourglass"))
@@ -521,10 +536,9 @@ fn damages(translation: &mut Translation, root: &Node) -> Result<Vec<DamageModel
             }
             let value = translation.number_value(stretch, "Critical Stretch")?;
             let number = translation.number(stretch, "Critical Stretch")?;
-            for ignored in ["Thermal Expansion Coefficient"] {
-                if let Some(node) = table.get(ignored) {
-                    translation.log.left_out(node, "there are no temperatures");
-                }
+            if let Some(node) = table.get(EXPANSION) {
+                let note = "bonds break by their elastic part, with the expansion of the material";
+                translation.log.taken(node, note);
             }
             damages.push(DamageModel {
                 read: name.to_owned(),
@@ -691,14 +705,28 @@ fn source(
     }
 }
 
-/// Write the initial values, loads and supports, then the stages.
+/// Write the initial values, loads and supports, then the stages; return whether temperatures are among them.
 fn conditions<'n>(
     translation: &mut Translation,
     root: &'n Node,
     sets: &mut Sets<'n>,
     stages: &[solver::Stage],
-) -> Result<()> {
+    expanding: &[String],
+) -> Result<bool> {
     let mut conditions = Conditions::default();
+    let starts = starts(translation, root);
+    let uniform = match &starts[..] {
+        [first @ Value::Number(_), others @ ..] if others.iter().all(|start| start == first) => {
+            Some(first)
+        }
+        _ => None,
+    };
+    if let Some(reference) = uniform {
+        for header in expanding {
+            let section = translation.draft.section(header);
+            section.set("reference_temperature", reference.clone());
+        }
+    }
     if let Some(node) = root.get("Boundary Conditions") {
         for (name, value) in node.entries() {
             if value.text().is_some() && name.to_lowercase().replace('_', " ").contains("node set")
@@ -709,6 +737,16 @@ fn conditions<'n>(
         for (name, table) in node.tables() {
             let kind = translation.required(table, "Type", &format!("the condition `{name}`"))?;
             let kind_name = translation.text(kind, "Type")?;
+            if is_key(kind_name, PRESCRIBED_TEMPERATURE) {
+                temperature(
+                    translation,
+                    sets,
+                    &mut conditions,
+                    (name, table, kind),
+                    (uniform.is_some(), expanding),
+                )?;
+                continue;
+            }
             let quantity = [
                 ("Initial Displacement", Quantity::Initial("displacement")),
                 ("Initial Velocity", Quantity::Initial("velocity")),
@@ -725,15 +763,60 @@ fn conditions<'n>(
             let given = Given {
                 name,
                 node: table,
-                quantity: *quantity,
-                step: None,
+                quantity: quantity.clone(),
+                steps: Vec::new(),
             };
             conditions.add(translation, sets, &given)?;
         }
     }
     conditions.finish(translation);
-    solver::write(translation, stages, &conditions.written);
-    Ok(())
+    let has_contact = root.get("Contact").is_some();
+    solver::write(translation, stages, &conditions.written, has_contact);
+    Ok(conditions.has_temperature)
+}
+
+/// The prescribed temperatures at the start of the run, from which materials expand.
+fn starts(translation: &Translation, root: &Node) -> Vec<Value> {
+    let tables = root.get("Boundary Conditions").into_iter();
+    let tables = tables.flat_map(Node::tables).map(|(_, table)| table);
+    let text = |table: &Node, key: &str| Some(table.get(key)?.text()?.to_owned());
+    tables
+        .filter(|table| {
+            text(table, "Type").is_some_and(|kind| is_key(&kind, PRESCRIBED_TEMPERATURE))
+        })
+        .filter_map(|table| translation.at_start(&text(table, "Value")?).ok())
+        .collect()
+}
+
+/// Write a prescribed temperature. Materials expand from the temperature at the start, which is the reference
+/// temperature of all materials if it is `uniform`, and subtracted otherwise.
+fn temperature<'n>(
+    translation: &mut Translation,
+    sets: &mut Sets<'n>,
+    conditions: &mut Conditions,
+    (name, table, kind): (&str, &Node, &Node),
+    (uniform, expanding): (bool, &[String]),
+) -> Result<()> {
+    if expanding.is_empty() {
+        let note = "no material expands, and heat is not conducted";
+        translation.log.left_out(table, note);
+        return Ok(());
+    }
+    let value = translation.required(table, "Value", &format!("the condition `{name}`"))?;
+    let start = translation.at_start(translation.text(value, "Value")?);
+    let reference = match (uniform, start) {
+        (true, _) | (false, Err(_)) => None,
+        (false, Ok(start)) => Some(start),
+    };
+    let note = "temperature; the reference is that at the start; heat is not conducted";
+    translation.log.taken(kind, note);
+    let given = Given {
+        name,
+        node: table,
+        quantity: Quantity::Temperature(reference),
+        steps: Vec::new(),
+    };
+    conditions.add(translation, sets, &given)
 }
 
 /// Write contact, and the bonds between blocks.
@@ -784,6 +867,8 @@ fn contact(
         }
     }
     translation.add(section);
+    // Bodies with a rule for contact with themselves.
+    let mut with_rule = Vec::new();
     for (name, interaction) in interactions.tables() {
         if is_key(name, "General Contact") || is_key(name, "Self Contact") {
             continue;
@@ -802,19 +887,32 @@ fn contact(
         }
         let written = translation.new_name("contact", name);
         let mut section = Section::new(format!("contact.pair.{written}"));
+        if bodies[0] == bodies[1] {
+            with_rule.push(bodies[0].clone());
+        }
         section.set("bodies", Value::List(bodies));
         model(translation, models, interaction, &mut section)?;
         translation.add(section);
     }
-    if let Some(node) = self_contact {
-        for (_, body) in blocks {
-            let written = translation.new_name("contact", &format!("self {body}"));
-            let mut section = Section::new(format!("contact.pair.{written}"));
-            let pair = [Value::text(body.clone()), Value::text(body.clone())];
-            section.set("bodies", Value::list(pair));
-            model(translation, models, node, &mut section)?;
-            translation.add(section);
+    // General contact acts between different blocks only.
+    if general.is_none() && self_contact.is_none() {
+        return Ok(());
+    }
+    for (_, body) in blocks {
+        let name = Value::text(body.clone());
+        if with_rule.contains(&name) {
+            continue;
         }
+        let written = translation.new_name("contact", &format!("self {body}"));
+        let mut section = Section::new(format!("contact.pair.{written}"));
+        section.set("bodies", Value::list([name.clone(), name]));
+        match self_contact {
+            Some(node) => model(translation, models, node, &mut section)?,
+            None => {
+                section.set("model", Value::text("none"));
+            }
+        }
+        translation.add(section);
     }
     Ok(())
 }

@@ -50,12 +50,28 @@ enum Points {
     Mesh(Value),
 }
 
+/// How a material expands.
+#[derive(Debug, Clone, PartialEq)]
+struct Expansion {
+    /// Name of the thermal model.
+    name: String,
+    coefficient: Value,
+    reference: Option<Value>,
+}
+
 /// A material as the deck has it; the density is that of a block.
 struct Model<'n> {
     name: &'n str,
     node: &'n Node,
     law: &'static str,
     constants: Constants,
+}
+
+/// What the blocks of a deck refer to.
+struct Laws<'n> {
+    models: Vec<Model<'n>>,
+    damages: Vec<DamageModel>,
+    expansions: Vec<Expansion>,
 }
 
 /// Translate a deck.
@@ -83,21 +99,42 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let read = read_materials(translation, materials)?;
     let breaks = stages.iter().any(|stage| stage.breaks);
     let damages = damages(translation, models, breaks)?;
+    let expands = solvers(root).iter().any(|solver| {
+        let node = solver.get("Thermal Models");
+        node.is_some_and(|node| {
+            translation.log.taken(node, "whether materials expand");
+            translation.is_true(node)
+        })
+    });
+    let expansions = expansions(translation, models, expands)?;
     let damping = stages.iter().find_map(|stage| stage.damping);
-    let bodies = read_blocks(translation, blocks, &points, &read, &damages, damping)?;
+    let laws = Laws {
+        models: read,
+        damages,
+        expansions,
+    };
+    let bodies = read_blocks(translation, blocks, &points, &laws, damping)?;
+    let expands = blocks.tables().any(|(_, block)| {
+        let model = block.get("Thermal Model").and_then(Node::text);
+        model.is_some_and(|model| {
+            laws.expansions
+                .iter()
+                .any(|known| is_key(&known.name, model))
+        })
+    });
     let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
     if let Some(node_sets) = discretization.get("Node Sets") {
         for (name, node) in node_sets.entries() {
             sets.define(name, node);
         }
     }
-    conditions(translation, root, &mut sets, &stages)?;
+    let has_temperature = conditions(translation, root, &mut sets, &stages, expands)?;
     contact(translation, root, &bodies)?;
     let names: Vec<(String, String)> = bodies
         .iter()
         .map(|body| (body.0.clone(), body.2.clone()))
         .collect();
-    let mut outputs = Outputs::default();
+    let mut outputs = Outputs::new(has_temperature);
     if let Some(computed) = root.get("Compute Class Parameters") {
         outputs.computed(translation, &mut sets, &names, computed)?;
     }
@@ -115,14 +152,17 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     Ok(())
 }
 
+/// The solver, or its steps.
+fn solvers(root: &Node) -> Vec<&Node> {
+    match root.get("Multistep Solver") {
+        Some(steps) => steps.tables().map(|(_, node)| node).collect(),
+        None => root.get("Solver").into_iter().collect(),
+    }
+}
+
 /// The stages of the solver or of its steps.
 fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stage>> {
-    let mut solvers: Vec<&Node> = Vec::new();
-    if let Some(steps) = root.get("Multistep Solver") {
-        solvers.extend(steps.tables().map(|(_, node)| node));
-    } else if let Some(solver) = root.get("Solver") {
-        solvers.push(solver);
-    }
+    let solvers = solvers(root);
     let Some(first) = solvers.first() else {
         return Err(translation.error(root.line, "the deck has no `Solver`"));
     };
@@ -137,7 +177,7 @@ fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stag
         translation.start = start;
     }
     let mut stages: Vec<solver::Stage> = Vec::new();
-    for node in solvers {
+    for node in &solvers {
         let at = stages.last().map_or(translation.start, |stage| stage.end);
         for key in ["Material Models", "Pre Calculation Models"] {
             if let Some(models) = node.get(key) {
@@ -159,6 +199,22 @@ fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stag
             }
         }
         stages.extend(solver::stage(translation, node, at, false)?);
+    }
+    let damping_differs = stages
+        .iter()
+        .any(|stage| stage.damping != stages[0].damping);
+    let damage_differs = stages.iter().any(|stage| stage.breaks != stages[0].breaks);
+    for node in solvers {
+        for (_, solver) in node.tables() {
+            if let (Some(damping), true) = (solver.get("Numerical Damping"), damping_differs) {
+                let note = "the first damping acts in all stages";
+                translation.log.approximated(damping, note);
+            }
+        }
+        if let (Some(damage), true) = (node.get("Damage Models"), damage_differs) {
+            let note = "damage acts in all stages";
+            translation.log.approximated(damage, note);
+        }
     }
     Ok(stages)
 }
@@ -335,6 +391,7 @@ fn write_material(
     density: Value,
     damping: Option<f64>,
     angle: Option<Value>,
+    expansion: Option<&Expansion>,
 ) -> Result<()> {
     let mut section = Section::new(format!("material.{written}.{}", model.law));
     section.set("density", density);
@@ -369,6 +426,12 @@ fn write_material(
     }
     if let (Some(angle), true) = (angle, anisotropic) {
         section.set("angle_1", angle);
+    }
+    if let Some(expansion) = expansion {
+        section.set("thermal_expansion", expansion.coefficient.clone());
+        if let Some(reference) = &expansion.reference {
+            section.set("reference_temperature", reference.clone());
+        }
     }
     let control = table.get("Zero Energy Control");
     if model.law == "correspondence" {
@@ -455,6 +518,57 @@ fn anisotropic(
     Ok(found)
 }
 
+/// Read the thermal models with expansion; `acts` if the solver switches them on.
+fn expansions(translation: &Translation, models: &Node, acts: bool) -> Result<Vec<Expansion>> {
+    let mut expansions = Vec::new();
+    let Some(node) = models.get("Thermal Models") else {
+        return Ok(expansions);
+    };
+    if !acts {
+        let note = "the solver has no `Thermal Models: true`, so nothing expands";
+        translation.log.left_out(node, note);
+        return Ok(expansions);
+    }
+    for (name, table) in node.tables() {
+        let kind = translation.required(
+            table,
+            "Thermal Model",
+            &format!("the thermal model `{name}`"),
+        )?;
+        let kind_name = translation.text(kind, "Thermal Model")?.to_lowercase();
+        if !kind_name.contains("thermal expansion") {
+            translation.log.left_out(table, "heat is not conducted");
+            continue;
+        }
+        match kind_name.trim() {
+            "thermal expansion" => translation.log.taken(kind, "thermal_expansion"),
+            _ => translation
+                .log
+                .approximated(kind, "thermal_expansion; heat is not conducted"),
+        }
+        let key = "Thermal Expansion Coefficient";
+        let coefficient = translation.required(table, key, "the thermal model")?;
+        let value = translation.number_value(coefficient, key)?;
+        translation
+            .log
+            .taken(coefficient, "thermal_expansion of the material");
+        let mut reference = None;
+        let key = "Reference Temperature";
+        if let Some(node) = table.get(key) {
+            reference = Some(translation.number_value(node, key)?);
+            translation
+                .log
+                .taken(node, "reference_temperature of the material");
+        }
+        expansions.push(Expansion {
+            name: name.to_owned(),
+            coefficient: value,
+            reference,
+        });
+    }
+    Ok(expansions)
+}
+
 /// Read the damage models; `breaks` if the solver switches them on.
 fn damages(translation: &mut Translation, models: &Node, breaks: bool) -> Result<Vec<DamageModel>> {
     let mut damages = Vec::new();
@@ -526,8 +640,7 @@ fn read_blocks(
     translation: &mut Translation,
     node: &Node,
     points: &Points,
-    models: &[Model],
-    damages: &[DamageModel],
+    laws: &Laws,
     damping: Option<f64>,
 ) -> Result<Vec<(String, u64, String)>> {
     let (mut bodies, mut blocks) = (Vec::new(), Vec::new());
@@ -547,7 +660,8 @@ fn read_blocks(
         }
         let material_node = translation.required(table, "Material Model", &what)?;
         let material_name = translation.text(material_node, "Material Model")?;
-        let Some(model) = models
+        let Some(model) = laws
+            .models
             .iter()
             .find(|model| is_key(model.name, material_name))
         else {
@@ -578,8 +692,24 @@ fn read_blocks(
                     .left_out(node, "the order of the rotations is another one");
             }
         }
-        // A material has one density and one angle here.
-        let variant = format!("{density:?} {angle:?}");
+        let mut expansion = None;
+        if let Some(node) = table.get("Thermal Model") {
+            let model_name = translation.text(node, "Thermal Model")?;
+            expansion = laws
+                .expansions
+                .iter()
+                .find(|known| is_key(&known.name, model_name));
+            match expansion {
+                Some(_) => translation
+                    .log
+                    .taken(node, "thermal_expansion of the material"),
+                None => translation
+                    .log
+                    .left_out(node, "this thermal model is left out"),
+            }
+        }
+        // A material has one density, one angle and one expansion here.
+        let variant = format!("{density:?} {angle:?} {expansion:?}");
         let known = written
             .iter()
             .find(|(read, of, _)| read == model.name && *of == variant);
@@ -592,7 +722,7 @@ fn read_blocks(
                     false => format!("{} {name}", model.name),
                 };
                 let new = translation.name("material", &read);
-                write_material(translation, model, &new, density, damping, angle)?;
+                write_material(translation, model, &new, density, damping, angle, expansion)?;
                 written.push((model.name.to_owned(), variant, new.clone()));
                 new
             }
@@ -617,7 +747,11 @@ fn read_blocks(
         let mut damage = None;
         if let Some(damage_node) = table.get("Damage Model") {
             let model_name = translation.text(damage_node, "Damage Model")?;
-            match damages.iter().find(|model| is_key(&model.read, model_name)) {
+            match laws
+                .damages
+                .iter()
+                .find(|model| is_key(&model.read, model_name))
+            {
                 Some(model) => {
                     damage = bodies::damage(translation, model, &material, horizon)?;
                     translation.log.taken(damage_node, "damage of the body");
@@ -628,7 +762,6 @@ fn read_blocks(
             }
         }
         for key in [
-            "Thermal Model",
             "Additive Model",
             "Degradation Model",
             "Pre Calculation Model",
@@ -662,13 +795,14 @@ fn read_blocks(
     Ok(blocks)
 }
 
-/// Write the initial values, loads and supports, then the stages.
+/// Write the initial values, loads and supports, then the stages; return whether temperatures are among them.
 fn conditions(
     translation: &mut Translation,
     root: &Node,
     sets: &mut Sets,
     stages: &[solver::Stage],
-) -> Result<()> {
+    expands: bool,
+) -> Result<bool> {
     let mut conditions = Conditions::default();
     for (name, table) in root
         .get("Boundary Conditions")
@@ -696,11 +830,17 @@ fn conditions(
             Some(Quantity::BodyForce)
         } else if is(&["Forces", "Force"]) {
             Some(Quantity::ForceOfPoint)
+        } else if is(&["Temperature"]) && expands && !is_initial {
+            Some(Quantity::Temperature(None))
         } else {
             None
         };
         let Some(quantity) = quantity else {
-            let note = format!("{} has no counterpart", excerpt(text));
+            let note = match is(&["Temperature"]) {
+                true if !expands => "no material expands, and heat is not conducted".to_owned(),
+                true => "temperatures are prescribed only; heat is not conducted".to_owned(),
+                false => format!("{} has no counterpart", excerpt(text)),
+            };
             translation.log.left_out(table, note);
             continue;
         };
@@ -708,29 +848,47 @@ fn conditions(
         if let Some(kind) = kind {
             translation.log.taken(kind, "[initial] or [condition]");
         }
-        let step = match table.get("Step ID") {
-            None => None,
-            Some(node) => {
-                translation.log.taken(node, "the stage in which it acts");
-                Some(translation.count(node, "Step ID")?)
+        let mut steps = Vec::new();
+        if let Some(node) = table.get("Step ID") {
+            steps = step_ids(translation, node)?;
+            match is_initial && steps.iter().any(|step| stages[0].step_id != Some(*step)) {
+                true => translation
+                    .log
+                    .approximated(node, "initial values are those at the start of the run"),
+                false => translation.log.taken(node, "the stages in which it acts"),
             }
-        };
+        }
         let before = stages
             .iter()
-            .position(|stage| step.is_some() && stage.step_id == step);
+            .position(|stage| stage.step_id.is_some_and(|step| steps.contains(&step)));
         let before = before.and_then(|index| stages.get(index.checked_sub(1)?));
         translation.step_start = before.map_or(0.0, |stage| stage.end - translation.start);
         let given = Given {
             name,
             node: table,
             quantity,
-            step,
+            steps,
         };
         conditions.add(translation, sets, &given)?;
     }
     conditions.finish(translation);
-    solver::write(translation, stages, &conditions.written);
-    Ok(())
+    let has_contact = root.get("Contact").is_some();
+    solver::write(translation, stages, &conditions.written, has_contact);
+    Ok(conditions.has_temperature)
+}
+
+/// The numbers of steps, with commas between them.
+fn step_ids(translation: &Translation, node: &Node) -> Result<Vec<u64>> {
+    let text = translation.text(node, "Step ID")?;
+    let ids = text.split(',').map(|word| word.trim().parse::<u64>().ok());
+    let ids: Option<Vec<u64>> = ids.collect();
+    ids.ok_or_else(|| {
+        let message = format!(
+            "`Step ID` must be whole numbers with commas between them, is {}",
+            excerpt(text)
+        );
+        translation.error(node.line, message)
+    })
 }
 
 /// Write contact.

@@ -33,7 +33,7 @@ pub enum Method {
         safety: Option<Value>,
     },
     /// A sequence of this many equilibria.
-    Relaxation(u64),
+    Equilibria(u64),
 }
 
 /// A part of the run.
@@ -134,7 +134,7 @@ pub fn stage(
                 log.taken(end, "the last of the time steps");
             }
             let after = list.iter().filter(|end| **end > start);
-            let stages: Vec<Stage> = after.map(|end| new(*end, Method::Relaxation(1))).collect();
+            let stages: Vec<Stage> = after.map(|end| new(*end, Method::Equilibria(1))).collect();
             later(*list.last().expect("two at least"), times.line)?;
             return Ok(stages);
         }
@@ -145,13 +145,13 @@ pub fn stage(
         let load_steps = match given {
             None => LOAD_STEPS,
             Some((key, steps)) => {
-                log.taken(steps, "load_steps of the relaxation");
+                log.taken(steps, "load_steps");
                 translation.count(steps, key)?.max(1)
             }
         };
         return Ok(vec![new(
             later(end(&[])?, node.line)?,
-            Method::Relaxation(load_steps),
+            Method::Equilibria(load_steps),
         )]);
     }
     let fixed = solver.get("Fixed dt");
@@ -216,7 +216,7 @@ pub fn stage(
     Ok(vec![stage])
 }
 
-/// Note the keys of a static solver that relaxation does not have.
+/// Note the keys of a static solver without a counterpart.
 fn tolerances(translation: &Translation, solver: &Node) {
     for (name, node) in solver.entries() {
         let is = |known: &[&str]| known.iter().any(|known| is_key(name, known));
@@ -229,17 +229,19 @@ fn tolerances(translation: &Translation, solver: &Node) {
             let note = "the tolerance is the default, unbalanced force over loads and reactions";
             translation.log.approximated(node, note);
         } else if !is(&["Time Steps", "Number of Load Steps", "Number of Steps"]) {
-            let note = "concerns a solver of linear systems; equilibria are found by relaxation";
+            let note = "concerns the solver of that code";
             translation.log.left_out(node, note);
         }
     }
 }
 
-/// Write the stages of a run; `conditions` are the names of conditions with the number of the step that they act in.
+/// Write the stages of a run; `conditions` are the names of conditions with the numbers of the steps that they act in,
+/// none for all. Newton's method finds the equilibria of runs without contact, relaxation those of others.
 pub fn write(
     translation: &mut Translation,
     stages: &[Stage],
-    conditions: &[(String, Option<u64>)],
+    conditions: &[(String, Vec<u64>)],
+    has_contact: bool,
 ) {
     let start = translation.start;
     let Some(last) = stages.last() else {
@@ -248,7 +250,7 @@ pub fn write(
     let mut time = Section::new("time");
     time.set("end", Value::number(last.end - start));
     if let [only] = stages {
-        method(&mut time, &only.method);
+        method(&mut time, &only.method, has_contact);
         translation.add(time);
         return;
     }
@@ -258,10 +260,11 @@ pub fn write(
         if index + 1 < stages.len() {
             section.set("end", Value::number(stage.end - start));
         }
-        method(&mut section, &stage.method);
-        let rests = conditions
-            .iter()
-            .filter(|(_, step)| step.is_some() && *step != stage.step_id);
+        method(&mut section, &stage.method, has_contact);
+        let acts = |steps: &[u64]| {
+            steps.is_empty() || stage.step_id.is_some_and(|step| steps.contains(&step))
+        };
+        let rests = conditions.iter().filter(|(_, steps)| !acts(steps));
         let off: Vec<Value> = rests.map(|(name, _)| Value::text(name.clone())).collect();
         if !off.is_empty() {
             section.set("off", Value::List(off));
@@ -270,7 +273,7 @@ pub fn write(
     }
 }
 
-fn method(section: &mut Section, method: &Method) {
+fn method(section: &mut Section, method: &Method, has_contact: bool) {
     match method {
         Method::Explicit { step, safety } => {
             if let Some(step) = step {
@@ -280,12 +283,12 @@ fn method(section: &mut Section, method: &Method) {
                 section.set("safety", safety.clone());
             }
         }
-        Method::Relaxation(steps) => {
+        Method::Equilibria(steps) => {
             let steps = Value::Number(steps.to_string());
-            section.set("method", Value::text("relaxation")).set(
-                "relaxation",
-                Value::Table(vec![("load_steps".to_owned(), steps)]),
-            );
+            let name = if has_contact { "relaxation" } else { "static" };
+            section
+                .set("method", Value::text(name))
+                .set(name, Value::Table(vec![("load_steps".to_owned(), steps)]));
         }
     }
 }

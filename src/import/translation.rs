@@ -154,6 +154,15 @@ impl<'a> Translation<'a> {
         Ok(Value::number_or_expression(&text))
     }
 
+    /// An expression of position and time at the start of the run; `Err` says why it is none here.
+    pub fn at_start(&self, text: &str) -> std::result::Result<Value, String> {
+        let start = self.start;
+        let names = |name: &str| (name == "t").then(|| format!("({start:?})"));
+        let variables = &POSITION[..self.dimension.min(POSITION.len())];
+        let text = rewrite(text, self.dialect, &names, variables)?;
+        Ok(Value::number_or_expression(&text))
+    }
+
     /// The name of a table in the new deck, unique in its section.
     pub fn name(&mut self, section: &'static str, name: &str) -> String {
         let same = |(s, read, _): &&(&str, String, String)| *s == section && read == name;

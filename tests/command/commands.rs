@@ -695,6 +695,20 @@ fn an_imported_tensile_test_has_youngs_modulus() {
         text(&output)
     );
     assert!(import(&["--overwrite", "--quiet"]).status.success());
+    let before = std::fs::read(&deck).unwrap();
+    let output = finish(
+        fissure(1)
+            .args(["import", "--overwrite", "-o"])
+            .arg(&deck)
+            .arg(&deck),
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output).contains("is the deck to import"),
+        "{}",
+        text(&output)
+    );
+    assert_eq!(std::fs::read(&deck).unwrap(), before);
     let output = import(&["--from", "perilab", "--overwrite"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output).contains("tensile.yaml:"), "{}", text(&output));

@@ -537,6 +537,298 @@ fn a_bond_of_lammps_has_its_force() {
     }
 }
 
+/// A deck of Peridigm with two blocks of a text file.
+fn with_contact(interactions: &str) -> String {
+    BAR.replacen(
+        "</ParameterList>\n  <ParameterList name=\"Solver1\">",
+        &format!(
+            r#"</ParameterList>
+  <ParameterList name="Contact">
+    <ParameterList name="Models">
+      <ParameterList name="Soft">
+        <Parameter name="Contact Model" type="string" value="Short Range Force"/>
+        <Parameter name="Contact Radius" type="double" value="0.5"/>
+        <Parameter name="Spring Constant" type="double" value="1e12"/>
+      </ParameterList>
+    </ParameterList>
+    <ParameterList name="Interactions">
+      {interactions}
+    </ParameterList>
+  </ParameterList>
+  <ParameterList name="Solver1">"#
+        ),
+        1,
+    )
+}
+
+/// General contact acts between different blocks only; equilibria with contact are found by relaxation.
+#[test]
+fn general_contact_of_peridigm_leaves_a_block_alone() {
+    let folder = Folder::new("general-contact");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n5\n9\n13\n");
+    let interaction = |name: &str| {
+        format!(
+            "<ParameterList name=\"{name}\"><Parameter name=\"Contact Model\" type=\"string\" value=\"Soft\"/></ParameterList>"
+        )
+    };
+    let general = interaction("General Contact");
+    let both = general.clone() + &interaction("Self Contact");
+    for (interactions, off) in [(general, 2), (both, 0)] {
+        let imported = folder
+            .import("bar.xml", &with_contact(&interactions))
+            .unwrap();
+        folder.problem(&imported);
+        let count = imported.text.matches("model = \"none\"").count();
+        assert_eq!(count, off, "{}", imported.text);
+        assert!(
+            imported
+                .text
+                .contains("bodies = [\"block_1\", \"block_1\"]")
+        );
+        assert!(imported.text.contains("method = \"relaxation\""));
+    }
+    let imported = folder.import("bar.xml", BAR).unwrap();
+    assert!(
+        imported
+            .text
+            .contains("method = \"static\"\nstatic = { load_steps = 2 }"),
+        "{}",
+        imported.text
+    );
+}
+
+/// A bottom unit vector of 45° to the plane is turned into it, and both lengths grow by √2.
+#[test]
+fn a_slanted_bond_filter_cuts_as_in_peridigm() {
+    let folder = Folder::new("slanted");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n");
+    let text = BAR.replacen(
+        "Bottom_Unit_Vector_X\" type=\"double\" value=\"0.0\"",
+        "Bottom_Unit_Vector_X\" type=\"double\" value=\"1.0\"",
+        1,
+    );
+    let imported = folder.import("bar.xml", &text).unwrap();
+    folder.problem(&imported);
+    let key = "Discretization > Bond Filters > Cut > Type";
+    assert_eq!(fate(&imported, key).0, Fate::Approximated);
+    let numbers = |key: &str| -> Vec<f64> {
+        let line = imported
+            .text
+            .lines()
+            .find_map(|line| line.strip_prefix(key));
+        let list = line
+            .unwrap()
+            .trim_start_matches(" = [")
+            .trim_end_matches(']');
+        list.split(", ").map(|word| word.parse().unwrap()).collect()
+    };
+    let long = 10.0 * 2.0_f64.sqrt();
+    for (found, expected) in [
+        (numbers("edge_a"), [0.0, long, 0.0]),
+        (numbers("edge_b"), [0.0, 0.0, -long]),
+    ] {
+        let near = found
+            .iter()
+            .zip(expected)
+            .all(|(f, e)| (f - e).abs() < 1e-12);
+        assert!(near, "{found:?} {expected:?}");
+    }
+    // Along the normal, no direction is left.
+    let text = text.replacen(
+        "Bottom_Unit_Vector_Y\" type=\"double\" value=\"1.0\"",
+        "Bottom_Unit_Vector_Y\" type=\"double\" value=\"0.0\"",
+        1,
+    );
+    let imported = folder.import("bar.xml", &text).unwrap();
+    assert!(!imported.text.contains("[crack."));
+}
+
+/// Prescribed temperatures of Peridigm: materials expand from those at the start.
+#[test]
+fn temperatures_of_peridigm_count_from_the_start() {
+    let folder = Folder::new("warm");
+    let warm = |expansion: &str, values: &[&str]| {
+        let mut conditions = String::new();
+        for (index, value) in values.iter().enumerate() {
+            conditions += &format!(
+                "    Warm {index}:\n      Type: Prescribed Temperature\n      Node Set: Spare Node Set\n      Value: \"{value}\"\n"
+            );
+        }
+        let text = TWO_POINTS
+            .replacen("    Go Right:\n", &(conditions + "    Go Right:\n"), 1)
+            .replacen(
+                "      Density: 1000.0\n",
+                &format!("      Density: 1000.0\n{expansion}"),
+                1,
+            )
+            .replacen("Radius: true", "Temperature: true", 1);
+        folder.import("two.yaml", &text).unwrap()
+    };
+    let expands = "      Thermal Expansion Coefficient: 1.0e-5\n";
+    let imported = warm(expands, &["273.0+1000.0*t"]);
+    folder.problem(&imported);
+    for line in [
+        "thermal_expansion = 1.0e-5",
+        "reference_temperature = 273.0",
+        "temperature = \"273.0+1000.0*t\"",
+        "\"temperature\"",
+    ] {
+        let plain = imported.text.replace(" + ", "+");
+        assert!(plain.contains(line), "{line}\n{}", imported.text);
+    }
+    assert!(imported.losses().is_empty());
+    // Where they differ at the start, each counts from its own.
+    let imported = warm(expands, &["x*t + 5*x"]);
+    folder.problem(&imported);
+    assert!(!imported.text.contains("reference_temperature"));
+    assert!(imported.text.contains(") - ("), "{}", imported.text);
+    // Without expansion they do nothing.
+    let imported = warm("", &["20*t"]);
+    folder.problem(&imported);
+    assert!(!imported.text.contains("temperature = "));
+    assert_eq!(imported.losses().conditions, [33]);
+    assert!(imported.losses().damages.is_empty());
+    assert_eq!(
+        imported.losses().to_string(),
+        "1 loads or supports and 0 damage models are left out: lines 33"
+    );
+}
+
+/// Materials of PeriLab expand where the solver says so.
+#[test]
+fn materials_of_perilab_expand() {
+    let folder = Folder::new("expansion");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let text = STRIP
+        .replacen("Thermal Flow", "Thermal Expansion", 1)
+        .replacen(
+            "Thermal Conductivity: 5.0",
+            "Thermal Expansion Coefficient: 2.5e-2\n        Reference Temperature: 4.0",
+            1,
+        )
+        .replacen(
+            "      Damage Model: Tough\n",
+            "      Thermal Model: Heat\n",
+            1,
+        );
+    let off = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&off);
+    assert!(!off.text.contains("thermal_expansion = "));
+    let text = text.replacen(
+        "    Material Models: True",
+        "    Material Models: True\n    Thermal Models: True",
+        1,
+    );
+    let on = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&on);
+    for line in [
+        "thermal_expansion = 2.5e-2",
+        "reference_temperature = 4.0",
+        "temperature = 20",
+    ] {
+        assert!(on.text.contains(line), "{line}\n{}", on.text);
+    }
+}
+
+/// Steps of PeriLab: conditions of two steps, and what one step has and the other does not.
+#[test]
+fn steps_of_perilab_share_damping_and_damage() {
+    let folder = Folder::new("steps");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let from = STRIP.find("  Solver:").unwrap();
+    let to = STRIP.find("  Outputs:").unwrap();
+    let steps = "  Multistep Solver:
+    One:
+      Step ID: 1
+      Damage Models: True
+      Initial Time: 0.0
+      Final Time: 1.0e-6
+      Verlet:
+        Fixed dt: 1.0e-8
+        Numerical Damping: 0.002
+    Two:
+      Step ID: 2
+      Additional Time: 1.0e-6
+      Verlet:
+        Fixed dt: 1.0e-8
+    Three:
+      Step ID: 3
+      Additional Time: 1.0e-6
+      Verlet:
+        Fixed dt: 1.0e-8
+";
+    let text = format!("{}{steps}{}", &STRIP[..from], &STRIP[to..])
+        .replacen("      Value: 0\n", "      Value: 0\n      Step ID: \"1, 2\"\n", 1)
+        .replacen(
+            "    Warm:\n",
+            "    Start:\n      Variable: Velocity\n      Node Set: Right\n      Coordinate: x\n      Value: 1\n      \
+             Type: Initial\n      Step ID: 2\n    Warm:\n",
+            1,
+        );
+    let imported = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&imported);
+    let key = |name: &str| fate(&imported, &format!("PeriLab > {name}")).0;
+    assert_eq!(
+        key("Multistep Solver > One > Verlet > Numerical Damping"),
+        Fate::Approximated
+    );
+    assert_eq!(
+        key("Multistep Solver > One > Damage Models"),
+        Fate::Approximated
+    );
+    assert_eq!(key("Boundary Conditions > Hold > Step ID"), Fate::Taken);
+    assert_eq!(
+        key("Boundary Conditions > Start > Step ID"),
+        Fate::Approximated
+    );
+    assert_eq!(imported.text.matches("off = [\"hold\"]").count(), 1);
+    let error = folder
+        .import("strip.yaml", &text.replacen("\"1, 2\"", "\"1; 2\"", 1))
+        .unwrap_err();
+    assert!(error.contains("`Step ID` must be whole numbers"), "{error}");
+}
+
+#[test]
+fn the_largest_of_several_intervals_counts() {
+    let folder = Folder::new("intervals");
+    let text = TWO_POINTS.to_owned()
+        + "  Output2:\n    Output Frequency: 50\n    Output Variables:\n      Velocity: true\n";
+    let imported = folder.import("two.yaml", &text).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("every_steps = 50"),
+        "{}",
+        imported.text
+    );
+    let (kept, note) = fate(&imported, "Peridigm > Output2 > Output Frequency");
+    assert_eq!(kept, Fate::Approximated);
+    assert!(note.contains("the other outputs have 10"), "{note}");
+}
+
+#[test]
+fn a_damage_model_without_a_counterpart_is_a_loss() {
+    let folder = Folder::new("loss");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n");
+    let text = BAR.replacen("value=\"Critical Stretch\"", "value=\"Von Mises\"", 1);
+    let imported = folder.import("bar.xml", &text).unwrap();
+    let line = 1 + text[..text.find("name=\"Stretch\"").unwrap()]
+        .matches('\n')
+        .count();
+    assert_eq!(imported.losses().damages, [line]);
+    assert!(imported.losses().conditions.is_empty());
+}
+
 #[test]
 fn a_wrong_deck_names_file_and_line() {
     let folder = Folder::new("wrong");
