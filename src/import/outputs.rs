@@ -110,7 +110,7 @@ pub struct Outputs {
     fields: Vec<&'static str>,
     /// The interval of each output, its key, and whether the output has fields.
     intervals: Vec<(Interval, Node, bool)>,
-    /// Materials expand, so points have temperatures.
+    /// Materials expand by prescribed temperatures, so points have some.
     has_temperature: bool,
     /// Names of computed quantities and what became of them.
     computed: Vec<(String, Fate, String)>,
@@ -327,7 +327,7 @@ impl Outputs {
             return (Fate::Taken, (*note).to_owned());
         }
         if is_key(name, "Temperature") && !self.has_temperature {
-            let note = "no material expands, so points have no temperature";
+            let note = "no temperature acts on a material that expands";
             return (Fate::LeftOut, note.to_owned());
         }
         let part = TENSOR_PARTS.iter().find_map(|part| name.strip_suffix(part));
