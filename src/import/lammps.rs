@@ -1,5 +1,6 @@
 //! Input scripts of LAMMPS with `atom_style peri`.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use super::bodies::{self, Body, Criterion, DamageModel, Material};
@@ -7,13 +8,13 @@ use super::draft::{Section, Value};
 use super::elastic::Constants;
 use super::log::Fate;
 use super::regions::{Region, others, region};
-use super::script::{Command, Script};
+use super::script::{Command, Script, Variables};
 use super::translation::Translation;
 use super::tree::{Content, Node};
 use crate::error::{Result, excerpt};
 
 /// Commands that concern the way LAMMPS works or what it prints.
-const WORKINGS: [&str; 28] = [
+const WORKINGS: [&str; 27] = [
     "atom_modify",
     "neighbor",
     "neigh_modify",
@@ -38,7 +39,6 @@ const WORKINGS: [&str; 28] = [
     "info",
     "shell",
     "timer",
-    "reset_timestep",
     "label",
     "balance",
     "undump",
@@ -84,6 +84,15 @@ struct Coefficients {
     node: Node,
 }
 
+/// The velocity that a command sets.
+struct Velocity {
+    /// Node of the command.
+    node: usize,
+    group: String,
+    /// Its components; `None` if neither the command nor an earlier one sets them.
+    components: [Option<f64>; 3],
+}
+
 /// What a script says of its atoms, gathered before the deck is written.
 #[derive(Default)]
 struct Model {
@@ -100,9 +109,9 @@ struct Model {
     /// Names of groups and their selections.
     groups: Vec<(String, Group, Node)>,
     /// Damping of all atoms, force over velocity.
-    drag: Option<(f64, Node)>,
-    /// Velocities of groups.
-    velocities: Vec<(String, [Option<f64>; 3])>,
+    drag: Option<f64>,
+    /// Velocities of groups in the order of the commands.
+    velocities: Vec<Velocity>,
     computes: Vec<(String, String)>,
     fields: Vec<&'static str>,
 }
@@ -131,16 +140,68 @@ pub fn tree(script: &Script) -> Node {
 /// # Errors
 /// If what a run needs is missing or wrong.
 pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
+    let commands = &script.commands;
+    let first = commands.iter().position(|command| command.name() == "run");
+    let (before, after) = commands.split_at(first.unwrap_or(commands.len()));
+    let without = without_effect(before);
     let mut model = Model::default();
-    for command in &script.commands {
-        setup(translation, script, &mut model, command)?;
+    let mut variables = Variables::default();
+    let read = |translation: &Translation, variables: &mut Variables, command: &Command| {
+        let read = variables.read(command);
+        read.map_err(|message| wrong(translation, command, message))
+    };
+    for command in before {
+        read(translation, &mut variables, command)?;
+        match without.get(&command.node.id) {
+            Some(reason) => translation.log.left_out(&command.node, *reason),
+            None => setup(translation, &variables, &mut model, command)?,
+        }
     }
     let bodies = write_bodies(translation, &mut model)?;
     let mut run = Run::default();
-    for command in &script.commands {
-        simulate(translation, script, &mut model, &bodies, &mut run, command)?;
+    // Fixes and outputs look their variables up when a run starts.
+    for command in before {
+        if !without.contains_key(&command.node.id) {
+            simulate(
+                translation,
+                &variables,
+                &mut model,
+                &bodies,
+                &mut run,
+                command,
+            )?;
+        }
     }
-    run.write(translation, script, &model)
+    for command in after {
+        read(translation, &mut variables, command)?;
+        follow(translation, &variables, &mut run, command)?;
+    }
+    run.write(translation, &model)
+}
+
+/// Fixes in front of the first run that do not act in it, by their nodes, and why.
+fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
+    let mut acting: HashMap<&str, usize> = HashMap::new();
+    let mut without = HashMap::new();
+    for command in commands {
+        let Some(id) = command.words.get(1) else {
+            continue;
+        };
+        match command.name() {
+            "fix" => {
+                if let Some(earlier) = acting.insert(id, command.node.id) {
+                    without.insert(earlier, "a later `fix` of the same id replaces it");
+                }
+            }
+            "unfix" => {
+                if let Some(removed) = acting.remove(id.as_str()) {
+                    without.insert(removed, "`unfix` removes it before the first `run`");
+                }
+            }
+            _ => {}
+        }
+    }
+    without
 }
 
 /// An error about a command.
@@ -156,7 +217,7 @@ fn wrong(
 /// Read a command that defines atoms or their properties.
 fn setup(
     translation: &mut Translation,
-    script: &Script,
+    variables: &Variables,
     model: &mut Model,
     command: &Command,
 ) -> Result<()> {
@@ -168,7 +229,7 @@ fn setup(
         let missing = || fail(format!("argument {} is missing", k + 1));
         arguments.get(k).copied().ok_or_else(missing)
     };
-    let number = |k: usize| script.number(argument(k)?).map_err(fail);
+    let number = |k: usize| variables.number(argument(k)?).map_err(fail);
     match command.name() {
         "units" => match argument(0)? {
             "si" => log.taken(node, "SI units"),
@@ -219,7 +280,7 @@ fn setup(
                     .map(|(_, region, _)| region.clone())
             };
             let spacing = model.spacing.unwrap_or(1.0);
-            match region(script, &arguments[1..], spacing, &known) {
+            match region(variables, &arguments[1..], spacing, &known) {
                 Ok(region) => {
                     log.taken(node, "the shape of what uses it");
                     model.regions.push((name.to_owned(), region, node.clone()));
@@ -300,7 +361,7 @@ fn setup(
             let types = [kind(argument(0)?)?, kind(argument(1)?)?];
             let values = arguments[2..]
                 .iter()
-                .map(|word| script.number(word).map_err(fail));
+                .map(|word| variables.number(word).map_err(fail));
             let values = values.collect::<Result<Vec<_>>>()?;
             model.coefficients.push(Coefficients {
                 types,
@@ -308,7 +369,7 @@ fn setup(
                 node: node.clone(),
             });
         }
-        "set" => properties(translation, script, model, command)?,
+        "set" => properties(translation, variables, model, command)?,
         "group" => {
             let name = argument(0)?;
             let group = match arguments.get(1).copied() {
@@ -322,13 +383,13 @@ fn setup(
             log.taken(node, "the set of what uses it");
             model.groups.push((name.to_owned(), group, node.clone()));
         }
-        "velocity" => velocity(translation, script, model, command)?,
+        "velocity" => velocity(translation, variables, model, command)?,
         "variable" => log.taken(node, "its value where it is used"),
         "fix" if arguments.get(2) == Some(&"viscous") => {
             let drag = number(3)?;
             match argument(1)? {
                 "all" => {
-                    model.drag = Some((drag, node.clone()));
+                    model.drag = Some(drag);
                     log.taken(
                         node,
                         "damping of the materials: force over velocity, density and volume",
@@ -337,26 +398,33 @@ fn setup(
                 _ => log.left_out(node, "damping acts on all points of a material"),
             }
         }
-        name if WORKINGS.contains(&name) => {
-            log.left_out(node, "concerns the way LAMMPS works or what it prints");
-        }
         "read_data" | "read_restart" => {
             let message =
                 "atoms of a file are not read; write them as a point file, and their deck by hand";
             return Err(fail(message.to_owned()));
         }
-        "if" | "jump" | "next" | "include" => {
-            log.left_out(node, "control flow is not followed");
+        name => {
+            if let Some(reason) = ignored(name) {
+                log.left_out(node, reason);
+            }
         }
-        _ => {}
     }
     Ok(())
+}
+
+/// Why a command is left out wherever it stands.
+fn ignored(name: &str) -> Option<&'static str> {
+    match name {
+        "if" | "jump" | "next" | "include" => Some("control flow is not followed"),
+        name if WORKINGS.contains(&name) => Some("concerns the way LAMMPS works or what it prints"),
+        _ => None,
+    }
 }
 
 /// Read `set`: densities and volumes.
 fn properties(
     translation: &Translation,
-    script: &Script,
+    variables: &Variables,
     model: &mut Model,
     command: &Command,
 ) -> Result<()> {
@@ -389,7 +457,7 @@ fn properties(
     };
     let mut rest = &arguments[2..];
     while let [key, value, others @ ..] = rest {
-        let number = script
+        let number = variables
             .number(value)
             .map_err(|message| wrong(translation, command, message))?;
         match *key {
@@ -417,7 +485,7 @@ fn properties(
 /// Read `velocity`.
 fn velocity(
     translation: &Translation,
-    script: &Script,
+    variables: &Variables,
     model: &mut Model,
     command: &Command,
 ) -> Result<()> {
@@ -432,10 +500,19 @@ fn velocity(
         true => 1.0,
         false => model.spacing.unwrap_or(1.0),
     };
-    let mut velocity = [None; 3];
-    for (component, word) in velocity.iter_mut().zip([vx, vy, vz]) {
+    let is_earlier = |earlier: &Velocity| earlier.group == *group || earlier.group == "all";
+    let found = model.velocities.iter().rposition(is_earlier);
+    let mut components = found.map_or([None; 3], |at| model.velocities[at].components);
+    let others = &model.velocities[found.map_or(0, |at| at + 1)..];
+    if [vx, vy, vz].contains(&&"NULL") && !others.is_empty() {
+        log.approximated(
+            &command.node,
+            "NULL keeps the velocity of the same group or of all, not that of a group in between",
+        );
+    }
+    for (component, word) in components.iter_mut().zip([vx, vy, vz]) {
         if *word != "NULL" {
-            let value = script
+            let value = variables
                 .number(word)
                 .map_err(|message| wrong(translation, command, message))?;
             *component = Some(unit * value);
@@ -444,7 +521,11 @@ fn velocity(
     if options.contains(&"sum") && options.windows(2).any(|pair| pair == ["sum", "yes"]) {
         log.approximated(&command.node, "velocities replace earlier ones");
     }
-    model.velocities.push(((*group).to_owned(), velocity));
+    model.velocities.push(Velocity {
+        node: command.node.id,
+        group: (*group).to_owned(),
+        components,
+    });
     Ok(())
 }
 
@@ -603,7 +684,7 @@ fn write_material(
         }
         _ => {}
     }
-    if let Some((drag, _)) = &model.drag {
+    if let Some(drag) = model.drag {
         section.set("damping", Value::number(drag / (density * spacing.powi(3))));
     }
     translation.add(section);
@@ -641,12 +722,13 @@ fn write_material(
     Ok((material, damage, Value::number(horizon)))
 }
 
-/// The parts of a run.
+/// The parts of the runs.
 #[derive(Default)]
 struct Run {
-    steps: u64,
-    /// The first `run` is read.
-    started: bool,
+    /// Steps and time step, s, of the runs; those with the same step are joined.
+    runs: Vec<(u64, f64)>,
+    /// The number of the step at which the next run starts.
+    at: u64,
     output: Option<u64>,
     history: Option<u64>,
 }
@@ -696,10 +778,90 @@ fn set(
     }
 }
 
+/// A number of steps, which is `least` or more.
+fn steps(
+    translation: &Translation,
+    variables: &Variables,
+    command: &Command,
+    k: usize,
+    least: f64,
+) -> Result<u64> {
+    let fail = |message: String| wrong(translation, command, message);
+    let word = command.words.get(1 + k).map_or("", String::as_str);
+    let number = variables.number(word).map_err(fail)?;
+    match (least..1e15).contains(&number) {
+        true => Ok(number as u64),
+        false => Err(fail(format!("the number of steps must be {least} or more"))),
+    }
+}
+
+/// Read the number of the step at which the next run starts.
+fn reset(
+    translation: &Translation,
+    variables: &Variables,
+    run: &mut Run,
+    command: &Command,
+) -> Result<()> {
+    run.at = steps(translation, variables, command, 0, 0.0)?;
+    let note = "the step from which `run … upto` counts";
+    translation.log.taken(&command.node, note);
+    Ok(())
+}
+
+/// Read the first run, or a command behind it, of which only those that change the end of the runs count.
+fn follow(
+    translation: &Translation,
+    variables: &Variables,
+    run: &mut Run,
+    command: &Command,
+) -> Result<()> {
+    let node = &command.node;
+    match command.name() {
+        "run" => {
+            let fail = |message: &str| wrong(translation, command, message);
+            let step = variables.step.filter(|step| *step > 0.0);
+            let step = step.ok_or_else(|| fail("there is no `timestep` above 0 before it"))?;
+            let is_end = command.arguments().contains(&"upto");
+            let least = if is_end { 0.0 } else { 1.0 };
+            let given = steps(translation, variables, command, 0, least)?;
+            let count = match is_end {
+                true => given.checked_sub(run.at).ok_or_else(|| {
+                    fail(&format!(
+                        "the last step {given} is before the step {}",
+                        run.at
+                    ))
+                })?,
+                false => given,
+            };
+            run.at = run.at.saturating_add(count);
+            match run.runs.last_mut() {
+                Some((steps, known)) if *known == step => *steps = steps.saturating_add(count),
+                _ => run.runs.push((count, step)),
+            }
+            translation.log.taken(node, "[time] end");
+        }
+        "timestep" => match run.runs.first() {
+            Some((_, first)) if variables.step != Some(*first) => translation.log.approximated(
+                node,
+                "[time] end counts the steps behind it with this step; [time] step stays that of the first `run`",
+            ),
+            _ => translation.log.taken(node, "[time] step"),
+        },
+        "reset_timestep" => reset(translation, variables, run, command)?,
+        "variable" => translation.log.taken(node, "its value where it is used"),
+        name => {
+            let reason = ignored(name);
+            let reason = reason.unwrap_or("changes after the first `run` are not followed");
+            translation.log.left_out(node, reason);
+        }
+    }
+    Ok(())
+}
+
 /// Read a command that acts during the run.
 fn simulate(
     translation: &mut Translation,
-    script: &Script,
+    variables: &Variables,
     model: &mut Model,
     bodies: &[(u32, String, String)],
     run: &mut Run,
@@ -707,34 +869,11 @@ fn simulate(
 ) -> Result<()> {
     let node = &command.node;
     let arguments = command.arguments();
-    let count = |translation: &Translation, k: usize| -> Result<u64> {
-        let word = arguments.get(k).copied().unwrap_or("");
-        let number = script
-            .number(word)
-            .map_err(|message| wrong(translation, command, message))?;
-        match (1.0..1e15).contains(&number) {
-            true => Ok(number as u64),
-            false => Err(wrong(
-                translation,
-                command,
-                "the number of steps must be 1 or more",
-            )),
-        }
-    };
-    let late = ["velocity", "fix", "unfix", "timestep", "set"];
-    if run.started && late.contains(&command.name()) {
-        translation
-            .log
-            .left_out(node, "changes after the first `run` are not followed");
-        return Ok(());
-    }
+    let count =
+        |translation: &Translation, k: usize| steps(translation, variables, command, k, 1.0);
     match command.name() {
         "timestep" => translation.log.taken(node, "[time] step"),
-        "run" => {
-            run.steps = run.steps.saturating_add(count(translation, 0)?);
-            run.started = true;
-            translation.log.taken(node, "[time] end");
-        }
+        "reset_timestep" => reset(translation, variables, run, command)?,
         "thermo" => {
             run.history = Some(count(translation, 0)?);
             translation.log.taken(node, "[history] every_steps");
@@ -768,12 +907,11 @@ fn simulate(
             }
         }
         "velocity" => initial(translation, model, bodies, command),
-        "fix" => fix(translation, script, model, bodies, command)?,
-        "unfix" | "uncompute" => {
-            translation
-                .log
-                .left_out(node, "changes during a run are not followed");
-        }
+        "fix" => fix(translation, variables, model, bodies, command)?,
+        "unfix" => translation.log.taken(node, "its fix is left out"),
+        "uncompute" => translation
+            .log
+            .left_out(node, "fields that a `compute` adds stay"),
         "minimize" => {
             translation.log.left_out(
                 node,
@@ -794,18 +932,13 @@ fn initial(
 ) {
     let arguments = command.arguments();
     let name = arguments.first().copied().unwrap_or("");
-    let Some((_, velocity)) = model
-        .velocities
-        .iter()
-        .rev()
-        .find(|(group, _)| group == name)
-    else {
+    let mut velocities = model.velocities.iter();
+    let Some(at) = velocities.position(|velocity| velocity.node == command.node.id) else {
         return;
     };
-    if velocity
-        .iter()
-        .all(|component| component.unwrap_or(0.0) == 0.0)
-    {
+    let components = |velocity: &Velocity| velocity.components.map(|v| v.unwrap_or(0.0));
+    let is_zero = |velocity: &Velocity| components(velocity) == [0.0; 3];
+    if model.velocities[..=at].iter().all(is_zero) {
         translation.log.taken(&command.node, "points start at rest");
         return;
     }
@@ -815,8 +948,8 @@ fn initial(
             .left_out(&command.node, "its group is no body or region");
         return;
     };
-    let written = translation.name("initial", &set);
-    let components = velocity.map(|component| component.unwrap_or(0.0));
+    let written = translation.new_name("initial", &set);
+    let components = components(&model.velocities[at]);
     let section = translation.draft.section(&format!("initial.{written}"));
     section
         .set("set", Value::text(set))
@@ -829,7 +962,7 @@ fn initial(
 /// Read a fix.
 fn fix(
     translation: &mut Translation,
-    script: &Script,
+    variables: &Variables,
     model: &Model,
     bodies: &[(u32, String, String)],
     command: &Command,
@@ -852,7 +985,7 @@ fn fix(
             return Ok(());
         }
         "viscous" => return Ok(()),
-        "indent" => return indent(translation, script, model, command, unit),
+        "indent" => return indent(translation, variables, model, command, unit),
         _ => {}
     }
     let vector = |words: &[&str], factor: f64| -> std::result::Result<Vec<Value>, String> {
@@ -862,7 +995,7 @@ fn fix(
             vector.push(match *word {
                 "NULL" => Value::text("free"),
                 word => {
-                    let text = script.of_time(word)?;
+                    let text = variables.of_time(word)?;
                     match text.parse::<f64>() {
                         Ok(value) => Value::number(factor * value),
                         Err(_) => Value::text(format!("{factor:?}*({text})")),
@@ -876,7 +1009,7 @@ fn fix(
     let made = match (*style, rest.first().copied()) {
         ("setforce", _) => {
             let zero =
-                |k: usize| rest.get(k).and_then(|word| script.number(word).ok()) == Some(0.0);
+                |k: usize| rest.get(k).and_then(|word| variables.number(word).ok()) == Some(0.0);
             let is_null = |k: usize| rest.get(k) == Some(&"NULL");
             if !(0..3).all(|k| zero(k) || is_null(k)) {
                 translation
@@ -888,8 +1021,8 @@ fn fix(
                 .velocities
                 .iter()
                 .rev()
-                .find(|(of, _)| of == group || of == "all");
-            let velocity = velocity.map_or([None; 3], |(_, velocity)| *velocity);
+                .find(|velocity| velocity.group == *group || velocity.group == "all");
+            let velocity = velocity.map_or([None; 3], |velocity| velocity.components);
             let component = |k: usize| match is_null(k) {
                 true => Value::text("free"),
                 false => Value::number(velocity[k].unwrap_or(0.0)),
@@ -911,7 +1044,7 @@ fn fix(
             Some(("displacement", displacement, "displacement"))
         }
         ("move", Some("wiggle")) => {
-            let period = rest.get(4).and_then(|word| script.number(word).ok());
+            let period = rest.get(4).and_then(|word| variables.number(word).ok());
             let amplitudes =
                 vector(&rest[1..], unit).map_err(|m| wrong(translation, command, m))?;
             period.map(|period| {
@@ -975,7 +1108,7 @@ fn fix(
 /// Read an indenter, which becomes a rigid body.
 fn indent(
     translation: &mut Translation,
-    script: &Script,
+    variables: &Variables,
     model: &Model,
     command: &Command,
     unit: f64,
@@ -994,9 +1127,9 @@ fn indent(
     let position = |word: Option<&&str>| -> Result<(f64, Option<String>)> {
         let word = word.ok_or_else(|| fail("a number is missing".to_owned()))?;
         if !word.starts_with("v_") {
-            return Ok((unit * script.number(word).map_err(fail)?, None));
+            return Ok((unit * variables.number(word).map_err(fail)?, None));
         }
-        let text = script.of_time(word).map_err(fail)?;
+        let text = variables.of_time(word).map_err(fail)?;
         let expression =
             crate::expression::Expression::of(&text).map_err(|error| fail(error.message))?;
         let start = expression.evaluate([0.0; 3], 0.0);
@@ -1079,13 +1212,13 @@ fn indent(
             let word = behind
                 .get(at + 1 + k)
                 .ok_or_else(|| fail("a number is missing".to_owned()))?;
-            let speed = unit * script.number(word).map_err(fail)?;
+            let speed = unit * variables.number(word).map_err(fail)?;
             if speed != 0.0 {
                 *component = Some(format!("{speed:?}*t"));
             }
         }
     }
-    let written = translation.name("rigid", "indenter");
+    let written = translation.new_name("rigid", "indenter");
     let mut section = Section::new(format!("rigid.{written}"));
     let Value::Table(entries) = shape else {
         unreachable!("a shape is a table");
@@ -1114,16 +1247,14 @@ fn indent(
 
 impl Run {
     /// Write time and outputs.
-    fn write(self, translation: &mut Translation, script: &Script, model: &Model) -> Result<()> {
-        let Some(step) = script.step.filter(|step| *step > 0.0) else {
-            return Err(translation.error(1, "the script has no `timestep` above 0"));
-        };
-        if self.steps == 0 {
+    fn write(self, translation: &mut Translation, model: &Model) -> Result<()> {
+        let Some((_, step)) = self.runs.first() else {
             return Err(translation.error(1, "the script has no `run`"));
-        }
+        };
+        let ends = self.runs.iter().map(|(steps, step)| *steps as f64 * step);
         let time = translation.draft.section("time");
-        time.set("end", Value::number(self.steps as f64 * step));
-        time.set("step", Value::number(step));
+        time.set("end", Value::number(ends.sum()));
+        time.set("step", Value::number(*step));
         let output = translation.draft.section("output");
         if let Some(steps) = self.output {
             output.set("every_steps", Value::Number(steps.to_string()));

@@ -1,7 +1,7 @@
 //! Regions of LAMMPS, which become shapes.
 
 use super::draft::Value;
-use super::script::Script;
+use super::script::Variables;
 
 /// Fraction of the spacing by which a shape is larger than a region: LAMMPS counts atoms on the surface, which would
 /// be lost by round-off.
@@ -27,7 +27,7 @@ pub enum Region {
 /// # Errors
 /// If it is of another style, or a number is none.
 pub fn region(
-    script: &Script,
+    variables: &Variables,
     arguments: &[&str],
     spacing: f64,
     known: &dyn Fn(&str) -> Option<Region>,
@@ -60,7 +60,7 @@ pub fn region(
                     f64::INFINITY
                 })
             }
-            word => Ok(unit * script.number(word)?),
+            word => Ok(unit * variables.number(word)?),
         }
     };
     match style {
@@ -92,7 +92,7 @@ pub fn region(
             ))
         }
         "union" => {
-            let count = script.number(rest.first().ok_or("a number is missing")?)? as usize;
+            let count = variables.number(rest.first().ok_or("a number is missing")?)? as usize;
             let names = rest.get(1..=count).ok_or("regions are missing")?;
             let parts = names.iter().map(|name| {
                 known(name).ok_or_else(|| format!("the region `{name}` is not defined"))

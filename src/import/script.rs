@@ -38,8 +38,13 @@ impl Command {
 pub struct Script {
     /// Its commands in order.
     pub commands: Vec<Command>,
-    /// Formulas and values of variables.
-    variables: HashMap<String, String>,
+}
+
+/// Variables and time step behind some of the commands of a script.
+#[derive(Debug, Default)]
+pub struct Variables {
+    /// Formulas and values by name.
+    values: HashMap<String, String>,
     /// The time step, s, of the last `timestep`.
     pub step: Option<f64>,
 }
@@ -52,12 +57,13 @@ pub fn is_script(text: &str) -> bool {
     })
 }
 
-/// Split a script into commands and define its variables.
+/// Split a script into commands and replace `$` by the values that variables have at each command.
 ///
 /// # Errors
 /// On a quote that is not closed, or a variable that is not defined.
 pub fn parse(text: &str) -> Result<Script, Mistake> {
     let mut script = Script::default();
+    let mut variables = Variables::default();
     let mut pending: Option<(usize, String)> = None;
     for (line, row) in (1..).zip(text.lines()) {
         let row = without_comment(row);
@@ -67,10 +73,10 @@ pub fn parse(text: &str) -> Result<Script, Mistake> {
             pending = Some((start, format!("{continued} ")));
             continue;
         }
-        script.command(start, &joined)?;
+        script.command(&mut variables, start, &joined)?;
     }
     if let Some((start, joined)) = pending {
-        script.command(start, &joined)?;
+        script.command(&mut variables, start, &joined)?;
     }
     Ok(script)
 }
@@ -109,21 +115,43 @@ fn words(text: &str) -> Result<Vec<String>, String> {
 
 impl Script {
     /// Add the command of a line.
-    fn command(&mut self, line: usize, text: &str) -> Result<(), Mistake> {
+    fn command(
+        &mut self,
+        variables: &mut Variables,
+        line: usize,
+        text: &str,
+    ) -> Result<(), Mistake> {
         let mistake = |message: String| (line, message);
-        let text = self.substitute(text).map_err(mistake)?;
+        let text = variables.substitute(text).map_err(mistake)?;
         let words = words(&text).map_err(mistake)?;
-        let Some(name) = words.first() else {
+        if words.is_empty() {
             return Ok(());
-        };
+        }
         if self.commands.len() >= MOST_NODES {
             return Err((line, "the commands are too many".to_owned()));
         }
-        match (name.as_str(), words.len()) {
-            ("timestep", 2) => {
-                let step = self.number(&words[1]).map_err(|message| (line, message))?;
-                self.step = Some(step);
-            }
+        // The command word is the key of its node.
+        let node = Node {
+            id: self.commands.len() + 1,
+            line,
+            content: Content::Text(words[1..].join(" ")),
+        };
+        let command = Command { words, node };
+        variables.read(&command).map_err(mistake)?;
+        self.commands.push(command);
+        Ok(())
+    }
+}
+
+impl Variables {
+    /// Take over what a command defines: a variable or the time step.
+    ///
+    /// # Errors
+    /// If the time step is no number.
+    pub fn read(&mut self, command: &Command) -> Result<(), String> {
+        let words = &command.words;
+        match (command.name(), words.len()) {
+            ("timestep", 2) => self.step = Some(self.number(&words[1])?),
             ("variable", 4..) => {
                 let style = words[2].as_str();
                 let value = match style {
@@ -132,20 +160,13 @@ impl Script {
                     _ => None,
                 };
                 // An index that has a value already keeps it.
-                let keeps = style == "index" && self.variables.contains_key(&words[1]);
+                let keeps = style == "index" && self.values.contains_key(&words[1]);
                 if let (Some(value), false) = (value, keeps) {
-                    self.variables.insert(words[1].clone(), value);
+                    self.values.insert(words[1].clone(), value);
                 }
             }
             _ => {}
         }
-        // The command word is the key of its node.
-        let node = Node {
-            id: self.commands.len() + 1,
-            line,
-            content: Content::Text(words[1..].join(" ")),
-        };
-        self.commands.push(Command { words, node });
         Ok(())
     }
 
@@ -194,7 +215,7 @@ impl Script {
 
     /// The value of a variable as text: of a formula, its value.
     fn value(&self, name: &str) -> Result<String, String> {
-        let text = self.variables.get(name);
+        let text = self.values.get(name);
         let text = text.ok_or_else(|| format!("the variable `{name}` is not defined"))?;
         Ok(match self.constant(text) {
             Ok(value) => value,
@@ -221,7 +242,7 @@ impl Script {
     pub fn number(&self, word: &str) -> Result<f64, String> {
         let number = word.parse::<f64>().ok().or_else(|| {
             let name = word.strip_prefix("v_")?;
-            self.constant(self.variables.get(name)?).ok()?.parse().ok()
+            self.constant(self.values.get(name)?).ok()?.parse().ok()
         });
         let number = number.filter(|number| number.is_finite());
         number.ok_or_else(|| {
@@ -241,7 +262,7 @@ impl Script {
             self.number(word)?;
             return Ok(word.to_owned());
         };
-        let formula = self.variables.get(name);
+        let formula = self.values.get(name);
         let formula = formula.ok_or_else(|| format!("the variable `{name}` is not defined"))?;
         let step = self.step.ok_or("the script has no `timestep`")?;
         self.formula(formula, step, 0)
@@ -264,7 +285,7 @@ impl Script {
             "time" => Some("t".to_owned()),
             "step" | "elapsed" | "elaplong" => Some(format!("(t/{step:?})")),
             name => {
-                let known = self.variables.get(name.strip_prefix("v_")?)?;
+                let known = self.values.get(name.strip_prefix("v_")?)?;
                 match self.formula(known, step, depth + 1) {
                     Ok(text) => Some(match text.parse::<f64>() {
                         Ok(value) if value >= 0.0 => text,
@@ -289,6 +310,15 @@ impl Script {
 mod tests {
     use super::*;
 
+    /// The variables behind all commands.
+    fn behind(script: &Script) -> Variables {
+        let mut variables = Variables::default();
+        for command in &script.commands {
+            variables.read(command).unwrap();
+        }
+        variables
+    }
+
     #[test]
     fn commands_are_joined_and_variables_replaced() {
         let text = "units si # metres\nvariable a equal 2*PI\nvariable n index 7\n\
@@ -305,9 +335,10 @@ mod tests {
         let fix = &script.commands[3];
         assert_eq!(fix.node.line, 4);
         assert_eq!(fix.words[6..], ["0", "6.283185307179586", "7", "v_y"]);
-        assert_eq!(script.of_time("v_y").unwrap(), "0.5-t*100");
+        let variables = behind(&script);
+        assert_eq!(variables.of_time("v_y").unwrap(), "0.5-t*100");
         assert_eq!(script.commands[7].words[1], "70.0");
-        assert_eq!(script.step, Some(1e-7));
+        assert_eq!(variables.step, Some(1e-7));
     }
 
     #[test]
@@ -325,8 +356,8 @@ mod tests {
             );
         }
         let text = "timestep 1\nvariable a equal v_b\nvariable b equal v_a\n";
-        let script = parse(text).unwrap();
+        let variables = behind(&parse(text).unwrap());
         let message = "the variables are too deep, or use themselves";
-        assert_eq!(script.of_time("v_a"), Err(message.to_owned()));
+        assert_eq!(variables.of_time("v_a"), Err(message.to_owned()));
     }
 }

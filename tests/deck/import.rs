@@ -828,6 +828,168 @@ fn a_damage_model_without_a_counterpart_is_a_loss() {
     assert_eq!(imported.losses().damages, [line]);
     assert!(imported.losses().conditions.is_empty());
 }
+/// Twelve points of LAMMPS, of which the four with x = 2 are the group `top`.
+const BLOCK: &str = "atom_style peri
+lattice sc 1.0
+region r block 0 2 0 1 0 1
+region high block 1.5 2 INF INF INF INF
+create_box 1 r
+create_atoms 1 region r
+group top region high
+pair_style peri/pmb
+pair_coeff * * 3.0e4 1.5 0.1 0.0
+set type 1 density 5
+timestep 1e-6
+";
+
+/// The import of the block with further commands.
+fn block(folder: &Folder, commands: &str) -> Import {
+    let imported = folder.import("in.block", &format!("{BLOCK}{commands}"));
+    imported.unwrap_or_else(|error| panic!("{commands}{error}"))
+}
+
+/// The lines of a new deck without comments.
+fn lines(imported: &Import) -> Vec<&str> {
+    let lines = imported.text.lines();
+    lines.filter(|line| !line.starts_with('#')).collect()
+}
+
+#[test]
+fn commands_of_lammps_after_the_first_run_change_only_the_end() {
+    let folder = Folder::new("later");
+    let before = "variable v equal 2
+variable y equal step*3
+velocity all set v_v 0 0
+variable v equal 4
+fix 1 top addforce v_y v_v 0
+thermo 7
+run 10
+";
+    let first = block(&folder, before);
+    folder.problem(&first);
+    for line in [
+        "velocity = [2.0, 0.0, 0.0]",
+        "density = 5.0",
+        "end = 1e-5",
+        "step = 1e-6",
+    ] {
+        assert!(lines(&first).contains(&line), "{line}\n{}", first.text);
+    }
+    let after = "set type 1 density 9
+velocity all set 1 1 1
+fix 2 all viscous 3
+fix 3 all addforce 1 0 0
+unfix 1
+pair_coeff * * 9.0e4 1.5 0.1 0.0
+group low type 1
+compute 1 all damage/atom
+dump 1 all custom 50 dump.peri id x
+thermo 5
+create_atoms 1 region high
+";
+    let changes = "variable v equal 7\nvariable y equal 8\ntimestep 2e-6\n";
+    let whole = block(&folder, &format!("{before}{after}{changes}"));
+    assert_eq!(lines(&whole), lines(&first));
+    let start = BLOCK.lines().count() + before.lines().count();
+    let left_out = &whole.entries[start..start + after.lines().count()];
+    for entry in left_out {
+        let note = "changes after the first `run` are not followed";
+        assert_eq!((entry.fate, &*entry.note), (Fate::LeftOut, note), "{entry}");
+    }
+    // Each run has the step in force.
+    let whole = block(&folder, &format!("{before}{changes}run v_v\nrun 3\n"));
+    let expected = lines(&first).into_iter().map(|line| match line {
+        "end = 1e-5" => "end = 3e-5",
+        line => line,
+    });
+    assert_eq!(lines(&whole), expected.collect::<Vec<_>>());
+    let steps = whole.entries.iter().filter(|entry| entry.key == "timestep");
+    let fates: Vec<Fate> = steps.map(|entry| entry.fate).collect();
+    assert_eq!(fates, [Fate::Taken, Fate::Approximated]);
+}
+
+#[test]
+fn velocities_of_lammps_act_in_order() {
+    let folder = Folder::new("velocities");
+    for (commands, all, top) in [
+        (
+            "velocity all set 3 0 10\nvelocity top set 0 0 0\n",
+            [3.0, 0.0, 10.0],
+            [0.0; 3],
+        ),
+        (
+            "velocity top set 0 0 0\nvelocity all set 3 0 10\n",
+            [3.0, 0.0, 10.0],
+            [3.0, 0.0, 10.0],
+        ),
+        (
+            "velocity all set 3 0 10\nvelocity top set NULL 4 NULL\n",
+            [3.0, 0.0, 10.0],
+            [3.0, 4.0, 10.0],
+        ),
+        (
+            "velocity top set 1 2 3\nvelocity top set 4 NULL 0\n",
+            [0.0; 3],
+            [4.0, 2.0, 0.0],
+        ),
+        ("velocity all set 0 0 0\n", [0.0; 3], [0.0; 3]),
+    ] {
+        let imported = block(&folder, &format!("{commands}run 1\n"));
+        let problem = folder.problem(&imported);
+        with::<3, _>(&problem, |simulation| {
+            assert_eq!(simulation.model.owned(), 12);
+            for point in 0..12 {
+                let [x, ..] = simulation.model.position(point);
+                let expected = if x > 1.5 { top } else { all };
+                let velocity = simulation.fields.velocity.each_ref();
+                let velocity = velocity.map(|component| component[point]);
+                assert_eq!(velocity, expected, "{commands}{x}");
+            }
+        });
+    }
+}
+
+#[test]
+fn fixes_of_lammps_that_do_not_act_are_left_out() {
+    let folder = Folder::new("unfix");
+    let plain = block(&folder, "run 10\n");
+    let removed = "fix 1 top addforce 1 0 0\nfix 2 all viscous 3\nunfix 1\nunfix 2\nrun 10\n";
+    let removed = block(&folder, removed);
+    assert_eq!(lines(&removed), lines(&plain));
+    assert_eq!(
+        fate(&removed, "fix"),
+        (Fate::LeftOut, "`unfix` removes it before the first `run`")
+    );
+    let last = "fix 1 top addforce 2 0 0\nrun 10\n";
+    let replaced = block(&folder, &format!("fix 1 all addforce 1 0 0\n{last}"));
+    assert_eq!(lines(&replaced), lines(&block(&folder, last)));
+}
+
+#[test]
+fn a_run_of_lammps_ends_at_a_step() {
+    let folder = Folder::new("upto");
+    for (commands, end) in [
+        ("run 10\nrun 25 upto\nrun 5\n", "end = 3e-5"),
+        ("run 10\nreset_timestep 0\nrun 25 upto\n", "end = 3.5e-5"),
+        ("reset_timestep 20\nrun 25 upto\n", "end = 5e-6"),
+    ] {
+        let imported = block(&folder, commands);
+        assert!(lines(&imported).contains(&end), "{}", imported.text);
+    }
+    let wrong = format!("{BLOCK}run 10\nrun 5 upto\n");
+    let error = folder.import("deck", &wrong).unwrap_err();
+    let message = "deck:13:1: run: the last step 5 is before the step 10";
+    assert_eq!(error.lines().next(), Some(message));
+}
+
+#[test]
+fn indenters_of_lammps_have_names_of_their_own() {
+    let folder = Folder::new("indenters");
+    let commands =
+        "fix 1 all indent 1e9 sphere 0 9 0 3\nfix 2 all indent 1e9 sphere 0 -9 0 3\nrun 1\n";
+    let problem = folder.problem(&block(&folder, commands));
+    assert_eq!(problem.rigid.len(), 2);
+}
 
 #[test]
 fn a_wrong_deck_names_file_and_line() {
