@@ -154,7 +154,7 @@ impl Conditions {
                     .taken(value, format!("[initial.{set}] {key}"));
                 self.initials.push(Initial {
                     set,
-                    key: *key,
+                    key,
                     component,
                     value: expression,
                     node: value.clone(),
