@@ -136,9 +136,12 @@ fn weibull(
             }
         };
     };
-    let key = format!("{key} weibull_modulus");
-    let modulus = scope.within(modulus, &key, 1.0..f64::INFINITY, "1 or more")?;
-    let seed = seed.as_ref().map_or(0, |seed| *seed.get_ref());
+    let place = format!("{key} weibull_modulus");
+    let modulus = scope.within(modulus, &place, 1.0..f64::INFINITY, "1 or more")?;
+    let seed = match seed {
+        Some(seed) => scope.whole(seed, &format!("{key} seed"))?,
+        None => 0,
+    };
     Ok(Some(Weibull { modulus, seed }))
 }
 

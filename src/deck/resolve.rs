@@ -80,6 +80,16 @@ impl<'a> Scope<'a> {
         Ok(value.expect("an expression without variables is a constant"))
     }
 
+    /// A whole number that TOML can write: its integers end at 2⁶³.
+    pub fn whole(&self, number: &Spanned<u64>, key: &str) -> Result<u64> {
+        let (value, most) = (*number.get_ref(), i64::MAX);
+        if value <= most as u64 {
+            return Ok(value);
+        }
+        let message = format!("{key}: must be at most {most}, is {value}");
+        Err(self.error(number.span(), message))
+    }
+
     /// A number above 0.
     pub fn positive(&self, number: &Number, key: &str) -> Result<f64> {
         self.within(number, key, f64::MIN_POSITIVE..f64::INFINITY, "above 0")

@@ -86,7 +86,10 @@ fn selector(
         Ok(problem::Selector::Mesh(set))
     } else if let Some(file) = &set.file {
         let folder = scope.source.path.parent().unwrap_or("".as_ref());
-        let first = set.first_id.as_ref().map_or(0, |first| *first.get_ref());
+        let first = match &set.first_id {
+            Some(first) => scope.whole(first, &format!("{key} first_id"))?,
+            None => 0,
+        };
         let ids = id_file::read(&folder.join(file.get_ref()), first)
             .map_err(|message| scope.error(file.span(), format!("{key} file: {message}")))?;
         Ok(problem::Selector::Ids {

@@ -223,7 +223,10 @@ fn jitter(scope: &Scope, deck: &Deck) -> Result<Option<problem::Jitter>> {
     let words = "at least 0 and below 0.5";
     Ok(Some(problem::Jitter {
         share: scope.within(share, "[grid] jitter", 0.0..0.5, words)?,
-        seed: grid.seed.as_ref().map_or(0, |seed| *seed.get_ref()),
+        seed: match &grid.seed {
+            Some(seed) => scope.whole(seed, "[grid] seed")?,
+            None => 0,
+        },
     }))
 }
 
