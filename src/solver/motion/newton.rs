@@ -15,7 +15,7 @@
 //!
 //! K is symmetric for laws with an energy. Where it is not positive definite, as in a body that softens or buckles, the
 //! conjugate gradients end at the first direction of negative curvature. The preconditioner adds up two parts: the
-//! diagonal, which is good for short waves, and a [coarse grid](super::coarse_grid), for long ones.
+//! diagonal, which is good for short waves, and a coarse grid (`coarse_grid.rs`), for long ones.
 //!
 //! The first iteration of a load step of another size than the one before, and after one in which bonds broke, is taken
 //! about the last equilibrium with the prescribed displacements as part of the motion. Others begin where the points get to
