@@ -84,9 +84,10 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     }
     let imported = import::import(&arguments.deck, code, &target)?;
     let mut options = OpenOptions::new();
-    match arguments.overwrite {
-        true => options.write(true).create(true).truncate(true),
-        false => options.write(true).create_new(true),
+    if arguments.overwrite {
+        options.write(true).create(true).truncate(true)
+    } else {
+        options.write(true).create_new(true)
     };
     let mut file = match options.open(&target) {
         Ok(file) => file,
@@ -130,16 +131,15 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
 fn default_target(deck: &Path) -> PathBuf {
     let endings = ["yaml", "yml", "xml", "peridigm"];
     let ending = deck.extension().and_then(|ending| ending.to_str());
-    match ending.is_some_and(|ending| {
+    if ending.is_some_and(|ending| {
         endings
             .iter()
             .any(|known| ending.eq_ignore_ascii_case(known))
     }) {
-        true => deck.with_extension("toml"),
-        false => {
-            let mut name = deck.as_os_str().to_owned();
-            name.push(".toml");
-            name.into()
-        }
+        deck.with_extension("toml")
+    } else {
+        let mut name = deck.as_os_str().to_owned();
+        name.push(".toml");
+        name.into()
     }
 }

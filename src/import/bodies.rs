@@ -108,9 +108,10 @@ pub fn damage(
         } => {
             let bond_based = BOND_BASED.contains(&material.law);
             // Bonds of a bond-based law break in tension only.
-            let name = match bond_based && !tension_only {
-                true => translation.name("damage", &format!("{} of bonds", model.read)),
-                false => translation.name("damage", &model.read),
+            let name = if bond_based && !tension_only {
+                translation.name("damage", &format!("{} of bonds", model.read))
+            } else {
+                translation.name("damage", &model.read)
             };
             let header = format!("damage.{name}.energy");
             let note = format!("[{header}] fracture_energy with PeriLab's calibration");

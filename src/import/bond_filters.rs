@@ -41,9 +41,10 @@ fn vector(translation: &Translation, filter: &Node, key: &str, note: &str) -> Re
             _ => translation.required(filter, &key, "the bond filter")?,
         };
         vector[k] = translation.number(node, &key)?;
-        match k < translation.dimension {
-            true => translation.log.taken(node, note),
-            false => translation.log.left_out(node, "the problem has no z"),
+        if k < translation.dimension {
+            translation.log.taken(node, note)
+        } else {
+            translation.log.left_out(node, "the problem has no z")
         }
     }
     Ok(vector)
@@ -62,9 +63,10 @@ fn scaled(vector: [f64; 3], factor: f64) -> [f64; 3] {
 /// A vector of length 1, or the zero vector.
 fn unit(vector: [f64; 3]) -> [f64; 3] {
     let length = vector.iter().map(|c| c * c).sum::<f64>().sqrt();
-    match length > 0.0 {
-        true => scaled(vector, 1.0 / length),
-        false => vector,
+    if length > 0.0 {
+        scaled(vector, 1.0 / length)
+    } else {
+        vector
     }
 }
 

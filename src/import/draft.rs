@@ -50,9 +50,10 @@ impl Value {
     /// A computed number, with 15 digits, so that round-off does not show.
     pub fn number(value: f64) -> Self {
         let rounded = format!("{value:.14e}").parse::<f64>().unwrap_or(value);
-        Self::Number(match rounded.is_nan() {
-            true => "nan".to_owned(),
-            false => format!("{rounded:?}"),
+        Self::Number(if rounded.is_nan() {
+            "nan".to_owned()
+        } else {
+            format!("{rounded:?}")
         })
     }
 

@@ -66,7 +66,7 @@ enum Token {
     Symbol(&'static str),
 }
 
-/// The symbols; a longer one precedes those that it starts with.
+/// The symbols. A symbol comes before its own prefixes, so the longest match is found first.
 const SYMBOLS: [&str; 27] = [
     "<=", ">=", "==", "!=", "&&", "||", "**", "+", "-", "*", "/", "^", "(", ")", ",", "<", ">",
     "!", "=", ";", "{", "}", "?", ":", "&", "|", "≤",
@@ -233,9 +233,10 @@ impl Rewriter<'_> {
             let condition = self.with_value(&tokens[at + 2..end], value.as_deref(), depth)?;
             let (then, next) = self.body(tokens, end + 1, value.clone(), depth + 1)?;
             let has_else = tokens.get(next).is_some_and(|token| is_name(token, "else"));
-            let (otherwise, next) = match has_else {
-                true => self.body(tokens, next + 1, value, depth + 1)?,
-                false => (value, next),
+            let (otherwise, next) = if has_else {
+                self.body(tokens, next + 1, value, depth + 1)?
+            } else {
+                (value, next)
             };
             let or_zero = |value: Option<String>| value.unwrap_or_else(|| "0".to_owned());
             let chosen = format!("if({condition}, {}, {})", or_zero(then), or_zero(otherwise));
@@ -272,9 +273,10 @@ impl Rewriter<'_> {
             return Ok((value, at + usize::from(ends)));
         }
         let (value, end) = self.block(tokens, at + 1, value, depth)?;
-        match end < tokens.len() {
-            true => Ok((value, end + 1)),
-            false => Err("`{` is not closed".to_owned()),
+        if end < tokens.len() {
+            Ok((value, end + 1))
+        } else {
+            Err("`{` is not closed".to_owned())
         }
     }
 

@@ -272,8 +272,9 @@ fn value(node: &Node) -> String {
 /// A value on one line, shortened.
 fn shown(text: &str) -> String {
     let text = text.trim();
-    match text.is_empty() {
-        true => String::new(),
-        false => excerpt(text).trim_matches('`').to_owned(),
+    if text.is_empty() {
+        String::new()
+    } else {
+        excerpt(text).trim_matches('`').to_owned()
     }
 }

@@ -119,10 +119,11 @@ pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<I
         .trim_start()
         .starts_with('<');
     let text = source.text.trim_start_matches('\u{feff}');
-    let parsed = match is_xml {
-        true => xml::parse(text),
+    let parsed = if is_xml {
+        xml::parse(text)
+    } else {
         // Braces of statements are escaped in decks of Peridigm, which is no escape of YAML.
-        false => yaml::parse(&text.replace("\\{", "{").replace("\\}", "}")),
+        yaml::parse(&text.replace("\\{", "{").replace("\\}", "}"))
     };
     let root = parsed.map_err(|(line, message)| line_error(source, line, message))?;
     let found = match root.get("PeriLab") {

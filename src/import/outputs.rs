@@ -342,9 +342,10 @@ impl Outputs {
         if !self.fields.contains(field) {
             self.fields.push(field);
         }
-        match difference.is_empty() {
-            true => (Fate::Taken, format!("field {field}")),
-            false => (Fate::Approximated, format!("field {field}, {difference}")),
+        if difference.is_empty() {
+            (Fate::Taken, format!("field {field}"))
+        } else {
+            (Fate::Approximated, format!("field {field}, {difference}"))
         }
     }
 

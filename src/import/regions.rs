@@ -138,9 +138,12 @@ impl Region {
 
     /// The region without infinite ends, cut to a box.
     pub fn within(&self, bounds: [[f64; 3]; 2]) -> Self {
-        let clamp = |value: f64, k: usize| match value.is_finite() {
-            true => value,
-            false => bounds[usize::from(value > 0.0)][k],
+        let clamp = |value: f64, k: usize| {
+            if value.is_finite() {
+                value
+            } else {
+                bounds[usize::from(value > 0.0)][k]
+            }
         };
         let all = |parts: &[Self]| parts.iter().map(|part| part.within(bounds)).collect();
         match self {

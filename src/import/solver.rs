@@ -51,6 +51,25 @@ pub struct Stage {
     pub breaks: bool,
 }
 
+/// Read the time at which the first solver starts.
+///
+/// # Errors
+/// If it is no number.
+pub fn read_start(translation: &mut Translation, first: &Node) -> Result<()> {
+    let Some(initial) = first.get("Initial Time") else {
+        return Ok(());
+    };
+    let start = translation.number(initial, "Initial Time")?;
+    if start == 0.0 {
+        translation.log.taken(initial, "a run starts at 0");
+    } else {
+        let note = "a run starts at 0; times are shifted";
+        translation.log.approximated(initial, note);
+    }
+    translation.start = start;
+    Ok(())
+}
+
 /// Read a solver that starts at a time, s. A default is that damage models act unless the deck says otherwise.
 ///
 /// # Errors
@@ -103,9 +122,10 @@ pub fn stage(
         log.taken(end, "[time] end");
         translation.number(end, "Final Time")
     };
-    let later = |end: f64, line: usize| match end > start {
-        true => Ok(end),
-        false => {
+    let later = |end: f64, line: usize| {
+        if end > start {
+            Ok(end)
+        } else {
             let message = format!("the end {end} must be later than the start {start}");
             Err(translation.error(line, message))
         }

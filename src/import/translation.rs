@@ -112,12 +112,11 @@ impl<'a> Translation<'a> {
     pub fn count(&self, node: &Node, key: &str) -> Result<u64> {
         let number = self.number(node, key)?;
         let is_whole = (0.0..1e15).contains(&number) && number.fract() == 0.0;
-        match is_whole {
-            true => Ok(number as u64),
-            false => {
-                let message = format!("`{key}` must be a whole number, is {number}");
-                Err(self.error(node.line, message))
-            }
+        if is_whole {
+            Ok(number as u64)
+        } else {
+            let message = format!("`{key}` must be a whole number, is {number}");
+            Err(self.error(node.line, message))
         }
     }
 
@@ -136,15 +135,17 @@ impl<'a> Translation<'a> {
         let names = |name: &str| match name {
             "t" if start != 0.0 => Some(format!("(t + {start:?})")),
             // Time since the start of a step of PeriLab.
-            "st" if self.dialect == Dialect::PeriLab => Some(match self.step_start == 0.0 {
-                true => "t".to_owned(),
-                false => format!("(t - {:?})", self.step_start),
+            "st" if self.dialect == Dialect::PeriLab => Some(if self.step_start == 0.0 {
+                "t".to_owned()
+            } else {
+                format!("(t - {:?})", self.step_start)
             }),
             _ => None,
         };
-        let variables = match of_time {
-            true => &POSITION_AND_TIME[..],
-            false => &POSITION[..],
+        let variables = if of_time {
+            &POSITION_AND_TIME[..]
+        } else {
+            &POSITION[..]
         };
         let variables: Vec<_> = (0..variables.len())
             .filter(|k| *k < self.dimension || *k == 3)
@@ -204,18 +205,22 @@ impl<'a> Translation<'a> {
     /// The path of a file of the deck as the new deck names it.
     pub fn file(&self, file: &str) -> Value {
         let path = self.path(file);
-        let path = match Path::new(file).is_absolute() {
-            true => path,
-            false => relative(&path, &self.target),
+        let path = if Path::new(file).is_absolute() {
+            path
+        } else {
+            relative(&path, &self.target)
         };
         Value::text(path.display().to_string().replace('\\', "/"))
     }
 
     /// A vector with one component; the others have a default.
     pub fn component(&self, component: usize, value: Value, others: &Value) -> Value {
-        Value::list((0..self.dimension).map(|k| match k == component {
-            true => value.clone(),
-            false => others.clone(),
+        Value::list((0..self.dimension).map(|k| {
+            if k == component {
+                value.clone()
+            } else {
+                others.clone()
+            }
         }))
     }
 

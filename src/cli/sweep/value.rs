@@ -111,7 +111,7 @@ impl Column {
         found.map_or("", |(name, _)| name)
     }
 
-    /// The picked one of some numbers; those that are not finite are skipped for the largest and the smallest.
+    /// Pick one of some numbers; the largest and the smallest ignore values that are not finite.
     fn of(&self, numbers: &[f64]) -> Option<f64> {
         let finite = numbers.iter().copied().filter(|number| number.is_finite());
         let picked = match self.pick {

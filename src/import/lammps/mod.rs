@@ -1,0 +1,146 @@
+//! Input scripts of LAMMPS with `atom_style peri`.
+
+mod fixes;
+mod materials;
+mod run;
+mod setup;
+
+use crate::error::Result;
+use crate::import::regions::Region;
+use crate::import::script::{Command, Script, Variables};
+use crate::import::translation::Translation;
+use crate::import::tree::{Content, Node};
+use materials::{Coefficients, write_bodies};
+use run::{Run, follow, simulate};
+use setup::{Group, setup};
+use std::collections::HashMap;
+
+/// Atoms that a command creates.
+struct Atoms {
+    kind: u32,
+    region: Region,
+    /// Name of their region.
+    name: String,
+}
+
+/// The velocity that a command sets.
+struct Velocity {
+    /// Node of the command.
+    node: usize,
+    group: String,
+    /// Its components; `None` if neither the command nor an earlier one sets them.
+    components: [Option<f64>; 3],
+}
+
+/// What a script says of its atoms, gathered before the deck is written.
+#[derive(Default)]
+struct Model {
+    spacing: Option<f64>,
+    origin: [f64; 3],
+    regions: Vec<(String, Region, Node)>,
+    bounds: Option<[[f64; 3]; 2]>,
+    types: u32,
+    atoms: Vec<Atoms>,
+    style: Option<(String, Node)>,
+    coefficients: Vec<Coefficients>,
+    /// Type, or all, and density.
+    densities: Vec<(Option<u32>, f64)>,
+    /// Names of groups and their selections.
+    groups: Vec<(String, Group, Node)>,
+    /// Damping of all atoms, force over velocity.
+    drag: Option<f64>,
+    /// Velocities of groups in the order of the commands.
+    velocities: Vec<Velocity>,
+    computes: Vec<(String, String)>,
+    fields: Vec<&'static str>,
+}
+
+/// The tree of a script, whose keys are the commands.
+pub fn tree(script: &Script) -> Node {
+    let commands = script.commands.iter();
+    let entries = commands.map(|command| (command.name().to_owned(), command.node.clone()));
+    Node {
+        id: 0,
+        line: 1,
+        content: Content::Table(entries.collect()),
+    }
+}
+
+/// Translate a script.
+///
+/// # Errors
+/// If what a run needs is missing or wrong.
+pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
+    let commands = &script.commands;
+    let first = commands.iter().position(|command| command.name() == "run");
+    let (before, after) = commands.split_at(first.unwrap_or(commands.len()));
+    let without = without_effect(before);
+    let mut model = Model::default();
+    let mut variables = Variables::default();
+    let read = |translation: &Translation, variables: &mut Variables, command: &Command| {
+        let read = variables.read(command);
+        read.map_err(|message| wrong(translation, command, message))
+    };
+    for command in before {
+        read(translation, &mut variables, command)?;
+        match without.get(&command.node.id) {
+            Some(reason) => translation.log.left_out(&command.node, *reason),
+            None => setup(translation, &variables, &mut model, command)?,
+        }
+    }
+    let bodies = write_bodies(translation, &mut model)?;
+    let mut run = Run::default();
+    // Fixes and outputs look their variables up when a run starts.
+    for command in before {
+        if !without.contains_key(&command.node.id) {
+            simulate(
+                translation,
+                &variables,
+                &mut model,
+                &bodies,
+                &mut run,
+                command,
+            )?;
+        }
+    }
+    for command in after {
+        read(translation, &mut variables, command)?;
+        follow(translation, &variables, &mut run, command)?;
+    }
+    run.write(translation, &model)
+}
+
+/// Fixes in front of the first run that do not act in it, by their nodes, and why.
+fn without_effect(commands: &[Command]) -> HashMap<usize, &'static str> {
+    let mut acting: HashMap<&str, usize> = HashMap::new();
+    let mut without = HashMap::new();
+    for command in commands {
+        let Some(id) = command.words.get(1) else {
+            continue;
+        };
+        match command.name() {
+            "fix" => {
+                if let Some(earlier) = acting.insert(id, command.node.id) {
+                    without.insert(earlier, "a later `fix` of the same id replaces it");
+                }
+            }
+            "unfix" => {
+                if let Some(removed) = acting.remove(id.as_str()) {
+                    without.insert(removed, "`unfix` removes it before the first `run`");
+                }
+            }
+            _ => {}
+        }
+    }
+    without
+}
+
+/// An error about a command.
+fn wrong(
+    translation: &Translation,
+    command: &Command,
+    message: impl AsRef<str>,
+) -> crate::error::Error {
+    let message = format!("{}: {}", command.name(), message.as_ref());
+    translation.error(command.node.line, message)
+}

@@ -1,0 +1,331 @@
+//! Runs, their steps and outputs, and initial velocities.
+
+use super::fixes::fix;
+use super::setup::{Group, ignored};
+use super::{Model, Velocity, wrong};
+use crate::error::Result;
+use crate::import::draft::{Section, Value};
+use crate::import::script::{Command, Variables};
+use crate::import::translation::Translation;
+
+/// Commands that concern the way LAMMPS works or what it prints.
+pub(super) const WORKINGS: [&str; 27] = [
+    "atom_modify",
+    "neighbor",
+    "neigh_modify",
+    "newton",
+    "processors",
+    "comm_modify",
+    "comm_style",
+    "communicate",
+    "suffix",
+    "package",
+    "special_bonds",
+    "thermo_style",
+    "thermo_modify",
+    "dump_modify",
+    "run_style",
+    "restart",
+    "write_restart",
+    "write_data",
+    "log",
+    "echo",
+    "print",
+    "info",
+    "shell",
+    "timer",
+    "label",
+    "balance",
+    "undump",
+];
+
+/// Fields of atoms in a dump, and of computes.
+const FIELDS: [(&str, &str); 21] = [
+    ("x", "displacement"),
+    ("y", "displacement"),
+    ("z", "displacement"),
+    ("xu", "displacement"),
+    ("yu", "displacement"),
+    ("zu", "displacement"),
+    ("xs", "displacement"),
+    ("ys", "displacement"),
+    ("zs", "displacement"),
+    ("vx", "velocity"),
+    ("vy", "velocity"),
+    ("vz", "velocity"),
+    ("fx", "force_density"),
+    ("fy", "force_density"),
+    ("fz", "force_density"),
+    ("damage/atom", "damage"),
+    ("dilatation/atom", "dilatation"),
+    ("plasticity/atom", "plastic_strain_equivalent"),
+    ("pe/atom", "strain_energy_density"),
+    ("stress/atom", "stress"),
+    ("displace/atom", "displacement"),
+];
+
+/// The parts of the runs.
+#[derive(Default)]
+pub(super) struct Run {
+    /// Steps and time step, s, of the runs; those with the same step are joined.
+    runs: Vec<(u64, f64)>,
+    /// The number of the step at which the next run starts.
+    at: u64,
+    output: Option<u64>,
+    history: Option<u64>,
+}
+
+/// The set of the new deck for a group; `None` if it has none.
+pub(super) fn set(
+    translation: &mut Translation,
+    model: &Model,
+    bodies: &[(u32, String, String)],
+    name: &str,
+) -> Option<String> {
+    let group = match name {
+        "all" => Group::All,
+        name => {
+            let found = model.groups.iter().find(|(other, ..)| other == name);
+            found.map(|(_, group, _)| group.clone())?
+        }
+    };
+    match group {
+        Group::All => Some("all".to_owned()),
+        Group::Type(kind) => {
+            let mut of_type = bodies.iter().filter(|(of, ..)| *of == kind);
+            match (of_type.next(), of_type.next()) {
+                (Some((.., body)), None) => Some(body.clone()),
+                _ => None,
+            }
+        }
+        Group::Region(region) => {
+            let (_, region, _) = model.regions.iter().find(|(other, ..)| *other == region)?;
+            let region = model
+                .bounds
+                .map_or(region.clone(), |bounds| region.within(bounds));
+            let taken = bodies.iter().any(|(.., body)| body == name);
+            let wanted = if taken {
+                format!("group {name}")
+            } else {
+                name.to_owned()
+            };
+            let written = translation.name("set", &wanted);
+            if !translation.draft.has(&format!("set.{written}")) {
+                let mut section = Section::new(format!("set.{written}"));
+                section.set("shape", region.shape(model.spacing?));
+                translation.add(section);
+            }
+            Some(written)
+        }
+    }
+}
+
+/// A number of steps, which is `least` or more.
+fn steps(
+    translation: &Translation,
+    variables: &Variables,
+    command: &Command,
+    k: usize,
+    least: f64,
+) -> Result<u64> {
+    let fail = |message: String| wrong(translation, command, message);
+    let word = command.words.get(1 + k).map_or("", String::as_str);
+    let number = variables.number(word).map_err(fail)?;
+    if (least..1e15).contains(&number) {
+        Ok(number as u64)
+    } else {
+        Err(fail(format!("the number of steps must be {least} or more")))
+    }
+}
+
+/// Read the number of the step at which the next run starts.
+fn reset(
+    translation: &Translation,
+    variables: &Variables,
+    run: &mut Run,
+    command: &Command,
+) -> Result<()> {
+    run.at = steps(translation, variables, command, 0, 0.0)?;
+    let note = "the step from which `run … upto` counts";
+    translation.log.taken(&command.node, note);
+    Ok(())
+}
+
+/// Read the first run or a later command. Later commands count only if they change the end of the runs.
+pub(super) fn follow(
+    translation: &Translation,
+    variables: &Variables,
+    run: &mut Run,
+    command: &Command,
+) -> Result<()> {
+    let node = &command.node;
+    match command.name() {
+        "run" => {
+            let fail = |message: &str| wrong(translation, command, message);
+            let step = variables.step.filter(|step| *step > 0.0);
+            let step = step.ok_or_else(|| fail("there is no `timestep` above 0 before it"))?;
+            let is_end = command.arguments().contains(&"upto");
+            let least = if is_end { 0.0 } else { 1.0 };
+            let given = steps(translation, variables, command, 0, least)?;
+            let count = if is_end { given.checked_sub(run.at).ok_or_else(|| {
+                    fail(&format!(
+                        "the last step {given} is before the step {}",
+                        run.at
+                    ))
+                })? } else { given };
+            run.at = run.at.saturating_add(count);
+            match run.runs.last_mut() {
+                Some((steps, known)) if *known == step => *steps = steps.saturating_add(count),
+                _ => run.runs.push((count, step)),
+            }
+            translation.log.taken(node, "[time] end");
+        }
+        "timestep" => match run.runs.first() {
+            Some((_, first)) if variables.step != Some(*first) => translation.log.approximated(
+                node,
+                "[time] end counts the steps behind it with this step; [time] step stays that of the first `run`",
+            ),
+            _ => translation.log.taken(node, "[time] step"),
+        },
+        "reset_timestep" => reset(translation, variables, run, command)?,
+        "variable" => translation.log.taken(node, "its value where it is used"),
+        name => {
+            let reason = ignored(name);
+            let reason = reason.unwrap_or("changes after the first `run` are not followed");
+            translation.log.left_out(node, reason);
+        }
+    }
+    Ok(())
+}
+
+/// Read a command that acts during the run.
+pub(super) fn simulate(
+    translation: &mut Translation,
+    variables: &Variables,
+    model: &mut Model,
+    bodies: &[(u32, String, String)],
+    run: &mut Run,
+    command: &Command,
+) -> Result<()> {
+    let node = &command.node;
+    let arguments = command.arguments();
+    let count =
+        |translation: &Translation, k: usize| steps(translation, variables, command, k, 1.0);
+    match command.name() {
+        "timestep" => translation.log.taken(node, "[time] step"),
+        "reset_timestep" => reset(translation, variables, run, command)?,
+        "thermo" => {
+            run.history = Some(count(translation, 0)?);
+            translation.log.taken(node, "[history] every_steps");
+        }
+        "compute" => {
+            let style = arguments.get(2).copied().unwrap_or("");
+            match FIELDS.iter().find(|(known, _)| *known == style) {
+                Some((_, field)) => {
+                    translation.log.taken(node, format!("field {field}"));
+                    let id = arguments.first().copied().unwrap_or("");
+                    model.computes.push((id.to_owned(), style.to_owned()));
+                    if !model.fields.contains(field) {
+                        model.fields.push(field);
+                    }
+                }
+                None => translation.log.left_out(node, "there is no such field"),
+            }
+        }
+        "dump" => {
+            run.output = Some(count(translation, 3)?);
+            translation
+                .log
+                .approximated(node, "[output] every_steps; the result is one HDF5 file");
+            for word in arguments.iter().skip(5) {
+                let known = FIELDS.iter().find(|(known, _)| known == word);
+                if let Some((_, field)) = known
+                    && !model.fields.contains(field)
+                {
+                    model.fields.push(field);
+                }
+            }
+        }
+        "velocity" => initial(translation, model, bodies, command),
+        "fix" => fix(translation, variables, model, bodies, command)?,
+        "unfix" => translation.log.taken(node, "its fix is left out"),
+        "uncompute" => translation
+            .log
+            .left_out(node, "fields that a `compute` adds stay"),
+        "minimize" => {
+            translation.log.left_out(
+                node,
+                "there is no minimization; relaxation finds equilibria",
+            );
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Write the initial velocity of a command.
+fn initial(
+    translation: &mut Translation,
+    model: &Model,
+    bodies: &[(u32, String, String)],
+    command: &Command,
+) {
+    let arguments = command.arguments();
+    let name = arguments.first().copied().unwrap_or("");
+    let mut velocities = model.velocities.iter();
+    let Some(at) = velocities.position(|velocity| velocity.node == command.node.id) else {
+        return;
+    };
+    let components = |velocity: &Velocity| velocity.components.map(|v| v.unwrap_or(0.0));
+    let is_zero = |velocity: &Velocity| components(velocity) == [0.0; 3];
+    if model.velocities[..=at].iter().all(is_zero) {
+        translation.log.taken(&command.node, "points start at rest");
+        return;
+    }
+    let Some(set) = set(translation, model, bodies, name) else {
+        translation
+            .log
+            .left_out(&command.node, "its group is no body or region");
+        return;
+    };
+    let written = translation.new_name("initial", &set);
+    let components = components(&model.velocities[at]);
+    let section = translation.draft.section(&format!("initial.{written}"));
+    section
+        .set("set", Value::text(set))
+        .set("velocity", Value::numbers(&components));
+    translation
+        .log
+        .taken(&command.node, format!("[initial.{written}] velocity"));
+}
+
+impl Run {
+    /// Write time and outputs.
+    pub(super) fn write(self, translation: &mut Translation, model: &Model) -> Result<()> {
+        let Some((_, step)) = self.runs.first() else {
+            return Err(translation.error(1, "the script has no `run`"));
+        };
+        let ends = self.runs.iter().map(|(steps, step)| *steps as f64 * step);
+        let time = translation.draft.section("time");
+        time.set("end", Value::number(ends.sum()));
+        time.set("step", Value::number(*step));
+        let output = translation.draft.section("output");
+        if let Some(steps) = self.output {
+            output.set("every_steps", Value::Number(steps.to_string()));
+        }
+        if !model.fields.is_empty() {
+            let mut fields = model.fields.clone();
+            for always in ["displacement", "velocity"] {
+                if !fields.contains(&always) {
+                    fields.push(always);
+                }
+            }
+            output.set("fields", Value::list(fields.into_iter().map(Value::text)));
+        }
+        if let Some(steps) = self.history {
+            let history = translation.draft.section("history");
+            history.set("every_steps", Value::Number(steps.to_string()));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,279 @@
+//! Material and damage models of Peridigm.
+
+use crate::error::{Result, excerpt};
+use crate::import::bodies::{Criterion, DamageModel, Material};
+use crate::import::draft::{Section, Value};
+use crate::import::elastic::Constants;
+use crate::import::translation::Translation;
+use crate::import::tree::{Node, is_key};
+
+/// Material models: their names, the law, and how the law differs.
+const MATERIALS: [(&str, &str, &str); 20] = [
+    ("Elastic", "ordinary", ""),
+    ("Elastic Bond Based", "pmb", ""),
+    ("Elastic Plastic", "ordinary_plastic", ""),
+    (
+        "Elastic Plastic Hardening",
+        "ordinary_plastic",
+        "without hardening",
+    ),
+    (
+        "Pressure Dependent Elastic Plastic",
+        "ordinary_plastic",
+        "without dependence on pressure",
+    ),
+    ("Viscoelastic", "ordinary_viscoelastic", ""),
+    ("Elastic Partial Volume", "ordinary", "points count whole"),
+    (
+        "Linear LPS Partial Volume",
+        "ordinary",
+        "points count whole, and rotations are not linearised",
+    ),
+    ("Pals", "ordinary", "without the position-aware weights"),
+    ("Multiphysics Elastic", "ordinary", "without the fluid"),
+    ("Elastic Correspondence", "correspondence", ""),
+    (
+        "Elastic Correspondence Partial Stress",
+        "correspondence",
+        "",
+    ),
+    (
+        "Elastic Hypoelastic Correspondence",
+        "correspondence",
+        "hyperelastic",
+    ),
+    ("Elastic Plastic Correspondence", "correspondence", ""),
+    (
+        "Elastic Plastic Hypoelastic Correspondence",
+        "correspondence",
+        "hyperelastic",
+    ),
+    ("Isotropic Hardening Correspondence", "correspondence", ""),
+    (
+        "Isotropic Hardening Hypoelastic Correspondence",
+        "correspondence",
+        "hyperelastic",
+    ),
+    (
+        "Elastic Bond Associated Correspondence",
+        "bond_associated_correspondence",
+        "another formulation",
+    ),
+    (
+        "Elastic Plastic Bond Associated Correspondence",
+        "bond_associated_correspondence",
+        "elastic, another formulation",
+    ),
+    (
+        "Viscoplastic Needleman Correspondence",
+        "correspondence",
+        "elastic",
+    ),
+];
+
+/// The key of the thermal expansion of materials and damage models.
+const EXPANSION: &str = "Thermal Expansion Coefficient";
+
+/// Write the materials; return them, and the headers of materials with thermal expansion.
+pub(super) fn read_materials(
+    translation: &mut Translation,
+    node: &Node,
+    influence: Option<&'static str>,
+) -> Result<(Vec<Material>, Vec<String>)> {
+    let (mut materials, mut expanding) = (Vec::new(), Vec::new());
+    for (name, table) in node.tables() {
+        let what = format!("the material `{name}`");
+        let model = translation.required(table, "Material Model", &what)?;
+        let model_name = translation.text(model, "Material Model")?;
+        let known = MATERIALS
+            .iter()
+            .find(|(known, ..)| is_key(model_name, known));
+        let Some((_, law, difference)) = known else {
+            let note = format!("{} has no counterpart", excerpt(model_name));
+            translation.log.left_out(table, note);
+            continue;
+        };
+        let written = translation.name("material", name);
+        let header = format!("[material.{written}.{law}]");
+        if difference.is_empty() {
+            translation.log.taken(model, &header)
+        } else {
+            translation
+                .log
+                .approximated(model, format!("{header}: {difference}"))
+        }
+        let mut section = Section::new(format!("material.{written}.{law}"));
+        let density = translation.required(table, "Density", &what)?;
+        translation.log.taken(density, format!("{header} density"));
+        section.set("density", translation.number_value(density, "Density")?);
+        let constants = Constants::read(translation, table)?;
+        let enough = match *law {
+            "pmb" => {
+                // In the plane, Peridigm's bulk modulus is that of the plane: k = E/(2(1 − ν)), with ν = 1/3 in plane
+                // stress, and E/(2(1 + ν)(1 − 2ν)) with ν = 1/4 in plane strain.
+                let factor = if table
+                    .get("Plane Stress")
+                    .is_some_and(|node| translation.is_true(node))
+                {
+                    4.0 / 3.0
+                } else {
+                    1.25
+                };
+                constants.write_one(&mut section, (translation.dimension == 2).then_some(factor))
+            }
+            _ => {
+                constants.write_two(&mut section);
+                constants.count() >= 2
+            }
+        };
+        if !enough {
+            let message = format!("{what} has too few elastic constants");
+            return Err(translation.error(table.line, message));
+        }
+        law_keys(translation, table, law, &mut section)?;
+        if let Some(node) = table.get(EXPANSION) {
+            section.set(
+                "thermal_expansion",
+                translation.number_value(node, EXPANSION)?,
+            );
+            translation
+                .log
+                .taken(node, "thermal_expansion of the material");
+            expanding.push(section.header().to_owned());
+        }
+        if let (Some(influence), "ordinary" | "ordinary_viscoelastic") = (influence, *law) {
+            section.set("influence", Value::text(influence));
+        }
+        translation.add(section);
+        materials.push(Material {
+            read: name.to_owned(),
+            written,
+            law,
+            constants,
+        });
+    }
+    Ok((materials, expanding))
+}
+
+/// Write the keys that only some laws have.
+fn law_keys(
+    translation: &Translation,
+    table: &Node,
+    law: &str,
+    section: &mut Section,
+) -> Result<()> {
+    let log = &translation.log;
+    let take = |section: &mut Section, name: &str, key: &str| -> Result<()> {
+        if let Some(node) = table.get(name) {
+            section.set(key, translation.number_value(node, name)?);
+            log.taken(node, format!("{key} of the material"));
+        }
+        Ok(())
+    };
+    match law {
+        "ordinary_plastic" => {
+            take(section, "Yield Stress", "yield_stress")?;
+            section.set("calibration", Value::text("continuum"));
+        }
+        "ordinary_viscoelastic" => {
+            take(section, "lambda_i", "relaxing_share")?;
+            take(section, "tau b", "relaxation_time")?;
+        }
+        "correspondence" => {
+            let model = table
+                .get("Material Model")
+                .and_then(Node::text)
+                .unwrap_or("");
+            if model.contains("Plastic") && !model.contains("Visco") || model.contains("Hardening")
+            {
+                let disabled = table.get("Disable Plasticity");
+                let disabled = disabled.is_some_and(|node| {
+                    log.taken(node, "whether the material yields");
+                    translation.is_true(node)
+                });
+                if !disabled {
+                    take(section, "Yield Stress", "yield_stress")?;
+                    take(section, "Hardening Modulus", "hardening_modulus")?;
+                }
+            }
+            let coefficient = table.get("Hourglass Coefficient");
+            match coefficient {
+                Some(node) if translation.number(node, "Hourglass Coefficient")? > 0.0 => {
+                    section.set("zero_energy", Value::text("silling2017")).set(
+                        "zero_energy_coefficient",
+                        translation.number_value(node, "Hourglass Coefficient")?,
+                    );
+                    log.approximated(node, "zero_energy = \"silling2017\" with this coefficient");
+                }
+                Some(node) => {
+                    section.set("zero_energy", Value::text("none"));
+                    log.taken(node, "zero_energy = \"none\"");
+                }
+                None => {
+                    section.set("zero_energy", Value::text("none"));
+                }
+            }
+        }
+        _ => {}
+    }
+    for (name, reason) in [
+        (
+            "Apply Automatic Differentiation Jacobian",
+            "concerns a solver of linear systems",
+        ),
+        ("Hourglass Coefficient", "concerns correspondence laws only"),
+    ] {
+        if let Some(node) = table.get(name)
+            && !(law == "correspondence" && name.starts_with("Hourglass"))
+        {
+            log.left_out(node, reason);
+        }
+    }
+    if let Some(node) = table.get("Apply Shear Correction Factor") {
+        if translation.is_true(node) {
+            log.left_out(node, "ordinary laws have no surface correction")
+        } else {
+            log.taken(node, "no surface correction")
+        }
+    }
+    Ok(())
+}
+
+/// Read the damage models.
+pub(super) fn damages(translation: &mut Translation, root: &Node) -> Result<Vec<DamageModel>> {
+    let mut damages = Vec::new();
+    let tables = root.get("Damage Models").into_iter().flat_map(Node::tables);
+    for (name, table) in tables {
+        let what = format!("the damage model `{name}`");
+        let model = translation.required(table, "Damage Model", &what)?;
+        let kind = translation.text(model, "Damage Model")?;
+        let is = |known: &str| is_key(kind, known);
+        if is("Critical Stretch") || is("Interface Aware") {
+            let stretch = translation.required(table, "Critical Stretch", &what)?;
+            if is("Critical Stretch") {
+                translation.log.taken(model, "critical_stretch")
+            } else {
+                let note = "critical_stretch, also of bonds that Interface Aware would keep";
+                translation.log.approximated(model, note);
+            }
+            let value = translation.number_value(stretch, "Critical Stretch")?;
+            let number = translation.number(stretch, "Critical Stretch")?;
+            if let Some(node) = table.get(EXPANSION) {
+                let note = "bonds break by their elastic part, with the expansion of the material";
+                translation.log.taken(node, note);
+            }
+            damages.push(DamageModel {
+                read: name.to_owned(),
+                criterion: Criterion::Stretch(value, number),
+                node: stretch.clone(),
+            });
+        } else {
+            let note = format!(
+                "{} has no counterpart; bodies with it never break",
+                excerpt(kind)
+            );
+            translation.log.left_out(table, note);
+        }
+    }
+    Ok(damages)
+}

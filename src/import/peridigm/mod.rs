@@ -1,0 +1,133 @@
+//! Decks of Peridigm, in YAML or XML.
+
+mod blocks;
+mod conditions;
+mod contact;
+mod materials;
+mod points;
+
+use crate::error::Result;
+use crate::import::draft::Value;
+use crate::import::outputs::Outputs;
+use crate::import::sets::Sets;
+use crate::import::solver;
+use crate::import::translation::Translation;
+use crate::import::tree::Node;
+use blocks::read_blocks;
+use conditions::conditions;
+use contact::contact;
+use materials::{damages, read_materials};
+use points::{Points, influence, points};
+
+/// Translate a deck.
+///
+/// # Errors
+/// If what a run needs is missing or wrong.
+pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
+    let root = root.get("Peridigm").unwrap_or(root);
+    let sections = ["Discretization", "Materials", "Blocks"];
+    let mut found = Vec::new();
+    for name in sections {
+        found.push(translation.required(root, name, "the deck")?);
+    }
+    let [discretization, materials, blocks] = [found[0], found[1], found[2]];
+    let setting = setting(translation, materials)?;
+    translation.draft.top("dimension", Value::text(setting));
+    let solvers: Vec<&Node> = root
+        .tables()
+        .filter(|(name, _)| name.to_lowercase().starts_with("solver"))
+        .map(|(_, node)| node)
+        .collect();
+    let stages = stages(translation, root, &solvers)?;
+    let points = points(translation, discretization)?;
+    let influence = influence(translation, discretization)?;
+    let (read, expanding) = read_materials(translation, materials, influence)?;
+    let damages = damages(translation, root)?;
+    let names = read_blocks(translation, blocks, &points, &read, &damages)?;
+    let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
+    let has_temperature = conditions(translation, root, &mut sets, &stages, &expanding)?;
+    contact(translation, root, discretization, &names)?;
+    let mut outputs = Outputs::new(has_temperature);
+    if let Some(computed) = root.get("Compute Class Parameters") {
+        outputs.computed(translation, &mut sets, &names, computed)?;
+    }
+    for (name, node) in root.tables() {
+        if name.to_lowercase().starts_with("output") {
+            outputs.output(translation, node)?;
+        }
+    }
+    let length = stages.last().map_or(0.0, |stage| stage.end) - translation.start;
+    outputs.finish(translation, length);
+    sets.finish(translation);
+    Ok(())
+}
+
+/// The `dimension` of the new deck: plane if a material says so.
+fn setting(translation: &mut Translation, materials: &Node) -> Result<&'static str> {
+    let mut setting = "3d";
+    for (_, material) in materials.tables() {
+        for (key, value) in [
+            ("Plane Stress", "plane-stress"),
+            ("Plane Strain", "plane-strain"),
+            ("Planar Problem", "plane-strain"),
+        ] {
+            if let Some(node) = material.get(key) {
+                if translation.is_true(node) {
+                    setting = value;
+                }
+                let note = format!("dimension = \"{setting}\"");
+                match key {
+                    "Planar Problem" => translation.log.approximated(node, note),
+                    _ => translation.log.taken(node, note),
+                }
+            }
+        }
+    }
+    if setting == "3d" {
+        return Ok(setting);
+    }
+    translation.dimension = 2;
+    for (_, material) in materials.tables() {
+        for key in ["Height", "Thickness"] {
+            if let Some(node) = material.get(key) {
+                translation.log.taken(node, "thickness");
+                let thickness = translation.number_value(node, key)?;
+                if !translation.draft.has_top("thickness") {
+                    translation.draft.top("thickness", thickness);
+                }
+            }
+        }
+    }
+    Ok(setting)
+}
+
+/// The stages of all solvers.
+fn stages(
+    translation: &mut Translation,
+    root: &Node,
+    solvers: &[&Node],
+) -> Result<Vec<solver::Stage>> {
+    let Some(first) = solvers.first() else {
+        return Err(translation.error(root.line, "the deck has no `Solver`"));
+    };
+    solver::read_start(translation, first)?;
+    let start = translation.start;
+    let mut stages: Vec<solver::Stage> = Vec::new();
+    for (index, node) in solvers.iter().enumerate() {
+        let at = stages.last().map_or(start, |stage| stage.end);
+        if let (Some(initial), true) = (node.get("Initial Time"), index > 0) {
+            let begins = translation.number(initial, "Initial Time")?;
+            if begins == at {
+                translation
+                    .log
+                    .taken(initial, "the end of the stage before")
+            } else {
+                translation
+                    .log
+                    .approximated(initial, "the end of the stage before")
+            }
+        }
+        stages.extend(solver::stage(translation, node, at, true)?);
+    }
+    Ok(stages)
+}

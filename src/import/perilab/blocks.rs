@@ -1,0 +1,170 @@
+//! Blocks of PeriLab, which become bodies.
+
+use super::materials::{Laws, write_material};
+use super::points::Points;
+use crate::error::{Result, excerpt};
+use crate::import::bodies::{self, Body, Material};
+use crate::import::draft::Value;
+use crate::import::translation::Translation;
+use crate::import::tree::{Node, is_key};
+
+/// Write the materials and bodies; return the name, the number and the body of each block.
+pub(super) fn read_blocks(
+    translation: &mut Translation,
+    node: &Node,
+    points: &Points,
+    laws: &Laws,
+    damping: Option<f64>,
+) -> Result<Vec<(String, u64, String)>> {
+    let (mut bodies, mut blocks) = (Vec::new(), Vec::new());
+    let mut written: Vec<(String, String, String)> = Vec::new();
+    for (name, table) in node.tables() {
+        let what = format!("the block `{name}`");
+        let id_node = translation.required(table, "Block ID", &what)?;
+        let id = translation.count(id_node, "Block ID")?;
+        translation.log.taken(id_node, "block of the points");
+        if let Points::File(_, Some(file)) = points
+            && !file.blocks.iter().any(|block| u64::from(*block) == id)
+        {
+            translation
+                .log
+                .left_out(table, "no row of the point file belongs to it");
+            continue;
+        }
+        let material_node = translation.required(table, "Material Model", &what)?;
+        let material_name = translation.text(material_node, "Material Model")?;
+        let Some(model) = laws
+            .models
+            .iter()
+            .find(|model| is_key(model.name, material_name))
+        else {
+            let message = format!(
+                "the material {} is not defined, or has no counterpart",
+                excerpt(material_name)
+            );
+            return Err(translation.error(material_node.line, message));
+        };
+        let density_node = translation.required(table, "Density", &what)?;
+        let density = translation.number_value(density_node, "Density")?;
+        let mut angle = None;
+        for key in ["Angle X", "Angle Y", "Angle Z"] {
+            let Some(node) = table.get(key) else {
+                continue;
+            };
+            let value = translation.number(node, key)?;
+            if value == 0.0 {
+                translation.log.taken(node, "the axes are not turned");
+            } else if key == "Angle Z" {
+                translation
+                    .log
+                    .approximated(node, "angle_1 of the material, if it is anisotropic");
+                angle = Some(translation.number_value(node, key)?);
+            } else {
+                translation
+                    .log
+                    .left_out(node, "the order of the rotations is another one");
+            }
+        }
+        let mut expansion = None;
+        if let Some(node) = table.get("Thermal Model") {
+            let model_name = translation.text(node, "Thermal Model")?;
+            expansion = laws
+                .expansions
+                .iter()
+                .find(|known| is_key(&known.name, model_name));
+            match expansion {
+                Some(_) => translation
+                    .log
+                    .taken(node, "thermal_expansion of the material"),
+                None => translation
+                    .log
+                    .left_out(node, "this thermal model is left out"),
+            }
+        }
+        // A material has one density, one angle and one expansion here.
+        let variant = format!("{density:?} {angle:?} {expansion:?}");
+        let known = written
+            .iter()
+            .find(|(read, of, _)| read == model.name && *of == variant);
+        let material_written = match known {
+            Some((.., written)) => written.clone(),
+            None => {
+                let is_first = !written.iter().any(|(read, ..)| read == model.name);
+                let read = if is_first {
+                    model.name.to_owned()
+                } else {
+                    format!("{} {name}", model.name)
+                };
+                let new = translation.name("material", &read);
+                write_material(translation, model, &new, density, damping, angle, expansion)?;
+                written.push((model.name.to_owned(), variant, new.clone()));
+                new
+            }
+        };
+        translation
+            .log
+            .taken(material_node, format!("material `{material_written}`"));
+        translation.log.taken(
+            density_node,
+            format!("density of the material `{material_written}`"),
+        );
+        let horizon_node = translation.required(table, "Horizon", &what)?;
+        let horizon = translation.number(horizon_node, "Horizon")?;
+        let horizon_value = translation.number_value(horizon_node, "Horizon")?;
+        translation.log.taken(horizon_node, "horizon");
+        let material = Material {
+            read: model.name.to_owned(),
+            written: material_written.clone(),
+            law: model.law,
+            constants: model.constants.clone(),
+        };
+        let mut damage = None;
+        if let Some(damage_node) = table.get("Damage Model") {
+            let model_name = translation.text(damage_node, "Damage Model")?;
+            match laws
+                .damages
+                .iter()
+                .find(|model| is_key(&model.read, model_name))
+            {
+                Some(model) => {
+                    damage = bodies::damage(translation, model, &material, horizon)?;
+                    translation.log.taken(damage_node, "damage of the body");
+                }
+                None => translation
+                    .log
+                    .left_out(damage_node, "this damage model is left out"),
+            }
+        }
+        for key in [
+            "Additive Model",
+            "Degradation Model",
+            "Pre Calculation Model",
+        ] {
+            if let Some(node) = table.get(key) {
+                translation.log.left_out(node, "has no counterpart");
+            }
+        }
+        let body = translation.new_name("set", name);
+        let points = match points {
+            Points::File(file, _) => ("file", file),
+            Points::Mesh(file) => ("mesh", file),
+        };
+        let source = vec![
+            (points.0.to_owned(), points.1.clone()),
+            ("block".to_owned(), Value::Number(id.to_string())),
+        ];
+        blocks.push((name.to_owned(), id, body.clone()));
+        bodies.push(Body {
+            name: body,
+            material: material_written,
+            damage,
+            horizon: horizon_value,
+            points: ("points".to_owned(), Value::Table(source)),
+        });
+    }
+    if bodies.is_empty() {
+        return Err(translation.error(node.line, "there is no block"));
+    }
+    bodies::write(translation, &bodies);
+    Ok(blocks)
+}

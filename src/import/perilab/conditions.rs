@@ -1,0 +1,109 @@
+//! Boundary conditions of PeriLab.
+
+use crate::error::{Result, excerpt};
+use crate::import::conditions::{Conditions, Given, Quantity};
+use crate::import::sets::Sets;
+use crate::import::solver;
+use crate::import::translation::Translation;
+use crate::import::tree::{Node, is_key};
+
+/// Write the initial values, loads and supports, then the stages; return whether temperatures are among them.
+pub(super) fn conditions(
+    translation: &mut Translation,
+    root: &Node,
+    sets: &mut Sets,
+    stages: &[solver::Stage],
+    expands: bool,
+) -> Result<bool> {
+    let mut conditions = Conditions::default();
+    for (name, table) in root
+        .get("Boundary Conditions")
+        .into_iter()
+        .flat_map(Node::tables)
+    {
+        let what = format!("the condition `{name}`");
+        let variable = translation.required(table, "Variable", &what)?;
+        let text = translation.text(variable, "Variable")?;
+        let kind = table.get("Type");
+        let kind_name = kind.and_then(Node::text).unwrap_or("Dirichlet");
+        let is_initial = is_key(kind_name, "Initial");
+        let is = |names: &[&str]| names.iter().any(|name| is_key(text, name));
+        let quantity = if is(&["Displacements", "Displacement"]) {
+            Some(if is_initial {
+                Quantity::Initial("displacement")
+            } else {
+                Quantity::Support("displacement")
+            })
+        } else if is(&["Velocity", "Velocities"]) {
+            Some(if is_initial {
+                Quantity::Initial("velocity")
+            } else {
+                Quantity::Support("velocity")
+            })
+        } else if is(&["Force Densities", "Force Density"]) {
+            Some(Quantity::BodyForce)
+        } else if is(&["Forces", "Force"]) {
+            Some(Quantity::ForceOfPoint)
+        } else if is(&["Temperature"]) && expands && !is_initial {
+            Some(Quantity::Temperature(None))
+        } else {
+            None
+        };
+        let Some(quantity) = quantity else {
+            let note = if !is(&["Temperature"]) {
+                format!("{} has no counterpart", excerpt(text))
+            } else if expands {
+                "temperatures are prescribed only; heat is not conducted".to_owned()
+            } else {
+                "no material expands, and heat is not conducted".to_owned()
+            };
+            translation.log.left_out(table, note);
+            continue;
+        };
+        translation.log.taken(variable, "the condition's key");
+        if let Some(kind) = kind {
+            translation.log.taken(kind, "[initial] or [condition]");
+        }
+        let mut steps = Vec::new();
+        if let Some(node) = table.get("Step ID") {
+            steps = step_ids(translation, node)?;
+            if is_initial && steps.iter().any(|step| stages[0].step_id != Some(*step)) {
+                translation
+                    .log
+                    .approximated(node, "initial values are those at the start of the run")
+            } else {
+                translation.log.taken(node, "the stages in which it acts")
+            }
+        }
+        let before = stages
+            .iter()
+            .position(|stage| stage.step_id.is_some_and(|step| steps.contains(&step)));
+        let before = before.and_then(|index| stages.get(index.checked_sub(1)?));
+        translation.step_start = before.map_or(0.0, |stage| stage.end - translation.start);
+        let given = Given {
+            name,
+            node: table,
+            quantity,
+            steps,
+        };
+        conditions.add(translation, sets, &given)?;
+    }
+    conditions.finish(translation);
+    let has_contact = root.get("Contact").is_some();
+    solver::write(translation, stages, &conditions.written, has_contact);
+    Ok(conditions.has_temperature)
+}
+
+/// The numbers of steps, with commas between them.
+fn step_ids(translation: &Translation, node: &Node) -> Result<Vec<u64>> {
+    let text = translation.text(node, "Step ID")?;
+    let ids = text.split(',').map(|word| word.trim().parse::<u64>().ok());
+    let ids: Option<Vec<u64>> = ids.collect();
+    ids.ok_or_else(|| {
+        let message = format!(
+            "`Step ID` must be whole numbers with commas between them, is {}",
+            excerpt(text)
+        );
+        translation.error(node.line, message)
+    })
+}

@@ -1,0 +1,375 @@
+//! Material, damage and thermal models of PeriLab.
+
+use crate::error::{Result, excerpt};
+use crate::import::bodies::{Criterion, DamageModel};
+use crate::import::draft::{Section, Value};
+use crate::import::elastic::Constants;
+use crate::import::translation::Translation;
+use crate::import::tree::{Node, is_key};
+
+/// Material models: a part of their names, the law, and how the law differs. The first that fits counts.
+const MATERIALS: [(&str, &str, &str); 9] = [
+    (
+        "unified bond-based",
+        "ordinary",
+        "state-based in place of bonds with two constants",
+    ),
+    ("1d bond-based", "pmb", ""),
+    ("bond-based elastic", "pmb", ""),
+    ("pd solid plastic", "ordinary_plastic", ""),
+    ("pd solid elastic", "ordinary", ""),
+    ("correspondence plastic", "correspondence", ""),
+    ("correspondence elastic", "correspondence", ""),
+    ("correspondence umat", "", ""),
+    ("correspondence vumat", "", ""),
+];
+
+/// Constants of an orthotropic solid.
+const ORTHOTROPIC: [(&str, &str, bool); 9] = [
+    ("Young's Modulus X", "youngs_modulus_x", true),
+    ("Young's Modulus Y", "youngs_modulus_y", true),
+    ("Young's Modulus Z", "youngs_modulus_z", true),
+    ("Poisson's Ratio XY", "poisson_ratio_xy", true),
+    ("Poisson's Ratio YZ", "poisson_ratio_yz", true),
+    ("Poisson's Ratio XZ", "poisson_ratio_xz", true),
+    ("Shear Modulus XY", "shear_modulus_xy", true),
+    ("Shear Modulus YZ", "shear_modulus_yz", false),
+    ("Shear Modulus XZ", "shear_modulus_xz", false),
+];
+
+/// How a material expands.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Expansion {
+    /// Name of the thermal model.
+    pub(super) name: String,
+    pub(super) coefficient: Value,
+    pub(super) reference: Option<Value>,
+}
+
+/// A material as the deck has it; the density is that of a block.
+pub(super) struct Model<'n> {
+    pub(super) name: &'n str,
+    pub(super) node: &'n Node,
+    pub(super) law: &'static str,
+    pub(super) constants: Constants,
+}
+
+/// What the blocks of a deck refer to.
+pub(super) struct Laws<'n> {
+    pub(super) models: Vec<Model<'n>>,
+    pub(super) damages: Vec<DamageModel>,
+    pub(super) expansions: Vec<Expansion>,
+}
+
+/// Read the material models.
+pub(super) fn read_materials<'n>(
+    translation: &mut Translation,
+    node: &'n Node,
+) -> Result<Vec<Model<'n>>> {
+    let mut materials = Vec::new();
+    for (name, table) in node.tables() {
+        let model =
+            translation.required(table, "Material Model", &format!("the material `{name}`"))?;
+        let text = translation.text(model, "Material Model")?;
+        let lower = text.to_lowercase();
+        let known = MATERIALS.iter().find(|(part, ..)| lower.contains(part));
+        let Some((_, law, difference)) = known.filter(|(_, law, _)| !law.is_empty()) else {
+            let note = format!("{} has no counterpart", excerpt(text));
+            translation.log.left_out(table, note);
+            continue;
+        };
+        let associated = table.get("Bond Associated");
+        let law = match associated {
+            Some(node) if *law == "correspondence" && translation.is_true(node) => {
+                translation
+                    .log
+                    .approximated(node, "another bond-associated formulation");
+                "bond_associated_correspondence"
+            }
+            Some(node) => {
+                translation
+                    .log
+                    .taken(node, "the law is not bond-associated");
+                law
+            }
+            None => law,
+        };
+        if difference.is_empty() {
+            translation.log.taken(model, format!("the law {law}"))
+        } else {
+            translation
+                .log
+                .approximated(model, format!("the law {law}: {difference}"))
+        }
+        let constants = Constants::read(translation, table)?;
+        materials.push(Model {
+            name,
+            node: table,
+            law,
+            constants,
+        });
+    }
+    Ok(materials)
+}
+
+/// Write a material with the density of a block.
+pub(super) fn write_material(
+    translation: &mut Translation,
+    model: &Model,
+    written: &str,
+    density: Value,
+    damping: Option<f64>,
+    angle: Option<Value>,
+    expansion: Option<&Expansion>,
+) -> Result<()> {
+    let mut section = Section::new(format!("material.{written}.{}", model.law));
+    section.set("density", density);
+    let table = model.node;
+    let is_correspondence = model.law.contains("correspondence");
+    let anisotropic = anisotropic(translation, table, is_correspondence, &mut section)?;
+    let enough = match model.law {
+        "pmb" => {
+            if let (Some(node), true) = (table.get("Poisson's Ratio"), model.constants.count() > 1)
+            {
+                translation
+                    .log
+                    .approximated(node, "the law has the Poisson's ratio of bonds");
+            }
+            model.constants.write_one(&mut section, None)
+        }
+        _ if anisotropic => true,
+        _ => {
+            model.constants.write_two(&mut section);
+            model.constants.count() >= 2
+        }
+    };
+    if !enough {
+        let message = format!(
+            "the material `{}` has too few elastic constants",
+            model.name
+        );
+        return Err(translation.error(table.line, message));
+    }
+    if let Some(damping) = damping {
+        section.set("damping", Value::number(damping));
+    }
+    if let (Some(angle), true) = (angle, anisotropic) {
+        section.set("angle_1", angle);
+    }
+    if let Some(expansion) = expansion {
+        section.set("thermal_expansion", expansion.coefficient.clone());
+        if let Some(reference) = &expansion.reference {
+            section.set("reference_temperature", reference.clone());
+        }
+    }
+    let control = table.get("Zero Energy Control");
+    if model.law == "correspondence" {
+        match control {
+            Some(node) => {
+                translation.log.taken(node, "zero_energy = \"wan2019\"");
+                section.set("zero_energy", Value::text("wan2019"));
+            }
+            None => {
+                section.set("zero_energy", Value::text("none"));
+            }
+        }
+    } else if let Some(node) = control {
+        translation
+            .log
+            .taken(node, "this law has no modes of zero energy");
+    }
+    let yields = model.law == "ordinary_plastic" || (model.law == "correspondence" && !anisotropic);
+    if let (Some(node), true) = (table.get("Yield Stress"), yields) {
+        translation.log.taken(node, "yield_stress of the material");
+        section.set(
+            "yield_stress",
+            translation.number_value(node, "Yield Stress")?,
+        );
+    }
+    if model.law == "ordinary_plastic" {
+        section.set("calibration", Value::text("continuum"));
+    }
+    if let Some(node) = table.get("Density") {
+        translation
+            .log
+            .left_out(node, "the density of the block counts");
+    }
+    translation.add(section);
+    Ok(())
+}
+
+/// Write the entries of Hooke's matrix or the constants of an orthotropic solid, if the material has them.
+fn anisotropic(
+    translation: &Translation,
+    table: &Node,
+    is_correspondence: bool,
+    section: &mut Section,
+) -> Result<bool> {
+    let mut found = false;
+    let in_plane = translation.dimension == 2;
+    for i in 1..=6 {
+        for j in i..=6 {
+            let name = format!("C{i}{j}");
+            let Some(node) = table.get(&name) else {
+                continue;
+            };
+            let of_plane = [1, 2, 6].contains(&i) && [1, 2, 6].contains(&j);
+            if !is_correspondence {
+                translation.log.left_out(node, "this law is isotropic");
+            } else if in_plane && !of_plane {
+                translation.log.left_out(node, "the problem has no z");
+            } else {
+                let key = name.to_lowercase();
+                section.set(key.clone(), translation.number_value(node, &name)?);
+                translation
+                    .log
+                    .taken(node, format!("{key} of the material"));
+                found = true;
+            }
+        }
+    }
+    for (name, key, of_plane) in ORTHOTROPIC {
+        let Some(node) = table.get(name) else {
+            continue;
+        };
+        if !is_correspondence {
+            translation.log.left_out(node, "this law is isotropic");
+        } else if in_plane && !of_plane {
+            translation.log.left_out(node, "the problem has no z");
+        } else {
+            section.set(key, translation.number_value(node, name)?);
+            translation
+                .log
+                .taken(node, format!("{key} of the material"));
+            found = true;
+        }
+    }
+    Ok(found)
+}
+
+/// Read the thermal models with expansion; `acts` if the solver switches them on.
+pub(super) fn expansions(
+    translation: &Translation,
+    models: &Node,
+    acts: bool,
+) -> Result<Vec<Expansion>> {
+    let mut expansions = Vec::new();
+    let Some(node) = models.get("Thermal Models") else {
+        return Ok(expansions);
+    };
+    if !acts {
+        let note = "the solver has no `Thermal Models: true`, so nothing expands";
+        translation.log.left_out(node, note);
+        return Ok(expansions);
+    }
+    for (name, table) in node.tables() {
+        let kind = translation.required(
+            table,
+            "Thermal Model",
+            &format!("the thermal model `{name}`"),
+        )?;
+        let kind_name = translation.text(kind, "Thermal Model")?.to_lowercase();
+        if !kind_name.contains("thermal expansion") {
+            translation.log.left_out(table, "heat is not conducted");
+            continue;
+        }
+        match kind_name.trim() {
+            "thermal expansion" => translation.log.taken(kind, "thermal_expansion"),
+            _ => translation
+                .log
+                .approximated(kind, "thermal_expansion; heat is not conducted"),
+        }
+        let key = "Thermal Expansion Coefficient";
+        let coefficient = translation.required(table, key, "the thermal model")?;
+        let value = translation.number_value(coefficient, key)?;
+        translation
+            .log
+            .taken(coefficient, "thermal_expansion of the material");
+        let mut reference = None;
+        let key = "Reference Temperature";
+        if let Some(node) = table.get(key) {
+            reference = Some(translation.number_value(node, key)?);
+            translation
+                .log
+                .taken(node, "reference_temperature of the material");
+        }
+        expansions.push(Expansion {
+            name: name.to_owned(),
+            coefficient: value,
+            reference,
+        });
+    }
+    Ok(expansions)
+}
+
+/// Read the damage models; `breaks` if the solver switches them on.
+pub(super) fn damages(
+    translation: &mut Translation,
+    models: &Node,
+    breaks: bool,
+) -> Result<Vec<DamageModel>> {
+    let mut damages = Vec::new();
+    let Some(node) = models.get("Damage Models") else {
+        return Ok(damages);
+    };
+    if !breaks {
+        let note = "the solver has no `Damage Models: true`, so nothing breaks";
+        translation.log.left_out(node, note);
+        return Ok(damages);
+    }
+    for (name, table) in node.tables() {
+        let what = format!("the damage model `{name}`");
+        let model = translation.required(table, "Damage Model", &what)?;
+        let kind = translation.text(model, "Damage Model")?;
+        let is_stretch = is_key(kind, "Critical Stretch");
+        if !is_stretch && !is_key(kind, "Critical Energy") {
+            let note = format!(
+                "{} has no counterpart; bodies with it never break",
+                excerpt(kind)
+            );
+            translation.log.left_out(table, note);
+            continue;
+        }
+        let node = translation.required(table, "Critical Value", &what)?;
+        let number = translation.number(node, "Critical Value")?;
+        let value = translation.number_value(node, "Critical Value")?;
+        let tension = table.get("Only Tension");
+        let tension_only = tension.is_none_or(|node| translation.is_true(node));
+        if let Some(node) = tension {
+            if is_stretch && !tension_only {
+                translation
+                    .log
+                    .left_out(node, "bonds break in tension only")
+            } else {
+                translation.log.taken(node, "tension_only of the damage")
+            }
+        }
+        if let Some(node) = table.get("Interblock Damage") {
+            translation.log.left_out(
+                node,
+                "bonds between bodies take the weaker toughness of both",
+            );
+        }
+        translation.log.taken(
+            model,
+            if is_stretch {
+                "critical_stretch"
+            } else {
+                "energy"
+            },
+        );
+        damages.push(DamageModel {
+            read: name.to_owned(),
+            criterion: if is_stretch {
+                Criterion::Stretch(value, number)
+            } else {
+                Criterion::Energy {
+                    energy: value,
+                    tension_only,
+                }
+            },
+            node: node.clone(),
+        });
+    }
+    Ok(damages)
+}

@@ -1,0 +1,158 @@
+//! Decks of PeriLab, in YAML.
+
+mod blocks;
+mod conditions;
+mod contact;
+mod materials;
+mod points;
+
+use crate::error::Result;
+use crate::import::bond_filters::bond_filters;
+use crate::import::draft::Value;
+use crate::import::outputs::Outputs;
+use crate::import::sets::Sets;
+use crate::import::solver;
+use crate::import::translation::Translation;
+use crate::import::tree::{Node, is_key};
+use blocks::read_blocks;
+use conditions::conditions;
+use contact::contact;
+use materials::{Laws, damages, expansions, read_materials};
+use points::{Points, points, setting};
+
+/// Translate a deck.
+///
+/// # Errors
+/// If what a run needs is missing or wrong.
+pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
+    let root = root.get("PeriLab").unwrap_or(root);
+    let discretization = translation.required(root, "Discretization", "the deck")?;
+    let models = translation.required(root, "Models", "the deck")?;
+    let materials = translation.required(models, "Material Models", "`Models`")?;
+    let blocks = translation.required(root, "Blocks", "the deck")?;
+    let stages = stages(translation, root)?;
+    let points = points(translation, discretization)?;
+    let setting = setting(translation, discretization, materials, &points);
+    translation.draft.top("dimension", Value::text(setting));
+    if translation.dimension == 2 {
+        translation
+            .draft
+            .top("thickness", Value::Number("1".to_owned()));
+    }
+    if let Some(filters) = discretization.get("Bond Filters") {
+        bond_filters(translation, filters)?;
+    }
+    let read = read_materials(translation, materials)?;
+    let breaks = stages.iter().any(|stage| stage.breaks);
+    let damages = damages(translation, models, breaks)?;
+    let expands = solvers(root).iter().any(|solver| {
+        let node = solver.get("Thermal Models");
+        node.is_some_and(|node| {
+            translation.log.taken(node, "whether materials expand");
+            translation.is_true(node)
+        })
+    });
+    let expansions = expansions(translation, models, expands)?;
+    let damping = stages.iter().find_map(|stage| stage.damping);
+    let laws = Laws {
+        models: read,
+        damages,
+        expansions,
+    };
+    let bodies = read_blocks(translation, blocks, &points, &laws, damping)?;
+    let expands = blocks.tables().any(|(_, block)| {
+        let model = block.get("Thermal Model").and_then(Node::text);
+        model.is_some_and(|model| {
+            laws.expansions
+                .iter()
+                .any(|known| is_key(&known.name, model))
+        })
+    });
+    let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
+    if let Some(node_sets) = discretization.get("Node Sets") {
+        for (name, node) in node_sets.entries() {
+            sets.define(name, node);
+        }
+    }
+    let has_temperature = conditions(translation, root, &mut sets, &stages, expands)?;
+    contact(translation, root, &bodies)?;
+    let names: Vec<(String, String)> = bodies
+        .iter()
+        .map(|body| (body.0.clone(), body.2.clone()))
+        .collect();
+    let mut outputs = Outputs::new(has_temperature);
+    if let Some(computed) = root.get("Compute Class Parameters") {
+        outputs.computed(translation, &mut sets, &names, computed)?;
+    }
+    for (_, output) in root.get("Outputs").into_iter().flat_map(Node::tables) {
+        outputs.output(translation, output)?;
+    }
+    let length = stages.last().map_or(0.0, |stage| stage.end) - translation.start;
+    outputs.finish(translation, length);
+    sets.finish(translation);
+    for name in ["FEM", "Surface Correction"] {
+        if let Some(node) = root.get(name).or(discretization.get(name)) {
+            translation.log.left_out(node, "has no counterpart");
+        }
+    }
+    Ok(())
+}
+
+/// The solver, or its steps.
+fn solvers(root: &Node) -> Vec<&Node> {
+    match root.get("Multistep Solver") {
+        Some(steps) => steps.tables().map(|(_, node)| node).collect(),
+        None => root.get("Solver").into_iter().collect(),
+    }
+}
+
+/// The stages of the solver or of its steps.
+fn stages(translation: &mut Translation, root: &Node) -> Result<Vec<solver::Stage>> {
+    let solvers = solvers(root);
+    let Some(first) = solvers.first() else {
+        return Err(translation.error(root.line, "the deck has no `Solver`"));
+    };
+    solver::read_start(translation, first)?;
+    let mut stages: Vec<solver::Stage> = Vec::new();
+    for node in &solvers {
+        let at = stages.last().map_or(translation.start, |stage| stage.end);
+        for key in ["Material Models", "Pre Calculation Models"] {
+            if let Some(models) = node.get(key) {
+                if translation.is_true(models) {
+                    translation.log.taken(models, "materials always act")
+                } else {
+                    translation.log.left_out(models, "materials always act")
+                }
+            }
+        }
+        for key in [
+            "Calculate Cauchy",
+            "Calculate von Mises stress",
+            "Calculate Strain",
+        ] {
+            if let Some(field) = node.get(key) {
+                translation
+                    .log
+                    .taken(field, "fields are computed where the output has them");
+            }
+        }
+        stages.extend(solver::stage(translation, node, at, false)?);
+    }
+    let damping_differs = stages
+        .iter()
+        .any(|stage| stage.damping != stages[0].damping);
+    let damage_differs = stages.iter().any(|stage| stage.breaks != stages[0].breaks);
+    for node in solvers {
+        for (_, solver) in node.tables() {
+            if let (Some(damping), true) = (solver.get("Numerical Damping"), damping_differs) {
+                let note = "the first damping acts in all stages";
+                translation.log.approximated(damping, note);
+            }
+        }
+        if let (Some(damage), true) = (node.get("Damage Models"), damage_differs) {
+            let note = "damage acts in all stages";
+            translation.log.approximated(damage, note);
+        }
+    }
+    Ok(stages)
+}

@@ -1,0 +1,132 @@
+//! The discretization of PeriLab: point files and meshes, and the dimension.
+
+use crate::error::{Result, excerpt};
+use crate::import::draft::Value;
+use crate::import::files::PointFile;
+use crate::import::translation::Translation;
+use crate::import::tree::{Node, is_key};
+use crate::mesh::Format;
+
+/// Where the points of the blocks come from.
+pub(super) enum Points {
+    File(Value, Option<PointFile>),
+    Mesh(Value),
+}
+
+/// Where the points come from.
+pub(super) fn points(translation: &mut Translation, node: &Node) -> Result<Points> {
+    let file = translation.required(node, "Input Mesh File", "the discretization")?;
+    let path = translation.text(file, "Input Mesh File")?.to_owned();
+    let name = match node.get("Type") {
+        None => "Text File",
+        Some(kind) => {
+            translation.log.taken(kind, "points of the bodies");
+            translation.text(kind, "Type")?
+        }
+    };
+    let grid = translation.draft.section("grid");
+    grid.set("volume_correction", Value::text("none"));
+    let value = translation.file(&path);
+    if is_key(name, "Text File") {
+        let known = PointFile::read(&translation.path(&path), &[]);
+        let note = match known {
+            Some(_) => "points.file of the bodies, with the columns of its header",
+            None => "points.file of the bodies; it cannot be read yet",
+        };
+        translation.log.taken(file, note);
+        return Ok(Points::File(value, known));
+    }
+    if ["Exodus", "Abaqus", "Gmsh"]
+        .iter()
+        .any(|known| is_key(name, known))
+    {
+        match Format::of(path.as_ref()) {
+            Some(_) => translation.log.taken(file, "points.mesh of the bodies"),
+            None => {
+                let note = format!(
+                    "points.mesh of the bodies; its name must end with one of {}",
+                    Format::endings()
+                );
+                translation.log.approximated(file, note);
+            }
+        }
+        return Ok(Points::Mesh(value));
+    }
+    let message = format!(
+        "the discretization {} is not read; known are Text File, Exodus, Abaqus and Gmsh",
+        excerpt(name)
+    );
+    Err(translation.error(node.line, message))
+}
+
+/// The `dimension` of the new deck: by the header of the point file, else by the symmetry of the materials.
+pub(super) fn setting(
+    translation: &mut Translation,
+    discretization: &Node,
+    materials: &Node,
+    points: &Points,
+) -> &'static str {
+    let dimension = match points {
+        Points::File(_, Some(file)) => file.dimension(),
+        _ => None,
+    };
+    let mut plane = None;
+    for (_, material) in materials.tables() {
+        let Some(symmetry) = material.get("Symmetry") else {
+            continue;
+        };
+        let text = symmetry.text().unwrap_or("").to_lowercase();
+        let of_text = ["plane stress", "plane strain"]
+            .iter()
+            .position(|name| text.contains(name));
+        plane = plane.or(of_text);
+        let known = ["isotropic", "orthotropic", "3d"]
+            .iter()
+            .any(|name| text.contains(name));
+        if !known && of_text.is_none() {
+            translation
+                .log
+                .left_out(symmetry, "unknown, or without a counterpart");
+        }
+    }
+    let filters = discretization.get("Bond Filters");
+    let has_z = filters.is_some_and(|filters| {
+        filters
+            .tables()
+            .any(|(_, filter)| filter.get("Side Length").is_some())
+    });
+    let setting = match (dimension, plane) {
+        (Some(3), _) => "3d",
+        (Some(1), _) => "1d",
+        (Some(_), Some(1)) => "plane-strain",
+        (Some(_), _) => "plane-stress",
+        (None, Some(0)) => "plane-stress",
+        (None, Some(_)) => "plane-strain",
+        (None, None) => "3d",
+    };
+    translation.dimension = match setting {
+        "3d" => 3,
+        "1d" => 1,
+        _ => 2,
+    };
+    for (_, material) in materials.tables() {
+        let Some(symmetry) = material.get("Symmetry") else {
+            continue;
+        };
+        let text = symmetry.text().unwrap_or("").to_lowercase();
+        let agrees = match setting {
+            "plane-stress" => text.contains("plane stress"),
+            "plane-strain" => text.contains("plane strain"),
+            _ => !text.contains("plane"),
+        };
+        let note = format!("dimension = \"{setting}\"");
+        if agrees || (has_z && setting == "3d" && !text.contains("plane")) {
+            translation.log.taken(symmetry, note)
+        } else {
+            translation
+                .log
+                .approximated(symmetry, note + ": the points have that many coordinates")
+        }
+    }
+    setting
+}
