@@ -69,16 +69,21 @@ impl Described for TensorPmb {
     }
 }
 
-/// n·H n.
+/// n·H n. Written out: over an iterator the compiler keeps all entries in memory, and a sum of forces takes ten times as long.
 #[inline(always)]
 fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
     let xi = &bond.reference;
     let mut sum = diagonal[0] * (xi[0] * xi[0]);
-    for d in 1..D {
-        sum += diagonal[d] * (xi[d] * xi[d]);
+    if D == 2 {
+        sum += diagonal[1] * (xi[1] * xi[1]);
+        sum += others[0] * (xi[0] * xi[1] * 2.0);
     }
-    for (k, (a, b)) in mixed::<D>().enumerate() {
-        sum += others[k] * (xi[a] * xi[b] * 2.0);
+    if D == 3 {
+        sum += diagonal[1] * (xi[1] * xi[1]);
+        sum += diagonal[2] * (xi[2] * xi[2]);
+        sum += others[0] * (xi[1] * xi[2] * 2.0);
+        sum += others[1] * (xi[0] * xi[2] * 2.0);
+        sum += others[2] * (xi[0] * xi[1] * 2.0);
     }
     sum * (bond.inverse * bond.inverse)
 }
