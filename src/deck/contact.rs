@@ -3,6 +3,7 @@
 use super::grammar::{self, ContactName, Deck};
 use super::number::Number;
 use super::resolve::{Scope, find};
+use super::time::methods;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, ContactModel, ContactRule};
@@ -115,22 +116,6 @@ fn require_contact_is_possible(scope: &Scope, deck: &Deck) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The method of each stage, and the section that gives it.
-fn methods(deck: &Deck) -> Vec<(&'static str, &Spanned<grammar::Method>)> {
-    let of_time = ("[time]", &deck.time.get_ref().method);
-    if deck.stage.is_empty() {
-        return vec![of_time];
-    }
-    let each = deck
-        .stage
-        .iter()
-        .map(|stage| match &stage.get_ref().method {
-            Some(method) => ("[[stage]]", method),
-            None => of_time,
-        });
-    each.collect()
 }
 
 /// Whether any stage of a run is a relaxation.

@@ -39,10 +39,8 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
     let time = deck.time.get_ref();
     let end = scope.positive(&time.end, "[time] end")?;
     let method = *time.method.get_ref();
-    let methods: Vec<grammar::Method> = match &deck.stage[..] {
-        [] => vec![method],
-        stages => stages.iter().map(|stage| method_of(deck, stage)).collect(),
-    };
+    let methods = methods(deck).into_iter();
+    let methods: Vec<grammar::Method> = methods.map(|(_, method)| *method.get_ref()).collect();
     let mut quasi_static = methods.iter().filter(|method| method.is_quasi_static());
     if let (Some(table), None) = (&time.relaxation, quasi_static.next()) {
         let message = "[time] relaxation: only `method = \"relaxation\"` has these keys";
@@ -83,11 +81,11 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
     let time = deck.time.get_ref();
     let mut start = 0.0;
     let mut stages = Vec::new();
-    for (number, table) in (1..).zip(&deck.stage) {
+    for ((number, table), (_, method)) in (1..).zip(&deck.stage).zip(methods(deck)) {
         let stage = table.get_ref();
         let is_last = number == deck.stage.len();
         let end = stage_end(scope, table, (start, whole.end), is_last)?;
-        let method = method_of(deck, table);
+        let method = *method.get_ref();
         let is_explicit = !method.is_quasi_static();
         if let (Some(table), true) = (&stage.relaxation, is_explicit) {
             let message = "[[stage]] relaxation: only `method = \"relaxation\"` has these keys";
@@ -121,10 +119,20 @@ pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<p
     Ok(stages)
 }
 
-/// The method of a stage: its own or that of `[time]`.
-fn method_of(deck: &Deck, stage: &Spanned<grammar::Stage>) -> grammar::Method {
-    let method = stage.get_ref().method.as_ref();
-    *method.unwrap_or(&deck.time.get_ref().method).get_ref()
+/// The method of each stage, its own or that of `[time]`, and the section that gives it. Without stages there is one method.
+pub fn methods(deck: &Deck) -> Vec<(&'static str, &Spanned<grammar::Method>)> {
+    let of_time = ("[time]", &deck.time.get_ref().method);
+    if deck.stage.is_empty() {
+        return vec![of_time];
+    }
+    let each = deck
+        .stage
+        .iter()
+        .map(|stage| match &stage.get_ref().method {
+            Some(method) => ("[[stage]]", method),
+            None => of_time,
+        });
+    each.collect()
 }
 
 /// When a stage ends (s), after its start and at most at the end of the run.

@@ -227,7 +227,7 @@ impl Mesh {
         }
     }
 
-    /// The group of a key, among those that `is_wanted` accepts; `None` if there is none.
+    /// The group of a key that `is_wanted` accepts, if there is one.
     ///
     /// A key is a name, a number, or both with the kind in front, such as `side set 1`.
     ///

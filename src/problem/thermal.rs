@@ -41,21 +41,12 @@ impl Problem {
     /// Whether temperatures change during a run, so that they do work that the energy balance does not know.
     pub fn temperature_changes(&self) -> bool {
         let stages = self.all_stages();
-        let of_condition = |index: usize| {
-            stages
-                .iter()
-                .filter(move |stage| stage.acting[index])
-                .count()
-        };
-        self.conditions
-            .iter()
-            .enumerate()
-            .any(|(index, condition)| match &condition.action {
-                Action::Temperature(value) => {
-                    value.uses(Variable::T) || of_condition(index) < stages.len()
-                }
-                _ => false,
-            })
+        let acts_always = |index: usize| stages.iter().all(|stage| stage.acting[index]);
+        let mut conditions = self.conditions.iter().enumerate();
+        conditions.any(|(index, condition)| match &condition.action {
+            Action::Temperature(value) => value.uses(Variable::T) || !acts_always(index),
+            _ => false,
+        })
     }
 }
 
