@@ -1,5 +1,5 @@
-//! Scatter of positions and strengths: random numbers that follow from a seed and the id of a point alone, so that they do
-//! not depend on ranks, threads or restarts.
+//! Random numbers of points, such as the scatter of positions and strengths: they follow from a seed and the id of a point alone, so
+//! they do not depend on ranks, threads or restarts.
 
 /// What is scattered; each has random numbers of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -8,6 +8,8 @@ pub enum Scattered {
     Position(usize),
     /// The strength.
     Strength,
+    /// A component of a vector that probes a matrix.
+    Probe(usize),
 }
 
 /// A Weibull distribution of strengths.
@@ -33,6 +35,7 @@ pub fn uniform(seed: u64, what: Scattered, id: u64) -> f64 {
     let stream = match what {
         Scattered::Position(component) => component as u64,
         Scattered::Strength => 3,
+        Scattered::Probe(component) => 4 + component as u64,
     };
     let hash = mix(mix(mix(seed) ^ stream) ^ id);
     // The middle of one of 2⁵² equal intervals, which is a float.

@@ -10,6 +10,8 @@
 //! Every rank has the whole grid, factors its matrix and solves with it; there are few nodes. Sums over points are
 //! [rounded](crate::comm::rounded_sum::Unit), hence the same on any ranks and threads.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::comm::rounded_sum::Unit;
@@ -63,7 +65,7 @@ pub struct CoarseGrid<const D: usize> {
 pub struct PointStiffness<const D: usize> {
     /// λ V and G V, N m.
     pub moduli: [f64; 2],
-    /// Stiffness of its supported components, N/m; 0 for those that are free.
+    /// Stiffness of its supported components, N/m; 0 if free.
     pub springs: [f64; D],
 }
 
@@ -117,46 +119,61 @@ impl<const D: usize> CoarseGrid<D> {
         }
     }
 
-    /// Find the stiffness from what each owned point is to the grid. Collective.
+    /// Find the stiffness from that of each owned point. Collective.
     pub fn assemble(
         &mut self,
         comm: &dyn Communicator,
         model: &Model<D>,
-        share: impl Fn(usize) -> PointStiffness<D>,
+        of_point: impl Fn(usize) -> PointStiffness<D> + Sync,
     ) {
         let owned = model.owned();
-        let mut largest = [0.0_f64; 2];
-        for point in 0..owned {
-            let PointStiffness { moduli, springs } = share(point);
-            let most = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            largest = [
-                largest[0].max(most(&moduli)),
-                largest[1].max(most(&springs)),
-            ];
-        }
+        let most = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let points = (0..owned).into_par_iter().with_min_len(CHUNK);
+        let magnitudes = points.map(|point| {
+            let PointStiffness { moduli, springs } = of_point(point);
+            [most(&moduli), most(&springs)]
+        });
+        let mut largest = magnitudes.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
         comm.max(&mut largest);
         let units = largest.map(|magnitude| Unit::of(magnitude, model.total));
         let cells: usize = self.cells.iter().product();
         let width = 2 + D * PAIRS;
-        let mut words = vec![0_u64; cells * width];
-        for point in 0..owned {
-            let PointStiffness { moduli, springs } = share(point);
-            let place = self.place(model, point);
-            let own = &mut words[place.cell * width..][..width];
-            let mut add = |index: usize, unit: Option<Unit>, value: f64| {
-                if let Some(unit) = unit {
-                    own[index] = own[index].wrapping_add(unit.round(value) as u64);
-                }
-            };
-            add(0, units[0], moduli[0]);
-            add(1, units[0], moduli[1]);
-            for (d, spring) in springs.into_iter().enumerate().filter(|(_, k)| *k > 0.0) {
-                for (pair, (p, q)) in pairs::<D>().enumerate() {
-                    let value = spring * place.weight(p) * place.weight(q);
-                    add(2 + d * PAIRS + pair, units[1], value);
+        let sums_of = |points: Range<usize>| {
+            let mut words = vec![0_u64; cells * width];
+            for point in points {
+                let PointStiffness { moduli, springs } = of_point(point);
+                let place = self.place(model, point);
+                let own = &mut words[place.cell * width..][..width];
+                let mut add = |index: usize, unit: Option<Unit>, value: f64| {
+                    if let Some(unit) = unit {
+                        own[index] = own[index].wrapping_add(unit.round(value) as u64);
+                    }
+                };
+                add(0, units[0], moduli[0]);
+                add(1, units[0], moduli[1]);
+                for (d, spring) in springs.into_iter().enumerate().filter(|(_, k)| *k > 0.0) {
+                    for (pair, (p, q)) in pairs::<D>().enumerate() {
+                        let value = spring * place.weight(p) * place.weight(q);
+                        add(2 + d * PAIRS + pair, units[1], value);
+                    }
                 }
             }
-        }
+            words
+        };
+        let threads = rayon::current_num_threads();
+        let size = owned.div_ceil(threads).max(1);
+        let parts = (0..threads)
+            .into_par_iter()
+            .map(|part| sums_of((part * size).min(owned)..((part + 1) * size).min(owned)));
+        let mut words = parts.reduce(
+            || vec![0; cells * width],
+            |mut a, b| {
+                a.iter_mut()
+                    .zip(b)
+                    .for_each(|(a, b)| *a = a.wrapping_add(b));
+                a
+            },
+        );
         comm.sum(&mut words);
         let value = |unit: Option<Unit>, word: u64| unit.map_or(0.0, |u| u.value(word as i64));
         let [bulk, shear] = self.reference_stiffness();

@@ -3,7 +3,7 @@
 //! A load step moves time, which is the load parameter, and with it loads and supports. A method then looks for the
 //! equilibrium: [`super::relaxation`] or [`super::newton`].
 //!
-//! Bonds break at equilibria only: in equilibrium those that must break do, and the next equilibrium is looked for at
+//! Bonds break at equilibria only: bonds that reach their criterion there break, and the next equilibrium is found at
 //! the same load, until nothing breaks. The history of bonds and points is part of the equilibrium. Each iteration takes
 //! the forces from the history that a step from the last equilibrium to the present place would leave, and stores it
 //! when the equilibrium is found.

@@ -32,6 +32,7 @@ use crate::comm::sum::reduce;
 use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
 use crate::problem::Static;
+use crate::scatter::{Scattered, uniform};
 use crate::solver::Simulation;
 
 use super::coarse_grid::{CoarseGrid, PointStiffness};
@@ -433,26 +434,28 @@ impl<const D: usize> Vectors<D> {
         let owned = model.owned();
         let family = &simulation.family_volume;
         let mut intact = forces.intact_families(model).volume;
-        for (point, share) in intact.iter_mut().enumerate() {
+        let shares = intact.par_iter_mut().with_min_len(CHUNK).enumerate();
+        shares.for_each(|(point, share)| {
             *share = if family[point] > 0.0 {
                 (*share / family[point]).max(LEAST_INTACT)
             } else {
                 0.0
             };
-        }
+        });
         let is_free = simulation.conditions.free_components(owned);
         let density = simulation.fields.fictitious_density.as_deref();
         let density = density.expect("a run with equilibria has fictitious densities");
-        for d in 0..D {
-            for point in 0..owned {
+        for (inverse, is_free) in self.inverse_diagonal.iter_mut().zip(&is_free) {
+            let each = inverse.par_iter_mut().with_min_len(CHUNK).enumerate();
+            each.for_each(|(point, inverse)| {
                 let stiffness = density[point] * intact[point];
-                let takes_part = is_free[d][point] == 1.0 && stiffness.is_finite();
-                self.inverse_diagonal[d][point] = if takes_part && stiffness > 0.0 {
+                let takes_part = is_free[point] == 1.0 && stiffness.is_finite();
+                *inverse = if takes_part && stiffness > 0.0 {
                     1.0 / stiffness
                 } else {
                     0.0
                 };
-            }
+            });
         }
         if simulation.newton.diagonal.is_nan() {
             self.measure_diagonal(simulation);
@@ -492,7 +495,9 @@ impl<const D: usize> Vectors<D> {
             self.base[d].copy_from_slice(&simulation.fields.displacement[d][..owned]);
             for point in 0..owned {
                 let is_free = self.inverse_diagonal[d][point] > 0.0;
-                let sign = sign(simulation.model.ids[point], d);
+                let id = simulation.model.ids[point];
+                let is_positive = uniform(0, Scattered::Probe(d), id) < 0.5;
+                let sign = if is_positive { 1.0 } else { -1.0 };
                 self.direction[d][point] = if is_free { sign } else { 0.0 };
             }
         }
@@ -638,18 +643,5 @@ fn moduli(elastic: Isotropic, dimension: Dimension) -> [f64; 2] {
         Dimension::Line { .. } | Dimension::PlaneStrain { .. } | Dimension::Space => {
             [lambda, shear]
         }
-    }
-}
-
-/// 1 or −1, as if at random, for a component of a point (by id).
-fn sign(id: u64, d: usize) -> f64 {
-    // The finalizer of MurmurHash3.
-    let mut bits = id.wrapping_mul(3).wrapping_add(d as u64 + 1);
-    bits = (bits ^ bits >> 33).wrapping_mul(0xff51_afd7_ed55_8ccd);
-    bits = (bits ^ bits >> 33).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
-    if (bits ^ bits >> 33) & 1 == 0 {
-        1.0
-    } else {
-        -1.0
     }
 }
