@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::lanes::Column;
 use crate::material::{Counts, Law, MOST, PlasticState};
 use crate::solver::model::Model;
@@ -73,19 +75,40 @@ impl PointNumbers {
         sums: &[Vec<f64>],
         truncation_factors: &mut [f64],
     ) {
-        for (k, point) in points.enumerate() {
-            let law = blocks[usize::from(model.block[point])].law;
-            let count = law.counts::<D>();
-            let mut own = [0.0; MOST.reference_sum];
-            for (own, column) in own.iter_mut().zip(sums) {
-                *own = column[k];
-            }
-            if let Some(truncation_factor) = truncation_factors.get_mut(point) {
-                *truncation_factor = Law::<D>::truncation_factor(&law, &own[..count.reference_sum]);
-            }
+        let first = points.start;
+        let of_family = |block: u16, sums: &[f64; MOST.reference_sum]| {
+            let law = blocks[usize::from(block)].law;
+            let sums = &sums[..law.counts::<D>().reference_sum];
             let mut numbers = [0.0; NUMBERS];
-            Law::<D>::constants(&law, &own[..count.reference_sum], &mut numbers);
-            for (column, number) in self.columns.iter_mut().zip(numbers).take(count.constants) {
+            Law::<D>::constants(&law, sums, &mut numbers);
+            (numbers, Law::<D>::truncation_factor(&law, sums))
+        };
+        // Neighbours on a lattice mostly have equal families.
+        let found = points.clone().into_par_iter().with_min_len(CHUNK);
+        let found = found.map_init(
+            || None,
+            |last, point| {
+                let family = (model.block[point], {
+                    let mut own = [0.0; MOST.reference_sum];
+                    for (own, column) in own.iter_mut().zip(sums) {
+                        *own = column[point - first];
+                    }
+                    own
+                });
+                match last {
+                    Some((known, constants)) if *known == family => *constants,
+                    _ => last.insert((family, of_family(family.0, &family.1))).1,
+                }
+            },
+        );
+        let found: Vec<_> = found.collect();
+        for (point, (numbers, truncation_factor)) in points.zip(found) {
+            if let Some(entry) = truncation_factors.get_mut(point) {
+                *entry = truncation_factor;
+            }
+            let law = &blocks[usize::from(model.block[point])].law;
+            let constants = law.counts::<D>().constants;
+            for (column, number) in self.columns.iter_mut().zip(numbers).take(constants) {
                 column[point] = number;
             }
         }
