@@ -1,7 +1,7 @@
 //! From the problem to the law, the failure rule and the weights of every family.
 
 use crate::damage::{
-    BondEnergy, Criterion, CriticalStretch, DamageLaw, StretchConversion, WorkRule,
+    BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StretchConversion, WorkRule,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
@@ -281,25 +281,17 @@ fn criterion(
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
-    let of_blocks = ends.map(|block| problem.block(block).horizon);
     // A critical stretch that is given holds for bonds of any horizon.
     let is_given = ends.map(|block| {
         let damage = problem.block(block).body.damage.as_ref();
         damage.is_some_and(|damage| matches!(damage.toughness, Toughness::CriticalStretch(_)))
     });
-    let ratios_of_stretches = horizons.map(|horizon| {
-        std::array::from_fn(|k| {
-            if is_given[k] {
-                1.0
-            } else {
-                (of_blocks[k] / horizon).sqrt()
-            }
-        })
+    let stretch_ratios: HorizonRatios = horizons.map(|horizon| {
+        let ratio = |k: usize| (problem.block(ends[k]).horizon / horizon).sqrt();
+        [0, 1].map(|k| if is_given[k] { 1.0 } else { ratio(k) })
     });
-    let all_ratios: [[f64; 2]; 2] = ratios_of_stretches;
-    let converts = all_ratios.iter().flatten().any(|ratio| *ratio != 1.0);
-    let conversion = converts.then_some(StretchConversion {
-        ratios: all_ratios,
+    let conversion = (stretch_ratios != [[1.0; 2]; 2]).then_some(StretchConversion {
+        ratios: stretch_ratios,
         stiffness,
     });
     match (rules.reduce(WorkRule::of_both), per_point) {
