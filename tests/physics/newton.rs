@@ -1,6 +1,7 @@
 //! `method = "static"`: its equilibria are those of relaxation, in a fraction of the force evaluations; what it does where
 //! it finds none; ranks, threads and restarts change no bit.
 
+use crate::support::equilibria::{same_on_ranks, to_the_end, torn_plate};
 use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_input, simulate_on};
@@ -8,15 +9,6 @@ use fissure::comm::{Communicator, threads};
 use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
-
-/// Make all load steps. Returns the number of force evaluations.
-fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) -> u64 {
-    while !simulation.is_over() {
-        simulation.advance();
-        simulation.check().unwrap_or_else(|error| panic!("{error}"));
-    }
-    simulation.times.evaluations
-}
 
 fn displacements<const D: usize>(simulation: &Simulation<D>) -> Vec<f64> {
     let owned = simulation.model.owned();
@@ -84,7 +76,8 @@ fn compare<const D: usize>(law: &str, motion: &str) {
         simulate(
             &pulled::<D>(law, motion, method),
             |mut simulation: Simulation<D>| {
-                let evaluations = to_the_end(&mut simulation);
+                to_the_end(&mut simulation);
+                let evaluations = simulation.times.evaluations;
                 let yielded = simulation.fields.plastic_strain_equivalent.clone();
                 let most = yielded.map(|all| all.into_iter().fold(0.0, f64::max));
                 (displacements(&simulation), evaluations, most)
@@ -130,7 +123,8 @@ fn evaluations(name: &str, parameters: &[(&str, &str)]) -> [u64; 2] {
         let method = [("time.method", method)];
         let all = [parameters, &method].concat();
         simulate_input(name, &all, |mut simulation: Simulation<2>| {
-            to_the_end(&mut simulation)
+            to_the_end(&mut simulation);
+            simulation.times.evaluations
         })
     })
 }
@@ -147,42 +141,18 @@ fn it_takes_a_fifth_of_the_force_evaluations() {
     }
 }
 
-/// A notched plate that is torn, with bonds of two kinds.
+/// See [`torn_plate`].
 fn torn(family: &str) -> String {
-    format!(
-        "dimension = 'plane-stress'
-        grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
-        material.sheet.pmb = {{ density = 2, youngs_modulus = 5 }}
-        damage.brittle.critical_stretch = {{ critical_stretch = 0.02, alpha = 0.1 }}
-        body.plate = {{ material = 'sheet', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [24, 16] }} }}
-        crack.notch.segment = {{ from = [-1, 8], to = [8, 8] }}
-        set.top.where = 'y > 13'
-        set.bottom.where = 'y < 3'
-        set.right.where = 'x > 22'
-        condition.down = {{ set = 'bottom', velocity = [0, '-0.04'] }}
-        condition.up = {{ set = 'top', displacement = [0, '0.04*t'] }}
-        condition.push = {{ set = 'right', body_force = ['1e-4*t', 0] }}
-        time = {{ end = 4, method = 'static', static = {{ load_steps = 4, tolerance = 1e-5 }} }}
-        "
+    torn_plate(
+        family,
+        "method = 'static', static = { load_steps = 4, tolerance = 1e-5 }",
     )
 }
 
 #[test]
 fn ranks_do_not_change_a_bit() {
     for family in ["lattice", "list"] {
-        let run = |ranks: usize| {
-            let parts = simulate_on(ranks, &torn(family), |mut simulation: Simulation<2>| {
-                to_the_end(&mut simulation);
-                state(&simulation).1
-            });
-            whole(parts)
-        };
-        let one = run(1);
-        let broken = one.1.iter().any(|byte| *byte != one.1[0]);
-        assert!(broken);
-        for ranks in [2, 3] {
-            assert!(run(ranks) == one, "{family}, {ranks} ranks");
-        }
+        same_on_ranks(&torn(family));
     }
 }
 

@@ -2,6 +2,7 @@
 //! the load steps; bonds break between equilibria, without the overshoot of a wave; it can be stopped
 //! within a load step and goes on to the same bits.
 
+use crate::support::equilibria::{same_on_ranks, to_the_end, torn_plate};
 use crate::support::history::{column, row};
 use crate::support::saved::{state, whole};
 use crate::support::{problem, simulate, simulate_on};
@@ -10,14 +11,6 @@ use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
 use fissure::solver::observers::{Energies, HistoryObserver, Snapshot};
-
-/// Makes all load steps.
-fn to_the_end<const D: usize>(simulation: &mut Simulation<D>) {
-    while !simulation.is_over() {
-        simulation.advance();
-        simulation.check().unwrap_or_else(|error| panic!("{error}"));
-    }
-}
 
 /// Makes a whole load step.
 fn load_step<const D: usize>(simulation: &mut Simulation<D>) {
@@ -585,42 +578,18 @@ fn a_bar_breaks_when_it_must_and_carries_nothing_from_then_on() {
     });
 }
 
-/// A notched plate that is torn, with bonds of two kinds.
+/// See [`torn_plate`].
 fn torn(family: &str) -> String {
-    format!(
-        "dimension = 'plane-stress'
-        grid = {{ spacing = 1, horizon = 3, family = '{family}' }}
-        material.sheet.pmb = {{ density = 2, youngs_modulus = 5 }}
-        damage.brittle.critical_stretch = {{ critical_stretch = 0.02, alpha = 0.1 }}
-        body.plate = {{ material = 'sheet', damage = 'brittle', shape.box = {{ lower = [0, 0], upper = [24, 16] }} }}
-        crack.notch.segment = {{ from = [-1, 8], to = [8, 8] }}
-        set.top.where = 'y > 13'
-        set.bottom.where = 'y < 3'
-        set.right.where = 'x > 22'
-        condition.down = {{ set = 'bottom', velocity = [0, '-0.04'] }}
-        condition.up = {{ set = 'top', displacement = [0, '0.04*t'] }}
-        condition.push = {{ set = 'right', body_force = ['1e-4*t', 0] }}
-        time = {{ end = 4, method = 'relaxation', relaxation = {{ load_steps = 8, tolerance = 1e-5 }} }}
-        "
+    torn_plate(
+        family,
+        "method = 'relaxation', relaxation = { load_steps = 8, tolerance = 1e-5 }",
     )
 }
 
 #[test]
 fn ranks_do_not_change_a_bit() {
     for family in ["lattice", "list"] {
-        let run = |ranks: usize| {
-            let parts = simulate_on(ranks, &torn(family), |mut simulation: Simulation<2>| {
-                to_the_end(&mut simulation);
-                state(&simulation).1
-            });
-            whole(parts)
-        };
-        let one = run(1);
-        let broken = one.1.iter().any(|byte| *byte != one.1[0]);
-        assert!(broken);
-        for ranks in [2, 3] {
-            assert!(run(ranks) == one, "{family}, {ranks} ranks");
-        }
+        same_on_ranks(&torn(family));
     }
 }
 

@@ -4,6 +4,7 @@
 
 pub mod command;
 pub mod datasets;
+pub mod equilibria;
 pub mod history;
 pub mod recorded;
 pub mod saved;

@@ -84,7 +84,7 @@ struct FiniteCheck<'a, const D: usize> {
 }
 
 impl<const D: usize> FiniteCheck<'_, D> {
-    /// An error if points of a set have no length left at a temperature.
+    /// An error if the thermal stretch of a point of a set is -1 or less, which leaves its bonds no length.
     fn look_at_stretches(
         &self,
         key: &str,
@@ -114,8 +114,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
             return Ok(());
         };
         let message = format!(
-            "{key}: the thermal stretch is {} at t = {} s at point {id}, and must be above -1; `thermal_expansion` is by \
-             one unit of temperature, such as 1e-5",
+            "{key}: the thermal stretch is {} at t = {} s at point {id}, and must be above -1; `thermal_expansion` is \
+             per unit of temperature, such as 1e-5",
             format_number(stretch),
             format_number(self.time),
         );

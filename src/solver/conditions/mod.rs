@@ -281,7 +281,7 @@ impl<const D: usize> Conditions<D> {
         self.temperatures.set_time(time);
     }
 
-    /// Have all temperatures set anew by the next [`Here::apply_temperatures`].
+    /// Make the next [`Here::apply_temperatures`] set all temperatures.
     pub fn reset_temperatures(&mut self) {
         self.temperatures.reset();
     }

@@ -31,7 +31,7 @@ pub struct Temperatures {
 }
 
 impl Temperatures {
-    /// Adds one; returns its number.
+    /// Add a temperature; returns its number.
     pub fn add(&mut self, value: &Expression) -> usize {
         let values = Values::new(value);
         self.each.push(Temperature {
@@ -41,7 +41,8 @@ impl Temperatures {
         self.each.len() - 1
     }
 
-    /// Prepare the temperatures of a time (s). Points are due at the first time, and whenever a temperature changes.
+    /// Prepare the temperatures of a time (s). The points are due at the first call, and when the time of changing
+    /// temperatures is new.
     pub fn set_time(&mut self, time: f64) {
         let is_new = self.time != Some(time);
         let changes = self.each.iter().any(|one| one.values.changes);
@@ -79,7 +80,7 @@ impl Temperatures {
         }
         for (k, (stretch, value)) in stretch.iter_mut().zip(temperature.iter()).enumerate() {
             let free = model.expansion_of(first + k).stretch_at(*value);
-            // Without a length there is no bond: the run ends, and says why.
+            // Not a number ends the run, whose message then names the temperature.
             *stretch = if free > -1.0 { free } else { f64::NAN };
         }
     }
