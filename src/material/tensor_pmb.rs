@@ -12,10 +12,9 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
-use super::bond::Weights;
 use super::symmetric::{Symmetric, mixed, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb};
-use crate::lanes::{LaneTuple, Lanes, Simd};
+use crate::lanes::Lanes;
 
 /// Smallest eigenvalue of H: bodies of two or three points across would have bonds that push when they are pulled.
 const SMALLEST: f64 = 0.2;
@@ -69,21 +68,16 @@ impl Described for TensorPmb {
     }
 }
 
-/// n·H n. Written out: over an iterator the compiler keeps all entries in memory, and a sum of forces takes ten times as long.
+/// n·H n.
 #[inline(always)]
 fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> Lanes {
     let xi = &bond.reference;
     let mut sum = diagonal[0] * (xi[0] * xi[0]);
-    if D == 2 {
-        sum += diagonal[1] * (xi[1] * xi[1]);
-        sum += others[0] * (xi[0] * xi[1] * 2.0);
+    for d in 1..D {
+        sum += diagonal[d] * (xi[d] * xi[d]);
     }
-    if D == 3 {
-        sum += diagonal[1] * (xi[1] * xi[1]);
-        sum += diagonal[2] * (xi[2] * xi[2]);
-        sum += others[0] * (xi[1] * xi[2] * 2.0);
-        sum += others[1] * (xi[0] * xi[2] * 2.0);
-        sum += others[2] * (xi[0] * xi[1] * 2.0);
+    for (k, (a, b)) in mixed::<D>().enumerate() {
+        sum += others[k] * (xi[a] * xi[b] * 2.0);
     }
     sum * (bond.inverse * bond.inverse)
 }
@@ -202,22 +196,6 @@ impl<const D: usize> Law<D> for TensorPmb {
     #[inline(always)]
     fn force(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
         let micromodulus = along(bond, end) * self.micromodulus;
-        Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
-    }
-
-    #[inline(always)]
-    fn bond_force<S: Simd>(
-        _: S,
-        laws: &[Self; 2],
-        bond: &Bond<D>,
-        [i, j]: [&Symmetric<D>; 2],
-        _: &[[Lanes; 0]; 2],
-        weights: Weights,
-    ) -> Along {
-        let [c_i, c_j] = [laws[0].micromodulus, laws[1].micromodulus];
-        let diagonal = LaneTuple::each(|d| weights.sum(i.0[d] * c_i, j.0[d] * c_j));
-        let others = LaneTuple::each(|d| weights.sum(i.1[d] * c_i, j.1[d] * c_j));
-        let micromodulus = along(bond, &(diagonal, others));
         Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
     }
 
