@@ -144,12 +144,9 @@ impl AnyLaw {
         })
     }
 
-    /// How many numbers the law has in `D` dimensions.
+    /// [`Law::counts`] in `D` dimensions.
     pub fn counts<const D: usize>(&self) -> Counts {
-        fn of<L: Law<D>, const D: usize>(_: &L) -> Counts {
-            Counts::of::<L, D>()
-        }
-        with_law!(self, law => of::<_, D>(law))
+        with_law!(self, law => Law::<D>::counts(law))
     }
 }
 
@@ -183,6 +180,10 @@ impl<const D: usize> Law<D> for AnyLaw {
         plastic: &mut PlasticState,
     ) {
         with_law!(self, law => Law::<D>::update_point(law, pass, sums, numbers, plastic));
+    }
+
+    fn counts(&self) -> Counts {
+        with_law!(self, law => Law::<D>::counts(law))
     }
 
     fn has_plasticity(&self) -> bool {

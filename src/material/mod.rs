@@ -159,6 +159,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) {
     }
 
+    /// How many numbers points and bonds have; fewer passes and own numbers than the type's where this law needs fewer.
+    fn counts(&self) -> Counts {
+        Counts::of::<Self, D>()
+    }
+
     /// Whether points keep a [`PlasticState`].
     fn has_plasticity(&self) -> bool {
         false

@@ -11,7 +11,9 @@
 //! ([`Control`]). In the loops this is T⟨ξ⟩ = ω (A ξ + B η) with A = P K⁻¹ − B H. The strain energy
 //! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
 //!
-//! Where a body yields ([`Plastic`]), P follows from F and from what flow has left at the point.
+//! Where a body yields ([`Plastic`]), P follows from F and from what flow has left at the point. The control of the elastic body
+//! is multiplied by a share s that falls with the flow ([`Plastic::control_left`]); else it would carry what the solid no
+//! longer can. As s falls, −Δs times the energy ½ Σ ω z·B z Ṽ of the elastic control is dissipated.
 
 mod bond_associated;
 mod control;
@@ -24,10 +26,10 @@ mod tensor;
 use nalgebra::SMatrix;
 
 use super::bond::Weights;
-use super::symmetric::{symmetric, to_entries};
+use super::symmetric::{Symmetric, symmetric, to_entries};
 use super::{
-    Bond, Built, Declaration, Declared, Described, ForceState, Given, Influence, Invariants, Key,
-    Kind, Law, PlasticState, Rotation, Values, Word,
+    Bond, Built, Counts, Declaration, Declared, Described, ForceState, Given, Influence,
+    Invariants, Key, Kind, Law, PlasticState, Rotation, Values, Word,
 };
 use crate::lanes::{LaneTuple, Lanes, Simd};
 pub use bond_associated::BondAssociated;
@@ -154,11 +156,12 @@ type Point<const D: usize> = ([Lanes; CONSTANTS], Tensors<D>);
 
 const CONSTANTS: usize = 2;
 
-/// W − ½ P : H (J/m³), and whether the shape tensor is singular.
-const OWN: usize = 2;
+/// W − ½ P : H (J/m³), and whether the shape tensor is singular; where a body yields and is controlled, also the part
+/// ½ tr(B H K Hᵀ) of ½ Σ ω η·B η Ṽ that is not of the control (J/m³), and s at the start of the step.
+const OWN: usize = 4;
 
 /// A, and the diagonal and mixed entries of B.
-type Tensors<const D: usize> = ([[Lanes; D]; D], ([Lanes; D], [Lanes; D]));
+type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
 /// A ξ + B η. Row by row, written out: the compiler keeps loops over so much as loops, and then all of their
 /// numbers in memory.
@@ -195,6 +198,18 @@ fn row<S: Simd, const D: usize>(
     sum
 }
 
+/// η·B η, N/m⁵.
+#[inline(always)]
+fn of_control<const D: usize>(control: &Symmetric<D>, eta: &[Lanes; D]) -> Lanes {
+    let mut sum = Lanes::splat(0.0);
+    for a in 0..D {
+        for b in 0..D {
+            sum += symmetric(control, a, b) * eta[a] * eta[b];
+        }
+    }
+    sum
+}
+
 impl<const D: usize> Law<D> for Correspondence {
     type Point = Point<D>;
     type BondHistory = [Lanes; 0];
@@ -204,7 +219,8 @@ impl<const D: usize> Law<D> for Correspondence {
     type Sum = FamilyShare<D>;
     type Force = [Lanes; D];
     const CONSTANTS: usize = CONSTANTS;
-    const PASSES: usize = 1;
+    /// The second is for the energy of a control that yields.
+    const PASSES: usize = 2;
     const OWN_NUMBERS: usize = OWN;
     const LEAST_DIMENSION: usize = 2;
     const SUM_READS_STRETCH: bool = false;
@@ -226,6 +242,18 @@ impl<const D: usize> Law<D> for Correspondence {
         }
     }
 
+    fn counts(&self) -> Counts {
+        let all = Counts::of::<Self, D>();
+        if self.plastic.is_some() && self.control != Control::None {
+            return all;
+        }
+        Counts {
+            passes: 1,
+            own: 2,
+            ..all
+        }
+    }
+
     /// The trace of K⁻¹ over that of a whole family.
     fn truncation_factor(&self, sums: &[f64]) -> f64 {
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
@@ -238,17 +266,42 @@ impl<const D: usize> Law<D> for Correspondence {
     fn pass_contribution<const S: usize>(
         &self,
         bond: &Bond<D>,
-        _: &Self::Point,
+        (_, (_, control)): &Self::Point,
         _: &[Lanes; 0],
     ) -> Self::Sum {
-        family_share(bond)
+        if S == 0 {
+            return family_share(bond);
+        }
+        let mut sum = Self::Sum::splat(0.0);
+        *sum.get_mut(0) = of_control(control, &bond.eta);
+        sum
     }
 
-    fn update_point(&self, _: usize, sums: &[f64], numbers: &mut [f64], state: &mut PlasticState) {
-        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
+    fn update_point(
+        &self,
+        pass: usize,
+        sums: &[f64],
+        numbers: &mut [f64],
+        state: &mut PlasticState,
+    ) {
         let (constants, found) = numbers.split_at_mut(CONSTANTS);
         let own = D * D + 2 * D;
-        found[..own + OWN].fill(0.0);
+        let left = |state: &PlasticState| {
+            let plastic = self.plastic.as_ref();
+            plastic.map_or(1.0, |plastic| plastic.control_left(state))
+        };
+        if pass == 1 {
+            let [seen, before] = [found[own + 2], found[own + 3]];
+            let after = left(state);
+            let energy = (0.5 * sums[0] - seen).max(0.0) / after;
+            state.work += (before - after) * 0.5 * (state.control + energy);
+            state.control = energy;
+            return;
+        }
+        let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
+        let count = Law::<D>::counts(self).own;
+        found[..own + count].fill(0.0);
+        let before = left(state);
         let moved = from_rows::<D>(&sums[2 * D..]);
         let inverse = shape.inverse_of_rest(self.modulus, constants[0]);
         let stress = inverse.and_then(|inverse| {
@@ -263,11 +316,16 @@ impl<const D: usize> Law<D> for Correspondence {
             found[own + 1] = 1.0;
             return;
         };
-        let control = self.control.matrix(&inverse, constants[1]);
+        let after = left(state);
+        let control = self.control.matrix(&inverse, constants[1]) * after;
         let direct = stress * inverse - control * gradient;
         to_rows(&direct, found);
         to_entries(&control, &mut found[D * D..]);
         found[own] = energy - 0.5 * stress.dot(&gradient);
+        if count == OWN {
+            found[own + 2] = 0.5 * (control * gradient).dot(&moved);
+            found[own + 3] = before;
+        }
     }
 
     #[inline(always)]

@@ -181,6 +181,16 @@ impl Plastic {
         stress
     }
 
+    /// The share of the zero-energy control that is left: (σ/(σ + 3G ε̄))² with the present yield stress σ, the square of the
+    /// secant modulus of shear over G. It is 1 before any flow and never grows.
+    ///
+    /// z grows with ε̄. Under the secant itself the energy of the control grows as the plastic work does, and a limit load
+    /// contains a share of it for ever; under its square that energy stays what it was when the body began to yield.
+    pub fn control_left(&self, state: &PlasticState) -> f64 {
+        let limit = self.limit(state);
+        (limit / (limit + 3.0 * self.shear * state.equivalent)).powi(2)
+    }
+
     /// The stress at which a body of this state yields, Pa.
     fn limit(&self, state: &PlasticState) -> f64 {
         self.yield_stress + self.hardening * state.equivalent

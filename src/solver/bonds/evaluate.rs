@@ -379,7 +379,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
     sums: &mut [Column],
     source: PointData<'_, D>,
 ) {
-    if number >= L::PASSES {
+    if number >= law.counts().passes {
         return;
     }
     let results = L::Sum::columns_mut(sums);

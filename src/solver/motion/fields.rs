@@ -225,6 +225,13 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
+    /// Energy of the zero-energy control that an elastic body would have at a point, J/m³; none where no points flow.
+    control_energy: Option<Vec<f64>> = Description {
+        name: "control_energy",
+        unit: "J/m^3",
+        birth: Birth::Mixed,
+        ..STATE
+    };
     /// What plastic flow of a point has dissipated, J/m³; none where no points flow.
     plastic_work: Option<Vec<f64>> = Description {
         name: "plastic_work",
@@ -365,9 +372,10 @@ pub struct Needs {
 pub fn plastic_columns<'a>(
     strain: &'a mut Option<[Vec<f64>; 6]>,
     equivalent: &'a mut Option<Vec<f64>>,
+    control: &'a mut Option<Vec<f64>>,
     work: &'a mut Option<Vec<f64>>,
 ) -> PlasticColumns<'a> {
-    let fields: [&mut dyn Columns; 3] = [strain, equivalent, work];
+    let fields: [&mut dyn Columns; 4] = [strain, equivalent, control, work];
     let mut columns = fields.into_iter().flat_map(Columns::columns_mut);
     std::array::from_fn(|_| columns.next().map(Vec::as_mut_slice).unwrap_or_default())
 }
@@ -442,6 +450,7 @@ impl<const D: usize> Fields<D> {
             overshoot_energy: needs.damage.then(scalar),
             plastic_strain: needs.plasticity.then(|| std::array::from_fn(|_| scalar())),
             plastic_strain_equivalent: needs.plasticity.then(scalar),
+            control_energy: needs.plasticity.then(scalar),
             plastic_work: needs.plasticity.then(scalar),
             external_work: (needs.loads || needs.supports).then(scalar),
             damping_power: needs.damping.then(scalar),
