@@ -7,6 +7,7 @@ mod deck {
     mod decks;
     mod import;
     mod meshes;
+    mod messages;
     mod survey;
 }
 

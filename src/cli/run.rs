@@ -147,7 +147,7 @@ impl Observer for Log {
                 } else {
                     format!("; it is kept as {}", renamed.join(" and "))
                 };
-                errln!("warning: {reason}: a new result begins here{renamed}");
+                errln!("warning: {reason}: starting a new result{renamed}");
             }
             Message::Decided(decisions) if self.prints && self.verbose => {
                 outln!("decided");

@@ -137,8 +137,10 @@ fn action(
         (Some(depth), _) => scope.positive(depth, &format!("{key} depth")),
         (None, Some(spacing)) => Ok(spacing),
         (None, None) => {
-            let message =
-                format!("{key}: needs `depth`, the thickness of the layer that it acts on");
+            let message = format!(
+                "{key}: acts on a layer, and these points have no single spacing; give the thickness of the layer as \
+                 `depth`"
+            );
             Err(scope.error(place, message))
         }
     };

@@ -243,8 +243,8 @@ fn crack(
     let key = column_name(scope, "crack", name, table)?;
     if scope.dimension != 2 {
         let message = format!(
-            "{key}: paths are found in plane problems only, this one is {}-D; `[history.tip.{name}]` \
-             follows the tip of a crack in any",
+            "{key}: crack paths are found in 2-D only, this problem is {}-D; use `[history.tip.{name}]` with `from` \
+             and `direction`",
             scope.dimension
         );
         return Err(scope.error(table.span(), message));

@@ -24,8 +24,8 @@ pub fn lints(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<Vec<Warnin
             && !condition.is_condition()
         {
             let message = format!(
-                "[set.{}] where: is a number rather than a condition, and holds wherever it is not 0; \
-                 a comparison is missing",
+                "[set.{}] where: is a number, not a condition, and selects all points where it is not 0; add a \
+                 comparison",
                 set.name
             );
             warnings.push(Warning::new(message).at(&set.span));

@@ -283,7 +283,7 @@ impl<'a> Scope<'a> {
             })
             .collect::<Result<Vec<_>>>()?;
         if motion.iter().all(Option::is_none) {
-            let message = format!("{key}: every component is free, so this does nothing");
+            let message = format!("{key}: every component is `free`, so nothing is prescribed");
             return Err(self.error(vector.span(), message));
         }
         Ok(motion)

@@ -230,7 +230,7 @@ impl TimeSegment<'_> {
         let step = scope.positive(number, &key)?;
         let words = if self.method.is_quasi_static() {
             let method = self.method.name();
-            format!("{method} has load steps, `{method}.load_steps` of them")
+            format!("{method} has load steps instead of time steps; set `{method}.load_steps`")
         } else if step > self.length * (1.0 + UP_TO_ROUNDING) {
             let (step, length) = (format_number(step), format_number(self.length));
             let whole = if self.key == "[time]" { "run" } else { "stage" };
@@ -346,7 +346,7 @@ fn at_rest(scope: &Scope, deck: &Deck, method: grammar::Method) -> Result<()> {
     for (name, table) in &deck.initial {
         if let Some(velocity) = &table.get_ref().velocity {
             let message = format!(
-                "[initial.{name}] velocity: the run begins with {}, in which nothing has a velocity",
+                "[initial.{name}] velocity: initial velocities have no effect in a run that begins with {}; remove them",
                 method.name()
             );
             return Err(scope.error(velocity.span(), message));

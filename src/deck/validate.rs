@@ -197,8 +197,8 @@ fn volume_correction(
         return Ok(problem::VolumeCorrection::None);
     };
     let message = format!(
-        "[grid] volume_correction: only points at the centres of square or cubic lattice cells have \
-         cells to correct, and [body.{name}] {reason}"
+        "[grid] volume_correction: is for points at the centres of square or cubic lattice cells, but [body.{name}] \
+         {reason}"
     );
     Err(scope.error(given.span(), message))
 }
@@ -243,8 +243,8 @@ fn family(scope: &Scope, deck: &Deck) -> Result<problem::FamilyRule> {
             Ok(problem::FamilyRule::Lattice)
         }
         Family::Lattice => {
-            let message = "[grid] family: Gauss points do not have the same neighbours all over, \
-                           as those of a lattice do; take \"auto\" or \"list\"";
+            let message =
+                "[grid] family: Gauss points do not form a lattice; take \"auto\" or \"list\"";
             Err(scope.error(grid.family.span(), message))
         }
     }

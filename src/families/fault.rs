@@ -69,7 +69,7 @@ fn same_place(problem: &Problem, points: &[Point; 2]) -> Error {
     } else {
         format!(
             "[body.{}]: its point {} lies at the same place as point {} of [body.{}], {position:?} m; \
-             do the bodies overlap?",
+             check whether the bodies overlap",
             body.name, second.id, first.id, other.name
         )
     };
@@ -139,7 +139,7 @@ fn too_many_neighbours(
     };
     let message = format!(
         "{key}: {} m{is}, so a point of [body.{}] would have {count} neighbours there \
-         ({MOST_NEIGHBOURS} at most); is the horizon in metres?",
+         ({MOST_NEIGHBOURS} at most); check that the horizon is in metres",
         format_number(near.horizon),
         body.name
     );

@@ -36,7 +36,7 @@ const FORM: Key = Key {
         Word::new("energy"),
         Word {
             word: "diehl2016",
-            no_line: Some("the paper has no constant for 1-D; `energy` serves there"),
+            no_line: Some("the paper has no constant for 1-D; use \"energy\""),
         },
     ]),
 };

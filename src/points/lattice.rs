@@ -276,7 +276,7 @@ pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
     if lattice.cells() as f64 > limit && lattice.points() > limit {
         let message = format!(
             "[body.{}]: about {:.1e} points are too many for {ranks} rank(s), of 2³¹ each at most; \
-             use more ranks, or is the spacing not in m?",
+             use more ranks, or check that the spacing is in metres",
             problem.bodies[body].name,
             lattice.points()
         );
@@ -288,7 +288,7 @@ pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
 fn too_many(problem: &Problem, body: usize) -> Error {
     let body = &problem.bodies[body];
     let message = format!(
-        "[body.{}]: its lattice has too many cells; is the spacing in m?",
+        "[body.{}]: its lattice has too many cells; check that the spacing is in metres",
         body.name
     );
     Error::input(message).at(&body.span)

@@ -181,7 +181,7 @@ pub enum Toughness {
     FractureEnergy(f64),
     /// K_Ic, Pa·√m.
     FractureToughness(f64),
-    /// s0 itself; for bonds that break by their stretch.
+    /// s0 itself, for laws with a critical stretch.
     CriticalStretch(f64),
 }
 

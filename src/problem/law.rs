@@ -91,9 +91,10 @@ impl Law {
     /// Why bodies of the law can have no such damage, if they cannot.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         let (can, way): (fn(&Declaration) -> bool, _) = match damage.rule {
-            DamageRule::CriticalStretch => {
-                (|law| law.critical_stretch.is_some(), "by their stretch")
-            }
+            DamageRule::CriticalStretch => (
+                |law| law.critical_stretch.is_some(),
+                "by a critical stretch",
+            ),
             DamageRule::Energy { work, .. } => {
                 let wanted = [
                     (work.sense == Sense::Either, "tension_only = false"),
@@ -102,12 +103,12 @@ impl Law {
                 let wanted = wanted.into_iter().find_map(|(is, key)| is.then_some(key));
                 if let Some(key) = wanted.filter(|_| !self.declaration.any_poisson_ratio) {
                     return Some(format!(
-                        "bonds of the bond-based law `{}` break by their stretch, of the same fracture energy: \
-                         `{key}` is for laws with any Poisson's ratio",
+                        "`{}` has a critical stretch of the same fracture energy; `{key}` is only for laws with any \
+                         Poisson's ratio",
                         self.declaration.name
                     ));
                 }
-                (|law| law.breaks_by_energy, "by their energy")
+                (|law| law.breaks_by_energy, "by energy")
             }
         };
         let is_given = matches!(damage.toughness, super::Toughness::CriticalStretch(_));
@@ -123,7 +124,7 @@ impl Law {
         }
         let others = declarations().filter(|law| can(law));
         Some(format!(
-            "bonds of the law `{}` never break {way}; take {} for a body whose bonds can",
+            "`{}` cannot break {way}; take {}",
             self.declaration.name,
             names(others, "or"),
         ))

@@ -76,8 +76,8 @@ impl EnergyWatch {
         let relative_gain = gain / self.input.max(self.floor);
         let text = || {
             format!(
-                "step {} (t = {:.6e} s): the energy has grown by {gain:.3e} J beyond the {:.3e} J that were \
-                 put in at the start, by loads and by supports",
+                "step {} (t = {:.6e} s): the energy has grown by {gain:.3e} J beyond the energy input of {:.3e} J \
+                 (start, loads, supports)",
                 clock.number(),
                 clock.time(),
                 self.input,
@@ -86,7 +86,7 @@ impl EnergyWatch {
         let fatal = relative_gain > FATAL_GAIN;
         let certain = relative_gain.is_nan() || relative_gain > CERTAIN_GAIN;
         if certain || (fatal && (self.suspected || clock.is_over())) {
-            let message = format!("{}; are the steps too large? ({})", text(), self.steps);
+            let message = format!("{}; reduce the time step ({})", text(), self.steps);
             return Err(Error::run(message));
         }
         self.suspected = fatal;
@@ -108,8 +108,9 @@ impl EnergyWatch {
         }
         self.warned_of_breaking = true;
         Some(format!(
-            "t = {:.4e} s: breaking bonds have added {added:.3e} J to the body, {:.0} % of the energy put in. Families of \
-             correspondence laws can store more with fewer bonds; compare with a smaller step, a finer grid, or `ordinary`",
+            "t = {:.4e} s: breaking bonds have added {added:.3e} J to the body, {:.0} % of the energy put in. \
+             Families of correspondence laws can store more with fewer bonds; compare with a smaller \
+             step, a finer grid, or `ordinary`",
             clock.time(),
             100.0 * added / self.input,
         ))

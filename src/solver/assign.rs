@@ -56,8 +56,8 @@ fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
     elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
 }
 
-/// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not
-/// go with that of another body.
+/// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not go with
+/// that of another body.
 ///
 /// # Errors
 /// For problems made in Rust; most of what a deck says is checked where it is read.
@@ -137,7 +137,8 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         ));
     }
     if damage.rule.is_unmeasured() {
-        let message = "what opening the body costs has not been measured: take the problem that `solver::calibration::calibrated` returns";
+        let message = "what opening the body costs has not been measured: take the problem that \
+                       `solver::calibration::calibrated` returns";
         return error(message.to_owned());
     }
     let by_energy = damage.rule != DamageRule::CriticalStretch;
@@ -151,7 +152,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let influenced = build(problem, body, constants(problem, &block, &block)).influence;
     if influenced.is_some() && problem.volume_correction != VolumeCorrection::None {
         return error(
-            "bonds with an influence that is not constant break by their energy only with \
+            "energy damage needs a constant influence, or \
              `[grid] volume_correction = \"none\"`"
                 .to_owned(),
         );

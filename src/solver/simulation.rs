@@ -554,8 +554,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (body, position) = (self.problem.block(block as usize).body, &position[..D]);
         Err(if step == 0.0 {
             let message = format!(
-                "[body.{}]: the force on its point {id}, {position:?} m, is not finite at the start; do displacements \
-                 move points onto one another?",
+                "[body.{}]: the force on its point {id}, {position:?} m, is not finite at the start; check whether \
+                 displacements move points onto each other",
                 body.name,
             );
             Error::input(message).at(&body.span)

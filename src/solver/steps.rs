@@ -46,8 +46,8 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
             (step, steps_to(length, step))
         }
         StepRule::Automatic(_) if stable.is_infinite() => {
-            let message = "[grid] horizon: no point has a neighbour, so there is no stable step; is the horizon \
-                           in m and larger than the distance of the points?";
+            let message = "[grid] horizon: no point has a neighbour, so there is no stable step; check that the \
+                           horizon is in metres and exceeds the spacing";
             return Err(Error::input(message).at(&problem.places.horizon));
         }
         StepRule::Automatic(safety) => {

@@ -148,10 +148,10 @@ fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Opt
         if excess.abs() < VOLUME_SLACK {
             return None;
         }
-        let more = if excess > 0.0 { "more" } else { "less" };
+        let size = if excess > 0.0 { "large" } else { "small" };
         format!(
-            "[body.{}]: its points have {:.2} % {more} volume, and mass, than its shape, of which later \
-             bodies take their part; do the cells not fit?",
+            "[body.{}]: the grid does not divide this body evenly: its volume and mass are {:.2} % too {size}; choose \
+             a spacing that divides its edges",
             body.name,
             100.0 * excess.abs()
         )
@@ -164,8 +164,8 @@ fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Opt
             return None;
         }
         format!(
-            "[body.{}] points: have {mean:.3e} m³ each on average, but a cell as wide as they are apart, \
-             {:.3e} m, has {cell:.3e} m³; are the volumes in m³?",
+            "[body.{}] points: the mean volume is {mean:.3e} m³, but a cell of the mean spacing, {:.3e} m, has \
+             {cell:.3e} m³; check that volumes are in m³",
             body.name, figures.spacing
         )
     };

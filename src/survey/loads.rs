@@ -87,7 +87,7 @@ fn twice_prescribed<const D: usize>(
             let common = total(simulation.comm, common as u64);
             if common > 0 {
                 let words = format!(
-                    "takes the place of [condition.{}] in {} at {common} point(s)",
+                    "overrides [condition.{}] in {} at {common} point(s)",
                     first.name,
                     components.join(" and ")
                 );
@@ -118,7 +118,7 @@ fn without_effect<const D: usize>(
                     expansion.stretch_per_kelvin != 0.0
                 };
                 if !own.iter().any(expands) {
-                    let words = "acts on bodies without `thermal_expansion`, so it does nothing";
+                    let words = "acts on bodies without `thermal_expansion` and has no effect";
                     warn(condition, words, warnings);
                 }
                 continue;
@@ -126,7 +126,7 @@ fn without_effect<const D: usize>(
             Action::Displacement(_) | Action::Velocity(_) => continue,
         };
         if acts.is_empty() {
-            warn(condition, "is 0, so it does nothing", warnings);
+            warn(condition, "is 0 and has no effect", warnings);
             continue;
         }
         let is_prescribed = |point: &u32, d: usize| {
@@ -142,7 +142,7 @@ fn without_effect<const D: usize>(
         let is_free = |point: &&u32| acts.iter().any(|d| !is_prescribed(point, *d));
         let free = own.iter().filter(is_free).count();
         if total(simulation.comm, free as u64) == 0 {
-            let words = "acts only where supports prescribe the motion, so it moves nothing";
+            let words = "acts only on points with prescribed motion and has no effect";
             warn(condition, words, warnings);
         }
     }
@@ -188,8 +188,8 @@ fn layer<const D: usize>(
     let thickness = f64::from_le_bytes(bytes);
     if !(MAX_THICKNESS_RATIO.recip()..MAX_THICKNESS_RATIO).contains(&(thickness / depth)) {
         let words = format!(
-            "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give \
-             the layer's `depth`",
+            "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give the thickness of \
+             the layer as `depth`",
             format_number(depth)
         );
         warn(condition, &words, warnings);
@@ -265,7 +265,7 @@ fn inward_normals<const D: usize>(
         }
         if reduce(simulation.comm, &mut sum)[0] > 0.0 {
             let words =
-                "its `normal` points into the body, so that it pulls; the outward one is meant";
+                "`normal` points into the body, so the pressure pulls; give the outward normal";
             warn(condition, words, warnings);
         }
     }

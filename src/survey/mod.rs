@@ -157,7 +157,7 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
         if let Some(safety) = unstable {
             let largest = (100.0 / slower).floor() / 100.0;
             warn(format!(
-                "; so far stretched they ask for `safety = {largest:.2}` or less, it is {safety}"
+                "; bonds of this stretch need `safety = {largest:.2}` or less, it is {safety}"
             ));
         }
     }

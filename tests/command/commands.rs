@@ -448,7 +448,7 @@ time.end = 1
     let expected = warnings(&check);
     for (part, line) in [
         ("[parameters] unused: no expression uses it", 2),
-        ("[set.low] where: is a number rather than a condition", 7),
+        ("[set.low] where: is a number, not a condition", 7),
         ("[history.probe.far] at: the nearest point is", 9),
     ] {
         let place = format!("plate.toml:{line}: {part}");

@@ -376,7 +376,7 @@ fn energy_that_breaking_seems_to_give_hides_no_gain() {
     let out = folder.join("out");
     let mut command = fissure(1);
     command.arg("run").arg(deck).arg("--output").arg(&out);
-    failing(&mut command, "are the steps too large?", 1);
+    failing(&mut command, "reduce the time step", 1);
 }
 
 #[test]
@@ -396,7 +396,7 @@ fn a_run_that_blows_up_is_an_error_while_its_numbers_are_still_finite() {
     };
     let mut errors = Vec::new();
     for ranks in [1, 2] {
-        let printed = failing(&mut run(1.6, 120, ranks), "are the steps too large?", 1);
+        let printed = failing(&mut run(1.6, 120, ranks), "reduce the time step", 1);
         assert_eq!(printed.matches("warning: step").count(), 1, "{printed}");
         errors.push(
             printed
@@ -497,7 +497,7 @@ fn a_load_that_sets_in_hides_no_blow_up() {
         let mut command = fissure(1);
         command.arg("run").arg(&deck).arg("--overwrite");
         command.arg("--output").arg(folder.join("out"));
-        failing(&mut command, "are the steps too large?", 1);
+        failing(&mut command, "reduce the time step", 1);
     }
 }
 

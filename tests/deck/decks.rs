@@ -16,7 +16,7 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 
 /// The decks of a folder, in the order of their names.
-fn decks(folder: &str) -> Vec<PathBuf> {
+pub fn decks(folder: &str) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
     let mut paths: Vec<PathBuf> = entries
         .map(|entry| entry.unwrap().path())
@@ -41,7 +41,7 @@ fn right_decks() -> Vec<Source> {
 }
 
 /// Number of points, and first step (s) and number of steps of each stage, of the run that a deck makes.
-fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
+pub fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
     let deck = Deck::new(source.clone())?;
     let look = dry_run(&deck.problem()?, 1, false).map_err(|error| deck.locate(error))?;
     Ok((look.points, look.steps))

@@ -36,7 +36,7 @@ fn warnings(ranks: usize, deck: &str) -> Vec<String> {
     let output = finish(&mut command);
     let printed = text(&output);
     assert!(output.status.success(), "{printed}");
-    let lines = printed.lines().filter(|line| line.contains("nearer than"));
+    let lines = printed.lines().filter(|line| line.contains("closer than"));
     lines.map(str::to_owned).collect()
 }
 
@@ -47,7 +47,7 @@ fn a_ball_that_goes_through_a_plate_is_told_once() {
     assert_eq!(alone.len(), 1, "{alone:?}");
     // The lowest points of the ball, at y = 9.5, are a spacing above those of the plate, at 3.5, after
     // 5 s; then they are nearer.
-    let expected = "warning: at t = 5.2500e0 s points of `plate` and `ball` have come nearer";
+    let expected = "warning: at t = 5.2500e0 s points of `plate` and `ball` are closer";
     assert!(alone[0].starts_with(expected), "{alone:?}");
     let place = alone[0].split(['(', ')']).nth(1).unwrap();
     let place: Vec<f64> = place.split(", ").map(|x| x.parse().unwrap()).collect();

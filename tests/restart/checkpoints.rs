@@ -931,8 +931,9 @@ fn an_extended_run_keeps_its_step_and_says_so() {
     ));
     let printed = text(&output);
     assert!(output.status.success(), "{printed}");
-    let told =
-        format!("the steps stay at {step:e} s, as the run began; a new run until t = 1.77e-5 s");
+    let told = format!(
+        "the time step stays {step:e} s, as at the start of this run; a new run to t = 1.77e-5 s"
+    );
     assert_eq!(printed.matches(&told).count(), 1, "{printed} {told}");
     let times = ResultReader::open(&result(&out)).unwrap().times().unwrap();
     for (number, time) in steps().into_iter().zip(times) {
@@ -948,7 +949,7 @@ fn an_extended_run_keeps_its_step_and_says_so() {
         &out,
         &["--restart", "--set", "end=1.77e-5"],
     )));
-    assert!(!printed.contains("the steps stay"), "{printed}");
+    assert!(!printed.contains("the time step stays"), "{printed}");
 }
 
 #[test]

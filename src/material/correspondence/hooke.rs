@@ -228,8 +228,7 @@ fn indefinite(
     first: &'static str,
 ) -> Option<LawFault> {
     if matrix.iter().any(|entry| !entry.is_finite()) {
-        let message =
-            "these constants are of no solid: Hooke's matrix has entries that are not finite";
+        let message = "Hooke's matrix has entries that are not finite";
         return fault_at(first, message);
     }
     let (eigenvalue, strain) = softest(matrix, dimension);
@@ -239,8 +238,7 @@ fn indefinite(
     fault_at(
         first,
         format!(
-            "these constants are of no solid: Hooke's matrix has the eigenvalue {eigenvalue:.4e} Pa, of the strain \
-             {strain}, and all must be above 0"
+            "Hooke's matrix must be positive definite, but its eigenvalue for the strain {strain} is {eigenvalue:.4e} Pa"
         ),
     )
 }

@@ -70,14 +70,11 @@ pub fn fault(values: &Values) -> Option<LawFault> {
     };
     if values.get(YIELD_STRESS.name).is_none() {
         values.get(HARDENING.name)?;
-        return fault(
-            &HARDENING,
-            "a body hardens when it yields: give `yield_stress`, too",
-        );
+        return fault(&HARDENING, "needs `yield_stress`");
     }
     if let Some(constant) = hooke::own_constants(values) {
         let message = format!(
-            "an isotropic solid alone can yield: give two elastic constants in place of `{constant}`"
+            "only isotropic solids can yield; give two elastic constants instead of `{constant}`"
         );
         return fault(&YIELD_STRESS, &message);
     }

@@ -51,8 +51,8 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
         if places.product::<f64>() > MOST_PLACES {
             let spacings = block.horizon / edges[0];
             let message = format!(
-                "[grid] horizon: {spacings:.4e} spacings of level {} are too many for a refined grid; is it in \
-                 metres?",
+                "[grid] horizon: {spacings:.4e} spacings of level {} are too many for a refined grid; check that it \
+                 is in metres",
                 block.level
             );
             return Err(Error::input(message).at(&problem.places.horizon));
@@ -102,7 +102,7 @@ pub fn is_possible(problem: &Problem) -> Result<()> {
         return Ok(());
     };
     let message = format!(
-        "[refinement.trigger]: does not go with {other}; refine `[refinement.region]` from the start"
+        "[refinement.trigger]: is not available with {other}; refine `[refinement.region]` from the start"
     );
     Err(Error::input(message).at(&trigger.span))
 }
