@@ -37,6 +37,7 @@ mod laws {
 mod physics {
     mod contact;
     mod dynamics;
+    mod history;
     mod impact;
     mod newton;
     mod pressed;

@@ -177,6 +177,7 @@ time.end = 1
             "output.set = 'some'",
             "history.reactions = ['some']",
             "history.force.pull = { set = 'some', direction = [1, 0] }",
+            "history.field.pull = { set = 'some', field = 'damage', of = ['mean'] }",
             "history.crack.main = { set = 'some', from = [0, 0] }",
             "history.tip.main = { set = 'some', from = [0, 0], direction = [1, 0] }",
             "damage.d.critical_stretch = { fracture_energy = 1, no_failure = ['some'] }

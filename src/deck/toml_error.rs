@@ -327,6 +327,9 @@ every = 1
 [history.force.NAME]
 direction = [1, 0]
 set = 'all'
+[history.field.NAME]
+field = 'damage'
+of = ['mean']
 [history.probe.NAME]
 at = [0, 0]
 [history.front.NAME]

@@ -40,6 +40,8 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     problem.history.reactions.clear();
     problem.history.support_forces.clear();
     problem.history.fragments = false;
+    problem.history.angular_momentum = false;
+    problem.history.statistics.clear();
     problem.history.damage_threshold = 0.0;
     problem.history.probes.clear();
     problem.history.fronts.clear();
