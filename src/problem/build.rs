@@ -52,7 +52,8 @@ impl Problem {
             },
             stages: Vec::new(),
             output: Output {
-                every: Interval::Seconds(end / OUTPUTS),
+                every: Some(Interval::Seconds(end / OUTPUTS)),
+                times: Vec::new(),
                 fields: DEFAULT_FIELDS.to_vec(),
                 single: false,
                 set: None,

@@ -42,8 +42,10 @@ pub struct Balance {
 /// The result file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// How often.
-    pub every: Interval,
+    /// How often; `None` for the given times only.
+    pub every: Option<Interval>,
+    /// Simulated times of further outputs in ascending order, s.
+    pub times: Vec<f64>,
     /// Which fields.
     pub fields: Vec<Field>,
     /// Whether the fields are rounded to 4-byte numbers.

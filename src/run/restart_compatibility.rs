@@ -30,7 +30,8 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     }
     problem.time.end = 0.0;
     problem.output = Output {
-        every: Interval::Steps(1),
+        every: None,
+        times: Vec::new(),
         fields: Vec::new(),
         single: false,
         set: None,

@@ -154,6 +154,38 @@ fn statistics_have_the_same_bits_on_any_ranks_and_threads() {
     }
 }
 
+/// Numbers of the steps of the outputs of a bar that vibrates or is drawn, with these keys.
+fn steps_of_outputs(time: &str, output: &str) -> Vec<u64> {
+    let problem = problem(&format!(
+        "dimension = '1d'
+        parameters.late = 0.8
+        grid = {{ spacing = 1, horizon = 2 }}
+        material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [8] }} }}
+        set = {{ first.where = 'x < 2', last.where = 'x > 6' }}
+        condition.hold = {{ set = 'first', displacement = [0] }}
+        condition.pull = {{ set = 'last', displacement = ['0.01*t'] }}
+        time = {{ end = 1, {time} }}
+        output = {{ {output} }}"
+    ));
+    record(&problem, 1, 1).datasets["steps"].clone()
+}
+
+#[test]
+fn outputs_are_written_at_given_times() {
+    let explicit = |output| steps_of_outputs("step = 0.1", output);
+    assert_eq!(explicit("times = [0.33, 'late']"), [0, 4, 8, 10]);
+    assert_eq!(
+        explicit("every_steps = 5, times = ['late - 0.1', 0.2]"),
+        [0, 2, 5, 7, 10]
+    );
+    let relaxed = "method = 'relaxation', relaxation.load_steps = 4";
+    for method in [relaxed, "method = 'static', static.load_steps = 4"] {
+        let load_steps = steps_of_outputs(method, "times = [0.3, 0.75]");
+        assert_eq!(load_steps, [0, 2, 3, 4], "{method}");
+    }
+}
+
 /// A block with this setting, and the strain of a point in its middle after a deformation.
 fn strain<const D: usize>(setting: &str, deformation: impl Fn([f64; 3]) -> [f64; 3]) -> [f64; 6] {
     let (lower, upper) = (vec![0; D], vec![9; D]);

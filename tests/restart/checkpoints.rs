@@ -519,7 +519,7 @@ fn goes_on(name: &str, law: &str, family: &str) -> BTreeMap<String, Vec<u64>> {
         )
         .replace(
             "output.every_steps = 200",
-            "output = { every_steps = 200, fields = ['stress', 'damage'] }",
+            "output = { every_steps = 200, times = [3.333e-6, 9.5e-6], fields = ['stress', 'damage'] }",
         );
     let text = if law.starts_with("correspondence") {
         let plain = "critical_stretch = { fracture_energy = 135, alpha = 0.25 }";

@@ -11,12 +11,15 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Simulated time between outputs in s; a fiftieth of the run if neither is given.
+    /// Simulated time between outputs in s; a fiftieth of the run if neither `every_steps` nor `times` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
+    /// Simulated times of outputs in s, beside those of an interval if one is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub times: Option<Vector>,
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
