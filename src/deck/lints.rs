@@ -137,10 +137,7 @@ body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = ['edg
 time.end = 1
 "
         );
-        let deck = Deck::new(Source {
-            path: "a.toml".into(),
-            text,
-        });
+        let deck = Deck::new(Source::new("a.toml", text));
         let deck = deck.unwrap_or_else(|error| panic!("{error}"));
         let problem = deck.problem().unwrap_or_else(|error| panic!("{error}"));
         let warnings = problem.warnings.into_iter();

@@ -70,10 +70,7 @@ pub fn history_differences(old: &str, new: &str) -> Result<Option<String>> {
 }
 
 fn source(name: &str, text: &str) -> Source {
-    Source {
-        path: name.into(),
-        text: text.to_owned(),
-    }
+    Source::new(name, text)
 }
 
 /// Differences in the physics, one per line.

@@ -204,10 +204,7 @@ mod tests {
 
     #[test]
     fn every_section_within_another_is_listed() {
-        let example = crate::deck::Source {
-            path: "example.toml".into(),
-            text: crate::deck::EXAMPLE.to_owned(),
-        };
+        let example = crate::deck::Source::new("example.toml", crate::deck::EXAMPLE);
         let explained = crate::deck::explain(&example).unwrap();
         let explained: toml::Table = explained.parse().unwrap();
         let mut count = 0;
