@@ -29,7 +29,7 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
 
 /// A text with the places of its comments and blanks.
 fn document(source: &Source) -> Result<DocumentMut> {
-    // The error of the reader of decks has the words of other decks.
+    // Its errors are in the words that decks without overlays get.
     if let Err(error) = source.text.parse::<toml::Table>() {
         return Err(toml_error(source, &error));
     }
@@ -44,7 +44,8 @@ fn merge_tables<'k>(
     path: &mut Vec<&'k str>,
     is_inline: bool,
 ) {
-    if is_choice(path) && upper.iter().all(|(kind, _)| !lower.contains_key(kind)) {
+    let is_other = upper.iter().all(|(kind, _)| !lower.contains_key(kind));
+    if is_choice(path) && !upper.is_empty() && is_other {
         lower.clear();
     }
     for (key, item) in upper.iter() {
@@ -183,5 +184,9 @@ mod tests {
         let merged = super::tests::merged(deck, overlay);
         let law = merged["material"]["glass"]["pmb"].as_table().unwrap();
         assert_eq!(law.keys().collect::<Vec<_>>(), ["density", "damping"]);
+        // A table without keys replaces nothing.
+        let merged = super::tests::merged(deck, "[material.glass]");
+        let glass = merged["material"]["glass"].as_table().unwrap();
+        assert_eq!(glass.keys().collect::<Vec<_>>(), ["pmb"]);
     }
 }

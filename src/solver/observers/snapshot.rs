@@ -183,7 +183,7 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     let mut rows = Vec::with_capacity(6 * gradients.len());
     for (point, gradient) in gradients.iter().enumerate() {
         let across = stretch_across(simulation, point, gradient);
-        // With F − I, small strains are no differences of large numbers.
+        // Of F − I, so that small strains lose no digits.
         let mut change = Matrix3::identity() * (across - 1.0);
         change
             .view_mut((0, 0), (D, D))
