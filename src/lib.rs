@@ -1,5 +1,6 @@
 //! Fissure: a peridynamics solver for batch jobs on clusters.
 pub mod comm;
+pub mod component;
 pub mod damage;
 pub mod deck;
 pub mod dimension;

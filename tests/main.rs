@@ -38,6 +38,7 @@ mod laws {
 mod physics {
     mod contact;
     mod dynamics;
+    mod history;
     mod impact;
     mod newton;
     mod pressed;

@@ -200,10 +200,7 @@ pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
 
 fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<Figures> {
     let before = resident();
-    let deck = Deck::new(Source {
-        path: "benchmark.toml".into(),
-        text: deck(arguments),
-    })?;
+    let deck = Deck::new(Source::new("benchmark.toml", deck(arguments)))?;
     let speed = speed(&deck.problem()?, world, warm_up(arguments), arguments.steps);
     let speed = speed.map_err(|error| deck.locate(error))?;
 

@@ -43,7 +43,7 @@ fn check_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> R
 }
 
 fn report_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> Result<()> {
-    let deck = deck::read(path, &arguments.set)?;
+    let deck = deck::read_with(path, &arguments.with, &arguments.set)?;
     let request = Request {
         path,
         deck: &deck,

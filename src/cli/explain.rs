@@ -11,6 +11,6 @@ use super::{DeckArguments, each, print};
 /// If a deck is invalid or the output cannot be written.
 pub fn explain(arguments: &DeckArguments) -> Result<()> {
     each(&arguments.decks, |deck| {
-        print(&deck::read(deck, &arguments.set)?.explain()?)
+        print(&deck::read_with(deck, &arguments.with, &arguments.set)?.explain()?)
     })
 }

@@ -119,6 +119,7 @@ Examples:
   fissure run plate.toml --restart              go on from the last checkpoint
   fissure run plate.toml --set tension=20e6     another value of a parameter of the deck
   fissure run plate.toml --set time.safety=0.4  another value of any key, or one that is missing
+  fissure run plate.toml --with slow.toml       the keys of another deck over those of this one
 
 Give each rank as many cores as it has threads: --bind-to none or --map-by slot:PE=4.
 
@@ -150,6 +151,10 @@ struct RunArguments {
     /// Write a checkpoint and stop in time before this limit [default: the end of the Slurm job].
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
+
+    /// Put the keys of another deck over those of this one; may be repeated.
+    #[arg(long, value_name = "OVERLAY")]
+    with: Vec<PathBuf>,
 
     /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -184,6 +189,10 @@ struct CheckArguments {
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
+    /// Put the keys of another deck over those of this one; may be repeated.
+    #[arg(long, value_name = "OVERLAY")]
+    with: Vec<PathBuf>,
+
     /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
@@ -206,6 +215,10 @@ struct DeckArguments {
     /// The deck, or several.
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
+
+    /// Put the keys of another deck over those of this one; may be repeated.
+    #[arg(long, value_name = "OVERLAY")]
+    with: Vec<PathBuf>,
 
     /// Override a parameter of the deck, or any key, named with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]

@@ -41,7 +41,10 @@ fn run_deck(
     verbosity: Verbosity,
     (started, signals): (Instant, Signals),
 ) -> Result<Outcome> {
-    let deck = agree(world, deck::read(&arguments.deck, &arguments.set))?;
+    let deck = agree(
+        world,
+        deck::read_with(&arguments.deck, &arguments.with, &arguments.set),
+    )?;
     let problem = agree(world, deck.problem())?;
     let threads = launch::threads(arguments.threads);
     agree(world, launch::start_threads(threads))?;

@@ -24,17 +24,17 @@ pub fn is_key(source: &Source, name: &str) -> bool {
     name.contains('.') || (TOP_KEYS.contains(&name) && is_parameter().is_none())
 }
 
-/// The deck with the values of these keys, added where they are missing.
+/// The text of a deck with the values of these keys, added where they are missing.
 ///
 /// A value is written as in a deck; any other text, such as a bare word or an expression, is a string.
 ///
 /// # Errors
 /// If the deck is not TOML, or a key is not one of a table.
-pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
+pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
     let mut document: DocumentMut = match source.text.parse() {
         Ok(document) => document,
         // The reader of decks says what is wrong.
-        Err(_) => return Ok(source.clone()),
+        Err(_) => return Ok(source.text.clone()),
     };
     for (key, text) in assignments {
         let wrong = |message: String| Error::input(format!("--set {key}={text}: {message}"));
@@ -84,10 +84,7 @@ pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<Source> {
             }
         }
     }
-    Ok(Source {
-        path: source.path.clone(),
-        text: document.to_string(),
-    })
+    Ok(document.to_string())
 }
 
 #[cfg(test)]
@@ -95,11 +92,8 @@ mod tests {
     use super::*;
 
     fn assigned(text: &str, key: &str, value: &str) -> Result<String> {
-        let source = Source {
-            path: "deck.toml".into(),
-            text: text.to_owned(),
-        };
-        Ok(assign(&source, &[(key, value)])?.text)
+        let source = Source::new("deck.toml", text);
+        assign(&source, &[(key, value)])
     }
 
     #[test]
@@ -133,10 +127,7 @@ mod tests {
 
     #[test]
     fn names_of_parameters_are_not_keys() {
-        let is_key = |text: &str, name: &str| {
-            let (path, text) = ("deck.toml".into(), text.to_owned());
-            super::is_key(&Source { path, text }, name)
-        };
+        let is_key = |text: &str, name: &str| super::is_key(&Source::new("deck.toml", text), name);
         for name in ["thickness", "cross_section", "constraint", "time.end"] {
             assert!(is_key("dimension = '1d'", name), "{name}");
         }

@@ -160,10 +160,7 @@ mod tests {
     use super::*;
 
     fn source(text: &str) -> Source {
-        Source {
-            path: "deck.toml".into(),
-            text: text.to_owned(),
-        }
+        Source::new("deck.toml", text)
     }
 
     const DECK: &str = "

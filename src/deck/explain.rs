@@ -90,11 +90,9 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         time.newton.get_or_insert_with(default);
     }
     let output = deck.output.get_mut();
-    fill_interval(
-        &mut output.every,
-        output.every_steps.is_some(),
-        problem.output.every,
-    );
+    if let Some(interval) = problem.output.every {
+        fill_interval(&mut output.every, output.every_steps.is_some(), interval);
+    }
     output.fields.get_or_insert_with(|| {
         let names = problem.output.fields.iter().map(|field| field.name());
         names

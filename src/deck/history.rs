@@ -5,6 +5,7 @@ use super::names::suits_a_column;
 use super::number::{Number, Vector};
 use super::resolve::{Scope, find, resolve_each};
 use super::sets::find_set;
+use crate::component::{Component, entries, invariants};
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::problem::{self, Field, Interval};
@@ -37,14 +38,14 @@ pub fn history(
     let forces = resolve_each(&history.force, |name, table| {
         support_force(scope, name, table, sets)
     })?;
-    let probes = resolve_each(&history.probe, |name, probe| {
-        let key = column_name(scope, "probe", name, probe)?;
-        Ok(problem::Probe {
-            name: name.to_owned(),
-            span: probe.span(),
-            at: scope.vector(&probe.get_ref().at, &format!("{key} at"))?,
-        })
+    if *history.angular_momentum.get_ref() && scope.dimension == 1 {
+        let message = "[history] angular_momentum: a bar has none";
+        return Err(scope.error(history.angular_momentum.span(), message));
+    }
+    let statistics = resolve_each(&history.field, |name, table| {
+        statistics(scope, name, table, sets)
     })?;
+    let probes = resolve_each(&history.probe, |name, table| probe(scope, name, table))?;
     let reaction = |name: &Text| {
         Ok(problem::Reaction {
             set: find_set(scope, name, sets, "[history] reactions")?,
@@ -69,7 +70,9 @@ pub fn history(
             .collect::<Result<_>>()?,
         support_forces: forces.into_values().collect(),
         fragments: history.fragments,
+        angular_momentum: *history.angular_momentum.get_ref(),
         damage_threshold,
+        statistics: statistics.into_values().collect(),
         probes: probes.into_values().collect(),
         fronts: fronts.into_values().collect(),
         cracks: cracks.into_values().collect(),
@@ -125,12 +128,7 @@ fn front(
         None => Ok(default),
         Some(number) => scope.positive(number, &format!("{key} {name}")),
     };
-    // The ranks are no property of the solid.
-    let fields = Field::ALL.into_iter();
-    let fields = fields.filter(|field| !matches!(field, Field::Rank | Field::Fragment));
-    let fields: Vec<Field> = fields.collect();
-    let names = fields.iter().map(|field| field.name());
-    let field = fields[find(scope.source, &front.field, names, &format!("{key} field"))?];
+    let field = field(scope, &front.field, &format!("{key} field"))?;
     Ok(problem::Front {
         name: name.to_owned(),
         span: table.span(),
@@ -148,60 +146,42 @@ fn front(
     })
 }
 
-/// Names of the entries of a symmetric tensor, and the dimension from which on they are there.
-const ENTRIES: [(&str, usize); 6] = [
-    ("xx", 1),
-    ("yy", 2),
-    ("zz", 3),
-    ("xy", 2),
-    ("yz", 3),
-    ("xz", 3),
-];
+/// A field whose values are properties of the solid: neither its ranks nor its fragments.
+fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
+    let fields = Field::ALL.into_iter();
+    let fields = fields.filter(|field| !matches!(field, Field::Rank | Field::Fragment));
+    let fields: Vec<Field> = fields.collect();
+    let names = fields.iter().map(|field| field.name());
+    Ok(fields[find(scope.source, name, names, key)?])
+}
 
-/// Names of the entries of a tensor, row by row.
-const TENSOR: [(&str, usize); 9] = [
-    ("xx", 1),
-    ("xy", 2),
-    ("xz", 3),
-    ("yx", 2),
-    ("yy", 2),
-    ("yz", 3),
-    ("zx", 3),
-    ("zy", 3),
-    ("zz", 3),
-];
-
-/// Names of the entries of a vector.
-const AXES: [(&str, usize); 3] = [("x", 1), ("y", 2), ("z", 3)];
-
-/// The entry of a field that a front looks at; `None` for the length of a vector.
+/// The number of a point that a table asks for; by default that of a scalar or the magnitude of a vector.
 fn component(
     scope: &Scope,
     key: &str,
     field: Field,
     place: &Text,
     component: &Option<Text>,
-) -> Result<Option<usize>> {
-    let names: &[(&str, usize)] = match field.components() {
-        1 => &[],
-        3 => &AXES,
-        6 => &ENTRIES,
-        _ => &TENSOR,
-    };
-    let there = names.iter().filter(|(_, least)| *least <= scope.dimension);
+) -> Result<Component> {
+    let components = field.components();
+    let entries = entries(components, scope.dimension);
+    let entries = entries.map(|(entry, name)| (name, Component::Entry(entry)));
+    let known: Vec<_> = entries
+        .chain(invariants(components).iter().copied())
+        .collect();
+    let names = known.iter().map(|(name, _)| *name);
     match component {
-        None if names.is_empty() => Ok(Some(0)),
-        None if field.components() == 3 => Ok(None),
+        None if components == 1 => Ok(Component::Entry(0)),
+        None if components == 3 => Ok(Component::Magnitude),
         None => {
-            let known: Vec<&str> = there.map(|(name, _)| *name).collect();
             let message = format!(
                 "{key} field: `{}` needs a `component`, one of {}",
                 field.name(),
-                known.join(", ")
+                names.collect::<Vec<_>>().join(", ")
             );
             Err(scope.error(place.span(), message))
         }
-        Some(component) if names.is_empty() => {
+        Some(component) if components == 1 => {
             let message = format!(
                 "{key} component: `{}` is a single number and has none",
                 field.name()
@@ -209,11 +189,84 @@ fn component(
             Err(scope.error(component.span(), message))
         }
         Some(component) => {
-            let known: Vec<&str> = there.map(|(name, _)| *name).collect();
             let key = format!("{key} component");
-            let wanted = known[find(scope.source, component, known.iter().copied(), &key)?];
-            Ok(names.iter().position(|(name, _)| *name == wanted))
+            Ok(known[find(scope.source, component, names, &key)?].1)
         }
+    }
+}
+
+fn probe(scope: &Scope, name: &str, table: &Spanned<grammar::Probe>) -> Result<problem::Probe> {
+    let key = column_name(scope, "probe", name, table)?;
+    let probe = table.get_ref();
+    let at = scope.vector(&probe.at, &format!("{key} at"))?;
+    let key = format!("{key} fields");
+    let mut fields = Vec::new();
+    for name in &probe.fields {
+        let field = field(scope, name, &key)?;
+        let wrong = if matches!(field, Field::Displacement | Field::Velocity) {
+            "is always recorded"
+        } else if fields.contains(&field) {
+            "is named twice"
+        } else {
+            fields.push(field);
+            continue;
+        };
+        let message = format!("{key}: `{}` {wrong}", field.name());
+        return Err(scope.error(name.span(), message));
+    }
+    Ok(problem::Probe {
+        name: name.to_owned(),
+        span: table.span(),
+        at,
+        fields,
+    })
+}
+
+fn statistics(
+    scope: &Scope,
+    name: &str,
+    table: &Spanned<grammar::FieldStatistics>,
+    sets: &[problem::Set],
+) -> Result<problem::FieldStatistics> {
+    let key = column_name(scope, "field", name, table)?;
+    let rule = table.get_ref();
+    let field = field(scope, &rule.field, &format!("{key} field"))?;
+    let given = rule.of.get_ref();
+    if given.is_empty() {
+        let message = format!("{key} of: must name at least one of {STATISTICS}");
+        return Err(scope.error(rule.of.span(), message));
+    }
+    for (k, statistic) in given.iter().enumerate() {
+        let value = statistic.get_ref();
+        if given[..k].iter().any(|earlier| earlier.get_ref() == value) {
+            let message = format!("{key} of: `{}` is named twice", of(*value).name());
+            return Err(scope.error(statistic.span(), message));
+        }
+    }
+    Ok(problem::FieldStatistics {
+        name: name.to_owned(),
+        span: table.span(),
+        set: find_set(scope, &rule.set, sets, &format!("{key} set"))?,
+        field,
+        component: component(scope, &key, field, &rule.field, &rule.component)?,
+        of: given
+            .iter()
+            .map(|statistic| of(*statistic.get_ref()))
+            .collect(),
+    })
+}
+
+/// The statistics, for messages.
+const STATISTICS: &str = "sum, integral, mean, minimum, maximum";
+
+fn of(statistic: grammar::Statistic) -> problem::Statistic {
+    use problem::Statistic;
+    match statistic {
+        grammar::Statistic::Sum => Statistic::Sum,
+        grammar::Statistic::Integral => Statistic::Integral,
+        grammar::Statistic::Mean => Statistic::Mean,
+        grammar::Statistic::Minimum => Statistic::Minimum,
+        grammar::Statistic::Maximum => Statistic::Maximum,
     }
 }
 

@@ -137,10 +137,7 @@ body.plate = {{ material = 'glass', shape.box = {{ lower = [0, 0], upper = ['edg
 time.end = 1
 "
         );
-        let deck = Deck::new(Source {
-            path: "a.toml".into(),
-            text,
-        });
+        let deck = Deck::new(Source::new("a.toml", text));
         let deck = deck.unwrap_or_else(|error| panic!("{error}"));
         let problem = deck.problem().unwrap_or_else(|error| panic!("{error}"));
         let warnings = problem.warnings.into_iter();
@@ -177,6 +174,7 @@ time.end = 1
             "output.set = 'some'",
             "history.reactions = ['some']",
             "history.force.pull = { set = 'some', direction = [1, 0] }",
+            "history.field.pull = { set = 'some', field = 'damage', of = ['mean'] }",
             "history.crack.main = { set = 'some', from = [0, 0] }",
             "history.tip.main = { set = 'some', from = [0, 0], direction = [1, 0] }",
             "damage.d.critical_stretch = { fracture_energy = 1, no_failure = ['some'] }

@@ -15,7 +15,9 @@ mod lints;
 mod materials;
 mod names;
 mod number;
+mod origins;
 mod outputs;
+mod overlay;
 mod parameters;
 mod refinement;
 mod resolve;
@@ -29,7 +31,7 @@ mod time;
 mod toml_error;
 mod validate;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use difference::{differences, history_differences};
 pub use schema::schema;
@@ -54,20 +56,31 @@ pub struct Deck {
 /// # Errors
 /// An input error that names file, line, column and key and says what would be right.
 pub fn read(path: &Path, set: &[(String, String)]) -> Result<Deck> {
-    let mut source = Source::read(path)?;
+    read_with(path, &[], set)
+}
+
+/// As [`read`], with the keys of the decks `overlays` over those of the deck, later ones over earlier ones, and `set`
+/// over them all. Tables are merged key by key; lists and choices, such as the law of a material, are replaced. Paths
+/// in an overlay start from the folder of the deck.
+///
+/// # Errors
+/// As [`read`]; places are those in the deck or the overlay.
+pub fn read_with(path: &Path, overlays: &[PathBuf], set: &[(String, String)]) -> Result<Deck> {
+    let mut files = vec![Source::read(path)?];
+    for overlay in overlays {
+        files.push(Source::read(overlay)?);
+    }
+    let merged = Source::new(path, overlay::merge(&files[0], &files[1..])?);
     let (keys, parameters): (Vec<_>, Vec<_>) = set
         .iter()
         .map(|(name, value)| (name.as_str(), value.as_str()))
-        .partition(|(name, _)| assign::is_key(&source, name));
-    if !keys.is_empty() {
-        source = assign::assign(&source, &keys)?;
-    }
-    let mut deck = Deck::new(source).map_err(|mut error| {
-        if !keys.is_empty() {
-            error.message += "\nnote: lines are those of the deck as changed by --set";
-        }
-        error
-    })?;
+        .partition(|(name, _)| assign::is_key(&merged, name));
+    let source = if overlays.is_empty() && keys.is_empty() {
+        merged
+    } else {
+        Source::changed(assign::assign(&merged, &keys)?, files)
+    };
+    let mut deck = Deck::new(source)?;
     for (name, value) in parameters {
         parameters::set(&deck.source, &mut deck.grammar.parameters, name, value)?;
     }

@@ -5,6 +5,7 @@ use super::resolve::{Scope, find};
 use super::sets::find_set;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
+use crate::message::format_number;
 use crate::problem;
 
 /// Validates what is written to the result; `end` (s) is the end of the run.
@@ -39,6 +40,7 @@ pub fn output(
     }
     Ok(problem::Output {
         every: every(scope, output, end)?,
+        times: times(scope, output, end)?,
         fields,
         single: output.precision == grammar::Precision::Single,
         set: match &output.set {
@@ -48,20 +50,45 @@ pub fn output(
     })
 }
 
-/// When outputs are written.
-fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<problem::Interval> {
+/// The interval of outputs; none where only `times` are given.
+fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<Option<problem::Interval>> {
+    let default = problem::Interval::Seconds(end / problem::OUTPUTS);
     match (&output.every, &output.every_steps) {
-        (None, None) => Ok(problem::Interval::Seconds(end / problem::OUTPUTS)),
+        (None, None) => Ok(output.times.is_none().then_some(default)),
         (Some(every), None) => {
             let seconds = scope.positive(every, "[output] every")?;
-            Ok(problem::Interval::Seconds(seconds))
+            Ok(Some(problem::Interval::Seconds(seconds)))
         }
-        (None, Some(steps)) => Ok(problem::Interval::Steps(steps.get_ref().get())),
+        (None, Some(steps)) => Ok(Some(problem::Interval::Steps(steps.get_ref().get()))),
         (Some(_), Some(steps)) => {
             let message = "[output] every_steps: give either `every` or `every_steps`";
             Err(scope.error(steps.span(), message))
         }
     }
+}
+
+/// The given times of outputs, in ascending order.
+fn times(scope: &Scope, output: &grammar::Output, end: f64) -> Result<Vec<f64>> {
+    let Some(written) = &output.times else {
+        return Ok(Vec::new());
+    };
+    let key = "[output] times";
+    if written.get_ref().is_empty() {
+        let message = format!("{key}: must have at least one time; leave it out for the default");
+        return Err(scope.error(written.span(), message));
+    }
+    // A time may exceed the end by round-off.
+    let range = 0.0..end * (1.0 + 1e-9);
+    let words = format!("between 0 and the end of the run, {} s", format_number(end));
+    let time = |time| scope.within(time, key, range.clone(), &words);
+    let mut times = written
+        .get_ref()
+        .iter()
+        .map(time)
+        .collect::<Result<Vec<_>>>()?;
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    Ok(times)
 }
 
 /// Validates when points are dealt out anew.

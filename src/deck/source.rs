@@ -4,7 +4,9 @@ use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::origins::Origins;
 use crate::error::{Error, Result, Warning};
 
 /// The most bytes of a deck.
@@ -26,9 +28,45 @@ pub struct Source {
     pub path: PathBuf,
     /// The whole text.
     pub text: String,
+    /// The files that the text was put together from, if it is not that of the file.
+    origins: Option<Arc<Origins>>,
 }
 
+/// The line of a changed deck that an error marks is in no file.
+const CHANGED: &str = "\nnote: lines are those of the deck as changed by --set";
+
 impl Source {
+    /// The text of a file.
+    pub fn new(path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            text: text.into(),
+            origins: None,
+        }
+    }
+
+    /// The text of a deck that was put together from files, the deck the first of them. Errors name their lines.
+    pub(super) fn changed(text: String, files: Vec<Self>) -> Self {
+        let files: Vec<_> = files
+            .into_iter()
+            .map(|file| (file.path, file.text))
+            .collect();
+        let mut source = Self::new(files[0].0.clone(), text);
+        source.origins = Some(Arc::new(Origins::new(&source.text, files)));
+        source
+    }
+
+    /// Path and text of the file where a span stands, the span there, and a note on a place that is in no file.
+    fn place(&self, span: Range<usize>) -> (&Path, &str, Range<usize>, &'static str) {
+        let Some(origins) = &self.origins else {
+            return (&self.path, &self.text, span, "");
+        };
+        match origins.find(&span, self.text.len()) {
+            Some((path, text, span)) => (path, text, span, ""),
+            None => (&self.path, &self.text, span, CHANGED),
+        }
+    }
+
     /// Reads a deck.
     ///
     /// # Errors
@@ -44,16 +82,10 @@ impl Source {
             return Err(Error::input(format!("{message}; is this a deck?")));
         }
         match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self {
-                path: path.to_owned(),
-                text,
-            }),
+            Ok(text) => Ok(Self::new(path, text)),
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
-                let source = Self {
-                    path: path.to_owned(),
-                    text: String::from_utf8_lossy(error.as_bytes()).into_owned(),
-                };
+                let source = Self::new(path, String::from_utf8_lossy(error.as_bytes()));
                 let message = "is not UTF-8 text from here on; save the deck as UTF-8";
                 Err(source.error(valid..valid + 1, message))
             }
@@ -71,9 +103,10 @@ impl Source {
             return warning;
         };
         let message = shortened(&warning.message, MOST_SAID);
-        let start = self.text.floor_char_boundary(span.start);
-        let line = self.text[..start].matches('\n').count() + 1;
-        Warning::new(format!("{}:{line}: {message}", self.path.display()))
+        let (path, text, span, _) = self.place(span);
+        let start = text.floor_char_boundary(span.start);
+        let line = text[..start].matches('\n').count() + 1;
+        Warning::new(format!("{}:{line}: {message}", path.display()))
     }
 
     /// The error, with file, line, column and the line itself if it has a span.
@@ -92,27 +125,23 @@ impl Source {
     /// most.
     fn marked(&self, span: Range<usize>, message: &str) -> String {
         let message = shortened(message, MOST_SAID);
-        let start = self.text.floor_char_boundary(span.start);
-        let before = &self.text[..start];
+        let (path, text, span, note) = self.place(span);
+        let start = text.floor_char_boundary(span.start);
+        let before = &text[..start];
         let line_number = before.matches('\n').count() + 1;
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-        let line = self.text[line_start..].lines().next().unwrap_or("");
-        let column = self.text[line_start..start].chars().count();
-        let marked = self
-            .text
+        let line = text[line_start..].lines().next().unwrap_or("");
+        let column = text[line_start..start].chars().count();
+        let marked = text
             .get(start..span.end)
             .map_or(1, |text| text.chars().take(MOST_SHOWN).count());
-        let heading = format!(
-            "{}:{line_number}:{}: {message}",
-            self.path.display(),
-            column + 1
-        );
+        let heading = format!("{}:{line_number}:{}: {message}", path.display(), column + 1);
         let room = MOST_SHOWN.saturating_sub(heading.chars().count()) / 2;
         let window = Window::new(line, column, room.saturating_sub(12).max(NARROWEST));
         let carets = "^".repeat(marked.clamp(1, window.rest().max(1)));
         let gutter = " ".repeat(line_number.to_string().len());
         format!(
-            "{heading}\n{gutter} |\n{line_number} | {}\n{gutter} | {}{carets}",
+            "{heading}\n{gutter} |\n{line_number} | {}\n{gutter} | {}{carets}{note}",
             window.text, window.indent,
         )
     }
@@ -185,10 +214,7 @@ mod tests {
 
     #[test]
     fn the_caret_stands_below_the_mistake() {
-        let source = Source {
-            path: "a.toml".into(),
-            text: "one = 1\ntwo = µ, bad\n".into(),
-        };
+        let source = Source::new("a.toml", "one = 1\ntwo = µ, bad\n");
         let at = source.text.find("bad").unwrap();
         let error = source.error(at..at + 3, "no such thing");
         assert_eq!(
@@ -198,10 +224,7 @@ mod tests {
     }
 
     fn shown(text: &str, marked: Range<usize>, message: &str) -> String {
-        let source = Source {
-            path: "a.toml".into(),
-            text: text.to_owned(),
-        };
+        let source = Source::new("a.toml", text);
         source.error(marked, message).message
     }
 

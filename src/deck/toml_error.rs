@@ -327,6 +327,9 @@ every = 1
 [history.force.NAME]
 direction = [1, 0]
 set = 'all'
+[history.field.NAME]
+field = 'damage'
+of = ['mean']
 [history.probe.NAME]
 at = [0, 0]
 [history.front.NAME]
@@ -353,10 +356,7 @@ mass = 1
 
     /// The first line of the error of a deck.
     fn error_of(text: String) -> String {
-        let source = Source {
-            path: "a.toml".into(),
-            text,
-        };
+        let source = Source::new("a.toml", text);
         let error = deck::parse(&source).err();
         let error = error.unwrap_or_else(|| panic!("no error: {}", source.text));
         error.message.lines().next().unwrap_or_default().to_owned()

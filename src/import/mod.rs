@@ -158,10 +158,7 @@ fn finish(translation: Translation, root: &Node, code: Code, target: &Path) -> I
         "Each of its keys is taken, approximated or left out:".to_owned(),
     ];
     let text = translation.draft.text(&heading, &entries);
-    let new = Source {
-        path: target.to_owned(),
-        text: text.clone(),
-    };
+    let new = Source::new(target, text.clone());
     let fault = Deck::new(new).and_then(|deck| deck.problem()).err();
     Import {
         code,

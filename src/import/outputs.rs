@@ -40,11 +40,7 @@ const FIELDS: [(&str, &str, &str); 33] = [
     ("Strain Energy", "strain_energy_density", "times the volume"),
     ("Equivalent Plastic Strain", "plastic_strain_equivalent", ""),
     ("Plastic Strain", "plastic_strain_equivalent", ""),
-    (
-        "Strain",
-        "deformation_gradient",
-        "from which strain follows",
-    ),
+    ("Strain", "strain", ""),
     (
         "Left Stretch Tensor",
         "deformation_gradient",
@@ -177,16 +173,25 @@ impl Outputs {
                 let note = "a constant: the position of the nearest point";
                 return Ok((Fate::LeftOut, note.to_owned()));
             }
-            let moves = ["Displacement", "Displacements", "Velocity"];
-            if !moves.iter().any(|name| is_key(&variable, name)) {
-                let note = "a probe follows displacement and velocity only";
-                return Ok((Fate::LeftOut, note.to_owned()));
+            let field = FIELDS.iter().find(|(name, ..)| is_key(&variable, name));
+            let field = field.filter(|(_, field, _)| *field != "rank");
+            let Some((_, field, difference)) = field else {
+                return Ok((Fate::LeftOut, "there is no such field".to_owned()));
+            };
+            let mut probe = vec![("at".to_owned(), Value::numbers(&position))];
+            if !["displacement", "velocity"].contains(field) {
+                let fields = Value::list([Value::text(*field)]);
+                probe.push(("fields".to_owned(), fields));
             }
             let name = translation.name("probe", label);
-            let at = vec![("at".to_owned(), Value::numbers(&position))];
             let history = translation.draft.section("history");
-            history.set(format!("probe.{name}"), Value::Table(at));
-            return Ok((Fate::Taken, format!("[history] probe.{name}")));
+            history.set(format!("probe.{name}"), Value::Table(probe));
+            let note = format!("[history] probe.{name}");
+            return Ok(if difference.is_empty() {
+                (Fate::Taken, note)
+            } else {
+                (Fate::Approximated, format!("{note}, {difference}"))
+            });
         }
         if is_force && is_sum {
             let set = if is_key(&class, "Block Data") {

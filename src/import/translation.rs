@@ -271,10 +271,7 @@ mod tests {
 
     #[test]
     fn names_are_plain_and_unique() {
-        let source = Source {
-            path: "a.yaml".into(),
-            text: String::new(),
-        };
+        let source = Source::new("a.yaml", String::new());
         let mut translation = Translation::new(&source, "b.toml".as_ref(), Dialect::Peridigm);
         assert_eq!(translation.name("set", "My Set (left)"), "my_set_left");
         assert_eq!(translation.name("set", "my set left"), "my_set_left_2");

@@ -4,6 +4,7 @@ use super::failure::{innermost, system_error};
 use super::field::POINT_DATA;
 use super::history::{COLUMNS, HISTORY, SEPARATOR, UNITS};
 use super::vtkhdf::STEPS;
+use crate::component;
 use crate::error::{Error, Result};
 use hdf5_metno as hdf5;
 use hdf5_metno::types::{FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
@@ -44,13 +45,7 @@ pub struct StoredField {
 impl StoredField {
     /// Names of the components in their order; none for a scalar.
     pub fn component_names(&self) -> &'static [&'static str] {
-        match self.components {
-            2 => &["x", "y"],
-            3 => &["x", "y", "z"],
-            6 => &["xx", "yy", "zz", "xy", "yz", "xz"],
-            9 => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
-            _ => &[],
-        }
+        component::names(self.components)
     }
 }
 

@@ -15,6 +15,7 @@ mod outputs;
 mod refinement;
 mod rigid;
 pub mod single_body;
+mod statistics;
 mod thermal;
 mod time;
 
@@ -32,6 +33,7 @@ pub use law::Law;
 pub use outputs::*;
 pub use refinement::*;
 pub use rigid::*;
+pub use statistics::*;
 pub use thermal::ThermalExpansion;
 pub use time::*;
 

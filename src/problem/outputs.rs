@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::Problem;
+use super::{FieldStatistics, Problem};
+use crate::component::Component;
 
 /// How often something is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,8 +42,10 @@ pub struct Balance {
 /// The result file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// How often.
-    pub every: Interval,
+    /// How often; `None` for the given times only.
+    pub every: Option<Interval>,
+    /// Simulated times of further outputs in ascending order, s.
+    pub times: Vec<f64>,
     /// Which fields.
     pub fields: Vec<Field>,
     /// Whether the fields are rounded to 4-byte numbers.
@@ -62,8 +65,12 @@ pub struct History {
     pub support_forces: Vec<SupportForce>,
     /// Whether fragments are counted.
     pub fragments: bool,
+    /// Whether the angular momentum is recorded.
+    pub angular_momentum: bool,
     /// Damage above which a point counts as cracked.
     pub damage_threshold: f64,
+    /// Sums and extremes of fields over sets.
+    pub statistics: Vec<FieldStatistics>,
     /// Places that are watched.
     pub probes: Vec<Probe>,
     /// Fronts that are followed.
@@ -120,6 +127,8 @@ pub struct Probe {
     pub span: Range<usize>,
     /// The place, m.
     pub at: [f64; 3],
+    /// Fields that are recorded there, beside displacement and velocity.
+    pub fields: Vec<Field>,
 }
 
 /// A start and a way from it.
@@ -146,8 +155,8 @@ pub struct Front {
     pub radius: f64,
     /// The field.
     pub field: Field,
-    /// The entry of a row of the field; `None` is the length of a vector.
-    pub component: Option<usize>,
+    /// The number of a point.
+    pub component: Component,
     /// What the size of the field must exceed.
     pub threshold: f64,
 }
@@ -199,6 +208,9 @@ pub enum Field {
     VonMisesStress,
     /// F = (Σ ω Y⊗ξ Ṽ) K⁻¹ of the intact bonds, row by row; I where too few are left.
     DeformationGradient,
+    /// Green–Lagrange strain ½(FᵀF − I): xx, yy, zz, xy, yz, xz, of the body in space: in plane stress it has the
+    /// stretch of the law across the plane, under uniaxial stress that by ν.
+    Strain,
     /// Number of intact bonds, with points in the own family or that have the point in theirs.
     Neighbours,
     /// Number of the point's bonds that have broken since the start.
@@ -219,7 +231,7 @@ pub enum Field {
 
 impl Field {
     /// All fields.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Displacement,
         Self::Velocity,
         Self::Acceleration,
@@ -233,6 +245,7 @@ impl Field {
         Self::CauchyStress,
         Self::VonMisesStress,
         Self::DeformationGradient,
+        Self::Strain,
         Self::Neighbours,
         Self::BrokenBonds,
         Self::NewlyBrokenBonds,
@@ -259,6 +272,7 @@ impl Field {
             Self::CauchyStress => "cauchy_stress",
             Self::VonMisesStress => "von_mises_stress",
             Self::DeformationGradient => "deformation_gradient",
+            Self::Strain => "strain",
             Self::Neighbours => "neighbours",
             Self::BrokenBonds => "broken_bonds",
             Self::NewlyBrokenBonds => "newly_broken_bonds",
@@ -280,6 +294,7 @@ impl Field {
             Self::Damage
             | Self::Dilatation
             | Self::DeformationGradient
+            | Self::Strain
             | Self::Neighbours
             | Self::BrokenBonds
             | Self::NewlyBrokenBonds
@@ -302,7 +317,7 @@ impl Field {
             | Self::Acceleration
             | Self::ForceDensity
             | Self::ContactForceDensity => 3,
-            Self::Stress | Self::CauchyStress => 6,
+            Self::Stress | Self::CauchyStress | Self::Strain => 6,
             Self::DeformationGradient => 9,
             _ => 1,
         }

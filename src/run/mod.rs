@@ -442,7 +442,7 @@ impl<'a> Job<'a> {
     ) -> Vec<(&'static str, String)> {
         // Attributes are written collectively, so values that can differ come from rank 0.
         let [text, in_full, path] = match self.options.deck.as_ref().map(Deck::source) {
-            Some(Source { path, text }) => [
+            Some(Source { path, text, .. }) => [
                 text.clone(),
                 self.physics.clone(),
                 path.display().to_string(),

@@ -78,8 +78,8 @@ impl<'a> Recorder<'a> {
         let output_rows = output_rows(simulation, &order)?;
         let clock = &simulation.expected_clock();
         let (outputs, rows) = (
-            Schedule(problem.output.every),
-            Schedule(problem.row_interval()),
+            Schedule::of_outputs(&problem.output),
+            Schedule::every(problem.row_interval()),
         );
         let selection = (&order, &output_rows);
         let layout = ResultLayout::new(simulation, selection, outputs.count(clock), metadata);

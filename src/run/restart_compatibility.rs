@@ -30,7 +30,8 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     }
     problem.time.end = 0.0;
     problem.output = Output {
-        every: Interval::Steps(1),
+        every: None,
+        times: Vec::new(),
         fields: Vec::new(),
         single: false,
         set: None,
@@ -40,6 +41,8 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     problem.history.reactions.clear();
     problem.history.support_forces.clear();
     problem.history.fragments = false;
+    problem.history.angular_momentum = false;
+    problem.history.statistics.clear();
     problem.history.damage_threshold = 0.0;
     problem.history.probes.clear();
     problem.history.fronts.clear();
@@ -67,10 +70,7 @@ pub fn history_differences(old: &str, new: &str) -> Result<Option<String>> {
 }
 
 fn source(name: &str, text: &str) -> Source {
-    Source {
-        path: name.into(),
-        text: text.to_owned(),
-    }
+    Source::new(name, text)
 }
 
 /// Differences in the physics, one per line.

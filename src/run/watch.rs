@@ -64,7 +64,7 @@ impl<'a> Watch<'a> {
     ) -> Self {
         let schedule = match rule {
             CheckpointRule::WallClock(_) => None,
-            CheckpointRule::Simulation(interval) => Some(Schedule(interval)),
+            CheckpointRule::Simulation(interval) => Some(Schedule::every(interval)),
         };
         let of_job = || Some((Instant::now(), slurm_time_left()?));
         Self {
@@ -89,7 +89,11 @@ impl<'a> Watch<'a> {
     }
 
     fn is_scheduled(&self, step: Option<&Clock>) -> bool {
-        let due = |clock| self.schedule.is_some_and(|schedule| schedule.is_due(clock));
+        let due = |clock| {
+            self.schedule
+                .as_ref()
+                .is_some_and(|schedule| schedule.is_due(clock))
+        };
         step.is_some_and(due)
     }
 

@@ -250,11 +250,8 @@ fn saved_width(problem: &Problem) -> usize {
 }
 
 fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
-    let count = |every| Schedule(every).count(clock);
-    let (outputs, rows) = (
-        count(problem.output.every),
-        count(problem.row_interval()) as f64,
-    );
+    let outputs = Schedule::of_outputs(&problem.output).count(clock);
+    let rows = Schedule::every(problem.row_interval()).count(clock) as f64;
     let components: usize = problem
         .output
         .fields

@@ -747,3 +747,228 @@ fn an_imported_tensile_test_has_youngs_modulus() {
         "{modulus:e} {expected:e}"
     );
 }
+
+/// The deck of `fissure init` in a folder.
+fn example(folder: &Folder) -> std::path::PathBuf {
+    let deck = folder.join("plate.toml");
+    succeed(fissure(1).arg("init").arg(&deck));
+    deck
+}
+
+const OVERLAY: &str = "\
+title = 'Slow'  # other than the deck's
+[parameters]
+tension = 5e6
+dx = 4e-3
+[material.glass.ordinary]
+density = 2440
+youngs_modulus = 72e9
+poisson_ratio = 0.2
+[time]
+end = 5e-6
+[history.probe.behind]
+at = [0.02, 'dx/2']
+";
+
+#[test]
+fn an_overlay_goes_over_the_deck() {
+    let folder = Folder::new("overlay");
+    let deck = example(&folder);
+    let overlay = folder.write("slow.toml", OVERLAY);
+    let later = folder.write(
+        "later.toml",
+        "parameters.tension = 6e6\noutput.every = 2e-6\n",
+    );
+    let explain = |options: &[&str]| {
+        let mut command = fissure(1);
+        command.arg("explain").arg(&deck).args(options);
+        succeed(command.current_dir(&folder.0))
+    };
+    let explained = explain(&["--with", "slow.toml"]);
+    for line in [
+        "title = \"Slow\"",
+        "tension = 5000000.0",
+        "length = 0.1",
+        "[material.glass.ordinary]",
+        "end = 0.000005",
+        "[history.probe.ahead]",
+        "[history.probe.behind]",
+    ] {
+        assert!(explained.contains(line), "{line}: {explained}");
+    }
+    assert!(!explained.contains("pmb"), "{explained}");
+    // Later ones over earlier ones, and --set over all.
+    let explained = explain(&[
+        "--with",
+        "slow.toml",
+        "--with",
+        "later.toml",
+        "--set",
+        "time.end=4e-6",
+        "--set",
+        "dx=5e-3",
+    ]);
+    for line in [
+        "tension = 6000000.0",
+        "every = 0.000002",
+        "end = 0.000004",
+        "dx = 0.005",
+    ] {
+        assert!(explained.contains(line), "{line}: {explained}");
+    }
+
+    // The result has the merged deck, which alone makes the same run.
+    let out = folder.join("out");
+    let run = |deck: &std::path::Path, out: &std::path::Path, options: &[&str]| {
+        let mut command = fissure(1);
+        command.arg("run").arg(deck).arg("--output").arg(out);
+        finish(command.args(options).current_dir(&folder.0))
+    };
+    let output = run(&deck, &out, &["--with", "slow.toml"]);
+    assert!(output.status.success(), "{}", text(&output));
+    let result = out.join("result.vtkhdf");
+    let attributes = ResultReader::open(&result).unwrap().attributes().unwrap();
+    let merged = attributes.iter().find(|(name, _)| name == "deck");
+    let merged = folder.write("merged.toml", &merged.unwrap().1);
+    let alone = folder.join("alone");
+    let output = run(&merged, &alone, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let same = fissure(1)
+        .arg("compare")
+        .args([&out, &alone])
+        .output()
+        .unwrap();
+    assert!(same.status.success(), "{}", text(&same));
+
+    // A restart needs the overlay as well.
+    let further = ["--restart", "--set", "time.end=6e-6"];
+    let output = run(&deck, &out, &further);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(
+        text(&output).contains("differs in its physics"),
+        "{}",
+        text(&output)
+    );
+    let output = run(
+        &deck,
+        &out,
+        &[&further[..], &["--with", "slow.toml"]].concat(),
+    );
+    assert!(output.status.success(), "{}", text(&output));
+    let printed = succeed(
+        fissure(1)
+            .arg("check")
+            .arg(&deck)
+            .arg("--with")
+            .arg(&overlay),
+    );
+    assert!(printed.contains("Slow"), "{printed}");
+    let mut sweep = fissure(1);
+    sweep.arg("sweep").arg(&deck).arg("--with").arg(&later);
+    sweep.args([
+        "--set",
+        "dx=5e-3,4e-3",
+        "--set",
+        "time.end=2e-6",
+        "--output",
+    ]);
+    succeed(sweep.arg(folder.join("sweep")));
+    let log = std::fs::read_to_string(folder.join("sweep/dx=4e-3/history.csv"));
+    assert!(log.is_ok(), "{log:?}");
+}
+
+#[test]
+fn errors_in_an_overlay_name_its_line() {
+    let folder = Folder::new("wrong-overlay");
+    let deck = example(&folder);
+    let check = |deck: &std::path::Path, overlay: &str, set: &[&str]| {
+        folder.write("over.toml", overlay);
+        let mut command = fissure(1);
+        command.arg("check").arg(deck).args(["--with", "over.toml"]);
+        for set in set {
+            command.args(["--set", set]);
+        }
+        let output = finish(command.current_dir(&folder.0));
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{overlay}: {}",
+            text(&output)
+        );
+        text(&output)
+    };
+    for (overlay, message) in [
+        (
+            "[time]\nsafty = 1",
+            "over.toml:2:1: [time]: unknown key `safty`; did you mean `safety`?",
+        ),
+        (
+            "# A comment.\n[grid]\n\nhorizon = '3*dxx'",
+            "over.toml:4:14: [grid] horizon: unknown name `dxx`",
+        ),
+        (
+            "grid = { spacing = -1 }",
+            "over.toml:1:20: [grid] spacing: must be above 0, is -1",
+        ),
+        ("\n[time]\nend = []", "over.toml:3:7: [time] end: must be "),
+        ("\ntime = 5", "over.toml:2:8: [time]: must be a table, is 5"),
+        (
+            "[history.front.wave]\nfrom = [0, 0]",
+            "over.toml:1:1: [history.front.wave]: needs `direction`",
+        ),
+        (
+            "[set]\ntop.where = 'x > 9*dz'",
+            "over.toml:2:20: [set.top] where: unknown name `dz`",
+        ),
+        (
+            "[time]\nend = 1\nend = 2",
+            "over.toml:3:1: `end` is given twice",
+        ),
+        ("[time\nend = 1", "over.toml:1:"),
+    ] {
+        let printed = check(&deck, overlay, &[]);
+        assert!(
+            printed.contains(&format!("error: {message}")),
+            "{message}: {printed}"
+        );
+        assert!(!printed.contains("note: "), "{printed}");
+    }
+    // The deck's own errors have its lines, however many the overlay adds before them.
+    let whole = std::fs::read_to_string(&deck).unwrap();
+    let wrong = whole.replace("at = [0.06, \"dx/2\"]", "at = [0.06, \"dy/2\"]");
+    assert_ne!(whole, wrong);
+    let line = wrong
+        .lines()
+        .position(|line| line.contains("dy/2"))
+        .unwrap()
+        + 1;
+    folder.write("wrong.toml", &wrong);
+    let overlay = "thickness = 1\ncondition.new = { set = 'top', force = [1, 0] }\n[time]\nend = 1e-6\nsafety = 0.5\n";
+    let printed = check("wrong.toml".as_ref(), overlay, &["time.safety=0.4"]);
+    assert!(
+        printed.contains(&format!(
+            "error: wrong.toml:{line}:14: [history.probe.ahead] at: "
+        )),
+        "{printed}"
+    );
+    assert!(!printed.contains("note: "), "{printed}");
+    // What --set gives stands in no file.
+    let printed = check(&deck, overlay, &["time.safety=4"]);
+    let note = "note: lines are those of the deck as changed by --set";
+    assert!(
+        printed.contains("[time] safety: ") && printed.contains(note),
+        "{printed}"
+    );
+    let printed = finish(
+        fissure(1)
+            .arg("check")
+            .arg(&deck)
+            .args(["--with", "none.toml"]),
+    );
+    assert_eq!(printed.status.code(), Some(2));
+    assert!(
+        text(&printed).contains("cannot read the deck none.toml"),
+        "{}",
+        text(&printed)
+    );
+}

@@ -33,10 +33,7 @@ fn right_decks() -> Vec<Source> {
         .iter()
         .map(|path| Source::read(path).unwrap())
         .collect();
-    sources.push(Source {
-        path: "example.toml".into(),
-        text: deck::EXAMPLE.to_owned(),
-    });
+    sources.push(Source::new("example.toml", deck::EXAMPLE));
     sources
 }
 
@@ -110,10 +107,7 @@ fn a_right_deck_makes_a_run() {
 #[test]
 fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
     for source in right_decks() {
-        let explained = Source {
-            path: source.path.clone(),
-            text: deck::explain(&source).unwrap(),
-        };
+        let explained = Source::new(source.path.clone(), deck::explain(&source).unwrap());
         let again = deck::explain(&explained).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(explained.text, again, "{}", source.path.display());
         let run = |source| prepare(source).unwrap();
@@ -306,7 +300,7 @@ proptest! {
             }
             Ok(_) => {
                 let text = explained.unwrap();
-                let again = deck::explain(&Source { text: text.clone(), ..source });
+                let again = deck::explain(&Source::new(source.path, text.clone()));
                 prop_assert_eq!(again.map_err(|error| error.message), Ok(text));
             }
         }
@@ -327,10 +321,7 @@ fn defaults_are_the_accurate_ones() {
             time.end = 1e-5
             "
         );
-        let source = Source {
-            path: "tests/decks/good/deck.toml".into(),
-            text,
-        };
+        let source = Source::new("tests/decks/good/deck.toml", text);
         let deck = Deck::new(source).unwrap();
         let problem = deck.problem().unwrap();
         (deck.explain().unwrap(), problem)
@@ -366,10 +357,7 @@ fn filled(grid: &str, bodies: &str) -> (Vec<usize>, Vec<[f64; 3]>, bool) {
         time.end = 1
         "
     );
-    let source = Source {
-        path: "deck.toml".into(),
-        text,
-    };
+    let source = Source::new("deck.toml", text);
     let problem = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
     let comm = threads::alone();
     let simulation =

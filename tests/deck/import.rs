@@ -29,10 +29,7 @@ impl Folder {
 
     /// Import a deck of this folder into the same folder.
     fn import(&self, name: &str, text: &str) -> Result<Import, String> {
-        let source = Source {
-            path: self.0.join(name),
-            text: text.to_owned(),
-        };
+        let source = Source::new(self.0.join(name), text);
         let place = format!("{}/", self.0.display());
         let imported = translate(&source, None, &self.0.join("new.toml"));
         imported.map_err(|error| error.message.replace(&place, ""))
@@ -46,10 +43,7 @@ impl Folder {
             imported.fault,
             imported.text
         );
-        let source = Source {
-            path: self.0.join("new.toml"),
-            text: imported.text.clone(),
-        };
+        let source = Source::new(self.0.join("new.toml"), imported.text.clone());
         Deck::new(source).unwrap().problem().unwrap()
     }
 }

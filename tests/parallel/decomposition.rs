@@ -58,13 +58,17 @@ velocity = ['0.1*sin(400*x)', '0.1*cos(300*y)']
 end = 12e-6
 [output]
 every_steps = 7
+times = [1e-6, 5.1e-6]
 fields = ['displacement', 'velocity', 'acceleration', 'force_density', 'damage', 'strain_energy_density', 'neighbours', 'newly_broken_bonds']
 [history]
 every_steps = 3
 reactions = ['rim']
+angular_momentum = true
+field.load = { field = 'stress', component = 'von_mises', set = 'rim', of = ['sum', 'mean', 'maximum'] }
+field.strain = { field = 'strain', component = 'yy', of = ['integral', 'minimum'] }
 force.slanted = { set = 'rim', direction = [1, 2] }
 crack.notch = { from = [0, 0], threshold = 0.2 }
-probe.ahead.at = [0.02, 0]
+probe.ahead = { at = [0.02, 0], fields = ['stress', 'damage'] }
 front.wave = { from = [0.02, -0.012], direction = [0.1, 1], field = 'velocity', threshold = 0.5 }
 front.strain = { from = [0, 0], direction = [1, 0], length = 0.03, field = 'strain_energy_density', threshold = 1 }
 tip.notch = { from = [0, 0], direction = [1, 0.2], set = 'plate' }

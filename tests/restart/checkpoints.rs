@@ -31,7 +31,7 @@ fn plate(end: &str, extra: &str) -> String {
         condition.hold = {{ set = 'bottom', displacement = ['free', '-1e-8*ramp(t, 0, 1e-5)'] }}
         time = {{ end = 'end', step = 1e-8 }}
         output.every_steps = 200
-        history = {{ every_steps = 50, reactions = ['bottom'], probe.tip.at = [0.02, 0.015], front.load = {{ from = [0.03, 0.03], direction = [0, -1], field = 'velocity', component = 'y', threshold = 0.1 }}, tip.notch = {{ from = [0, 0.015], direction = [1, 0] }}, crack.notch = {{ from = [0, 0.015] }} }}
+        history = {{ every_steps = 50, reactions = ['bottom'], angular_momentum = true, field.load = {{ field = 'stress', component = 'yy', set = 'top', of = ['mean', 'maximum'] }}, probe.tip.at = [0.02, 0.015], probe.tip.fields = ['strain'], front.load = {{ from = [0.03, 0.03], direction = [0, -1], field = 'velocity', component = 'y', threshold = 0.1 }}, tip.notch = {{ from = [0, 0.015], direction = [1, 0] }}, crack.notch = {{ from = [0, 0.015] }} }}
         {extra}
         "
     )
@@ -519,7 +519,7 @@ fn goes_on(name: &str, law: &str, family: &str) -> BTreeMap<String, Vec<u64>> {
         )
         .replace(
             "output.every_steps = 200",
-            "output = { every_steps = 200, fields = ['stress', 'damage'] }",
+            "output = { every_steps = 200, times = [3.333e-6, 9.5e-6], fields = ['stress', 'damage'] }",
         );
     let text = if law.starts_with("correspondence") {
         let plain = "critical_stretch = { fracture_energy = 135, alpha = 0.25 }";

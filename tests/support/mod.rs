@@ -19,10 +19,7 @@ use fissure::solver::bonds::BondUpdate;
 
 /// A validated deck from its text.
 pub fn problem(text: &str) -> Problem {
-    let source = Source {
-        path: "test.toml".into(),
-        text: text.to_owned(),
-    };
+    let source = Source::new("test.toml", text);
     deck::parse(&source).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -83,7 +83,9 @@ fn pretended_time<const D: usize>(simulation: &Simulation<'_, D>) -> u64 {
 impl Recorded {
     /// Whether an output or a row of the history is due.
     fn is_due(problem: &Problem, clock: &Clock) -> [bool; 2] {
-        [problem.output.every, problem.row_interval()].map(|every| Schedule(every).is_due(clock))
+        let output = Schedule::of_outputs(&problem.output);
+        let row = Schedule::every(problem.row_interval());
+        [output, row].map(|schedule| schedule.is_due(clock))
     }
 
     /// Adds what is due after the present step. Collective.

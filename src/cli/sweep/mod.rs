@@ -45,6 +45,10 @@ pub struct SweepArguments {
     /// The deck.
     deck: PathBuf,
 
+    /// Put the keys of another deck over those of this one; may be repeated.
+    #[arg(long, value_name = "OVERLAY")]
+    with: Vec<PathBuf>,
+
     /// Values of a parameter or of a key, named with its section; may be repeated.
     #[arg(long, required = true, value_name = "NAME=VALUE,…", value_parser = design::axis)]
     set: Vec<Axis>,
@@ -112,7 +116,8 @@ impl SweepArguments {
 fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
     let run = |(row, name): (&Vec<usize>, String)| {
         let (label, set) = (design.label(row), design.assignments(row));
-        let deck = deck::read(&arguments.deck, &set).and_then(|deck| deck.explain());
+        let deck =
+            deck::read_with(&arguments.deck, &arguments.with, &set).and_then(|deck| deck.explain());
         let deck = deck.map_err(|error| Error {
             message: format!("{label}: {}", error.message),
             ..error

@@ -240,6 +240,9 @@ impl<'a> Program<'a> {
             .arg(&self.arguments.deck)
             .arg("--output")
             .arg(folder);
+        for overlay in &self.arguments.with {
+            command.arg("--with").arg(overlay);
+        }
         for (name, value) in &run.set {
             command.arg("--set").arg(format!("{name}={value}"));
         }

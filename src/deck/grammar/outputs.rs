@@ -11,12 +11,15 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Simulated time between outputs in s; a fiftieth of the run if neither is given.
+    /// Simulated time between outputs in s; a fiftieth of the run if neither `every_steps` nor `times` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
+    /// Simulated times of outputs in s, beside those of an interval if one is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub times: Option<Vector>,
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
@@ -59,9 +62,15 @@ pub struct History {
     /// Whether fragments are counted, and the largest one weighed; not if not given.
     #[serde(default)]
     pub fragments: bool,
+    /// Whether the angular momentum about the origin is recorded; not if not given. Plane problems and solids.
+    #[serde(default)]
+    pub angular_momentum: Spanned<bool>,
     /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage_threshold: Option<Number>,
+    /// Sums, means and extremes of fields over sets and bodies, by name.
+    #[serde(default)]
+    pub field: Tables<FieldStatistics>,
     /// Places whose nearest point is followed, by name.
     #[serde(default)]
     pub probe: Tables<Probe>,
@@ -145,6 +154,42 @@ pub struct CrackPath {
 pub struct Probe {
     /// The place in m; the nearest point is followed.
     pub at: Vector,
+    /// Names of output fields that are recorded beside displacement and velocity, such as `"stress"` and `"strain"`.
+    #[serde(default)]
+    pub fields: Vec<Text>,
+}
+
+/// Sums and extremes of a field over a set or body; a column each.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FieldStatistics {
+    /// Name of an output field.
+    pub field: Text,
+    /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or `"principal_1"`.
+    /// The magnitude of a vector if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub component: Option<Text>,
+    /// A set or a body; all points if not given.
+    #[serde(default = "super::all_points")]
+    pub set: Text,
+    /// What is recorded.
+    pub of: Spanned<Vec<Spanned<Statistic>>>,
+}
+
+/// A number that follows from the values of a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Statistic {
+    /// The sum over the points.
+    Sum,
+    /// The sum of value times volume.
+    Integral,
+    /// The integral over the volume of the set.
+    Mean,
+    /// The smallest value.
+    Minimum,
+    /// The largest value.
+    Maximum,
 }
 
 /// A front: how far a field has come along a line. Of the points near the line, the farthest one above
@@ -165,8 +210,8 @@ pub struct Front {
     pub radius: Option<Number>,
     /// Name of an output field.
     pub field: Text,
-    /// `"x"`, `"y"` or `"z"` of a vector, whose length is taken if nothing is given; `"xx"`, `"yy"`,
-    /// `"zz"`, `"xy"`, `"yz"` or `"xz"` of a stress.
+    /// A component such as `"x"` or `"xy"`, or an invariant such as `"magnitude"`, `"von_mises"` or `"principal_1"`.
+    /// The magnitude of a vector if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
     /// What the size of the field must exceed, in the unit of the field.

@@ -49,7 +49,7 @@ use Form::{Array, Key, Named, NamedKind, Table};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
-pub const SECTIONS: [Section; 36] = [
+pub const SECTIONS: [Section; 37] = [
     Section::new("title", Key, Free),
     Section::new("dimension", Key, Fixed),
     Section::new("thickness", Key, Fixed),
@@ -82,6 +82,7 @@ pub const SECTIONS: [Section; 36] = [
     // Definitions of history columns are compared separately.
     Section::new("history", Table, Free),
     Section::new("history.force", Named, Fixed),
+    Section::new("history.field", Named, Fixed),
     Section::new("history.probe", Named, Fixed),
     Section::new("history.front", Named, Fixed),
     Section::new("history.crack", Named, Fixed),
@@ -174,6 +175,7 @@ impl Deck {
         }
         let history = self.history.get_ref();
         add(&mut found, "history.force", &history.force);
+        add(&mut found, "history.field", &history.field);
         add(&mut found, "history.probe", &history.probe);
         add(&mut found, "history.front", &history.front);
         add(&mut found, "history.crack", &history.crack);
@@ -202,10 +204,7 @@ mod tests {
 
     #[test]
     fn every_section_within_another_is_listed() {
-        let example = crate::deck::Source {
-            path: "example.toml".into(),
-            text: crate::deck::EXAMPLE.to_owned(),
-        };
+        let example = crate::deck::Source::new("example.toml", crate::deck::EXAMPLE);
         let explained = crate::deck::explain(&example).unwrap();
         let explained: toml::Table = explained.parse().unwrap();
         let mut count = 0;

@@ -1,5 +1,6 @@
 //! The columns of the history: each with its name, its unit and what its value is, in one place.
 
+use crate::component::AXES;
 use crate::solver::contact::ContactNow;
 use crate::solver::motion::Clock;
 use crate::solver::motion::load_step::LoadStep;
@@ -7,9 +8,6 @@ use crate::solver::motion::load_step::LoadStep;
 use super::fragments::Fragments;
 use super::history::Energies;
 use super::tip::TipNow;
-
-/// Names of the components.
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Global quantities of one row of the history; the same on all ranks.
 pub struct GlobalState {
@@ -19,6 +17,8 @@ pub struct GlobalState {
     pub energies: Energies,
     /// By component, kg m/s.
     pub momentum: Vec<f64>,
+    /// About the origin, kg m²/s: z in plane problems, x, y and z of solids, where the history has it.
+    pub angular_momentum: Vec<f64>,
     /// Bonds broken since the start.
     pub broken: u64,
     /// Points above the threshold of damage, and the corners (m) of the box around them.
@@ -45,8 +45,10 @@ pub struct GlobalState {
     pub reactions: Vec<Vec<f64>>,
     /// Forces of supports in a direction, N.
     pub support_forces: Vec<f64>,
-    /// Displacement (m) and velocity (m/s) of each probe, by component.
-    pub probes: Vec<[Vec<f64>; 2]>,
+    /// Values of the columns of each probe.
+    pub probes: Vec<Vec<f64>>,
+    /// Values of the columns of the statistics of each field.
+    pub statistics: Vec<Vec<f64>>,
     /// Position of each front, m.
     pub fronts: Vec<f64>,
     /// Length (m) and number of branches of each crack.

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::problem;
 
 use super::reach::Course;
-use super::snapshot::Snapshot;
+use super::row_fields::RowFields;
 use crate::solver::Simulation;
 
 /// A front that is followed.
@@ -37,23 +37,20 @@ impl Front {
         })
     }
 
-    /// How far along the line (m) the size of the field is above the threshold, at the moment of the
-    /// snapshot; NaN where it is nowhere. Collective.
+    /// How far along the line (m) the size of the field is above the threshold; NaN where it is nowhere.
+    /// Collective.
     pub fn position<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
-        snapshot: &Snapshot,
+        fields: &mut RowFields<'_>,
     ) -> f64 {
         let problem::Front {
             field, component, ..
         } = self.rule;
-        let values = snapshot.field(simulation, field);
+        let values = fields.get(simulation, field);
         let size = |point: usize| {
             let row = &values[field.components() * point..][..field.components()];
-            match component {
-                Some(entry) => row[entry].abs(),
-                None => row.iter().map(|value| value * value).sum::<f64>().sqrt(),
-            }
+            component.of(row).abs()
         };
         let reached = self.course.reached(simulation, self.rule.threshold, size);
         reached.map_or(f64::NAN, |reached| reached.along)

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
+use crate::component::{AXES, entries};
 use crate::error::Result;
-use crate::problem::{self, Reaction};
+use crate::problem::{self, Field, Reaction};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 use crate::solver::contact::contact_now;
@@ -16,7 +17,9 @@ use super::cracked::Cracked;
 use super::fragments::Fragments;
 use super::front::Front;
 use super::nearest::nearest;
+use super::row_fields::RowFields;
 use super::snapshot::Snapshot;
+use super::statistics::FieldStatistics;
 use super::tip::Tip;
 
 /// Points summed by one task.
@@ -26,6 +29,8 @@ const CHUNK: usize = 4096;
 struct Probe {
     /// Local index, on the rank that owns it.
     point: Option<usize>,
+    /// Fields beside displacement and velocity.
+    fields: Vec<Field>,
 }
 
 /// The columns of the history and what they need.
@@ -34,6 +39,7 @@ pub struct HistoryObserver {
     reactions: Vec<Vec<u32>>,
     /// Points, and the direction in which the force on them counts.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
+    statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
     fronts: Vec<Front>,
     cracks: Vec<CrackPath>,
@@ -148,9 +154,8 @@ impl HistoryObserver {
             columns.add_vector(&of("force"), "N", move |now, d| {
                 now.contact.rigid[k].0.contact[d]
             });
-            let axes = if D == 3 { 0..3 } else { 2..3 };
-            for axis in axes.filter(|_| D > 1) {
-                let name = format!("{}_{}", of("torque"), ["x", "y", "z"][axis]);
+            for axis in rotation_axes(D) {
+                let name = format!("{}_{}", of("torque"), AXES[axis]);
                 columns.add(name, "N m", move |now| {
                     now.contact.rigid[k].0.contact[3 + axis]
                 });
@@ -196,13 +201,42 @@ impl HistoryObserver {
             let name = format!("force_{}", rule.name);
             columns.add(name, "N", move |now| now.support_forces[k]);
         }
+        if problem.history.angular_momentum {
+            for (k, axis) in rotation_axes(D).enumerate() {
+                let name = format!("angular_momentum_{}", AXES[axis]);
+                columns.add(name, "kg m^2/s", move |now| now.angular_momentum[k]);
+            }
+        }
+        let mut statistics = Vec::new();
+        for (k, rule) in problem.history.statistics.iter().enumerate() {
+            let of_field = FieldStatistics::new(simulation, rule)?;
+            for (column, (name, unit)) in of_field.columns().enumerate() {
+                columns.add(name, unit, move |now| now.statistics[k][column]);
+            }
+            statistics.push(of_field);
+        }
         let mut probes = Vec::new();
-        for (k, problem::Probe { name, at, .. }) in problem.history.probes.iter().enumerate() {
-            let point = nearest(simulation, *at).own;
-            probes.push(Probe { point });
-            let of = |quantity: &str| format!("probe_{name}_{quantity}");
-            columns.add_vector(&of("displacement"), "m", move |now, d| now.probes[k][0][d]);
-            columns.add_vector(&of("velocity"), "m/s", move |now, d| now.probes[k][1][d]);
+        for (
+            k,
+            problem::Probe {
+                name, at, fields, ..
+            },
+        ) in problem.history.probes.iter().enumerate()
+        {
+            let mut count = 0;
+            for field in [Field::Displacement, Field::Velocity].iter().chain(fields) {
+                for (_, entry) in entries(field.components(), D) {
+                    let separator = if entry.is_empty() { "" } else { "_" };
+                    let name = format!("probe_{name}_{}{separator}{entry}", field.name());
+                    let column = count;
+                    columns.add(name, field.unit(), move |now| now.probes[k][column]);
+                    count += 1;
+                }
+            }
+            probes.push(Probe {
+                point: nearest(simulation, *at).own,
+                fields: fields.clone(),
+            });
         }
         let mut fronts = Vec::new();
         for (k, front) in problem.history.fronts.iter().enumerate() {
@@ -229,6 +263,7 @@ impl HistoryObserver {
             columns,
             reactions,
             support_forces,
+            statistics,
             probes,
             fronts,
             cracks,
@@ -321,6 +356,9 @@ impl HistoryObserver {
         for members in self.reactions.iter().chain(directed) {
             sums.extend(simulation.conditions.reaction(model, fields, members));
         }
+        if simulation.problem.history.angular_momentum {
+            sums.extend(angular_momentum(simulation));
+        }
         let sums = reduce(comm, &mut sums);
         let (own, rest) = sums.split_at(3 + D);
         let (&[work, dissipated, overshoot, step_energy], reactions) =
@@ -363,16 +401,19 @@ impl HistoryObserver {
         let there_were = first_intact as i64 + simulation.refined.bonds;
         let broken = (there_were - intact as i64) as u64 / 2;
         let most_broken = std::mem::take(&mut simulation.step_control.most_broken);
-        let (reactions, directed) = reactions.split_at(D * self.reactions.len());
+        let (reactions, rest) = reactions.split_at(D * self.reactions.len());
+        let (directed, angular_momentum) = rest.split_at(D * self.support_forces.len());
         let support_forces = directed.chunks_exact(D).zip(&self.support_forces);
         let support_forces = support_forces.map(|(force, (_, direction))| {
             let products = force.iter().zip(direction).map(|(f, d)| f * d);
             products.sum()
         });
-        let probes = self.probe_values(simulation);
+        let mut fields = RowFields::new(snapshot);
+        let probes = self.probe_values(simulation, &mut fields);
+        let statistics = FieldStatistics::values(&self.statistics, simulation, &mut fields);
         let fronts = self.fronts.iter();
         let fronts = fronts
-            .map(|front| front.position(simulation, snapshot))
+            .map(|front| front.position(simulation, &mut fields))
             .collect();
         let damage = |point| snapshot.damage(&simulation.family_volume, point);
         let cracks = self.cracks.iter().map(|crack| {
@@ -386,6 +427,7 @@ impl HistoryObserver {
             clock: simulation.clock,
             energies,
             momentum: own[3..].to_vec(),
+            angular_momentum: angular_momentum.to_vec(),
             broken,
             cracked_points,
             cracked_extent: [lower, upper],
@@ -399,6 +441,7 @@ impl HistoryObserver {
             refinement_energy: simulation.refined.energy,
             reactions: reactions.chunks_exact(D).map(<[f64]>::to_vec).collect(),
             support_forces: support_forces.collect(),
+            statistics,
             probes,
             fronts,
             cracks,
@@ -416,26 +459,37 @@ impl HistoryObserver {
         }
     }
 
-    /// Displacement and velocity of the probes, from the ranks that own their points to all.
-    fn probe_values<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<[Vec<f64>; 2]> {
-        let fields = &simulation.fields;
-        let mut bits: Vec<u64> = self
-            .probes
-            .iter()
-            .flat_map(|probe| {
-                let at = |field: &[Vec<f64>; D], d: usize| {
-                    probe.point.map_or(0, |point| field[d][point].to_bits())
-                };
-                let displacement = (0..D).map(move |d| at(&fields.displacement, d));
-                displacement.chain((0..D).map(move |d| at(&fields.velocity, d)))
-            })
-            .collect();
+    /// Values of the probes, from the ranks that own their points to all. Collective.
+    fn probe_values<const D: usize>(
+        &self,
+        simulation: &mut Simulation<'_, D>,
+        fields: &mut RowFields<'_>,
+    ) -> Vec<Vec<f64>> {
+        let mut bits = Vec::new();
+        let mut counts = Vec::new();
+        for probe in &self.probes {
+            let before = bits.len();
+            for columns in [&simulation.fields.displacement, &simulation.fields.velocity] {
+                let bits_of =
+                    |point: usize| columns.each_ref().map(|column| column[point].to_bits());
+                bits.extend(probe.point.map_or([0; D], bits_of));
+            }
+            for field in &probe.fields {
+                let width = field.components();
+                // Computed by all ranks together.
+                let values = fields.get(simulation, *field);
+                bits.extend(entries(width, D).map(|(entry, _)| {
+                    let bits_of = |point: usize| values[width * point + entry].to_bits();
+                    probe.point.map_or(0, bits_of)
+                }));
+            }
+            counts.push(bits.len() - before);
+        }
         // One rank has the bits, the others add nothing.
         simulation.comm.sum(&mut bits);
-        let values = |bits: &[u64]| bits.iter().map(|bits| f64::from_bits(*bits)).collect();
-        bits.chunks_exact(2 * D)
-            .map(|of_probe| [values(&of_probe[..D]), values(&of_probe[D..])])
-            .collect()
+        let mut values = bits.into_iter().map(f64::from_bits);
+        let of_probe = |count: usize| values.by_ref().take(count).collect();
+        counts.into_iter().map(of_probe).collect()
     }
 }
 
@@ -470,16 +524,49 @@ pub(in crate::solver) fn point_sums<const D: usize>(
             sums[2].add(freed[point]);
         }
     };
-    (0..model.owned().div_ceil(CHUNK))
+    sums_over(model.owned(), 3 + D, add)
+}
+
+/// The axes about which bodies turn: z in plane problems, all in 3-D, none in 1-D.
+fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
+    match dimension {
+        1 => 0..0,
+        2 => 2..3,
+        _ => 0..3,
+    }
+}
+
+/// Angular momentum Σ ρ V y × u̇ of the owned points about the origin (kg m²/s), by axis; y is the deformed position.
+fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<ExactSum> {
+    let (model, fields) = (&simulation.model, &simulation.fields);
+    let axes = rotation_axes(D);
+    sums_over(model.owned(), axes.len(), |sums, point| {
+        let mass = model.density_of(point) * model.volume[point];
+        let place = |d: usize| model.reference[d][point] + fields.displacement[d][point];
+        for (sum, axis) in sums.iter_mut().zip(axes.clone()) {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            let velocity = [a, b].map(|d| fields.velocity[d][point]);
+            sum.add(mass * (place(a) * velocity[1] - place(b) * velocity[0]));
+        }
+    })
+}
+
+/// So many sums over the points below `count`.
+fn sums_over(
+    count: usize,
+    width: usize,
+    add: impl Fn(&mut [ExactSum], usize) + Sync,
+) -> Vec<ExactSum> {
+    (0..count.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut sums = vec![ExactSum::default(); 3 + D];
-            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(model.owned());
+            let mut sums = vec![ExactSum::default(); width];
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
             range.for_each(|point| add(&mut sums, point));
             sums
         })
         .reduce(
-            || vec![ExactSum::default(); 3 + D],
+            || vec![ExactSum::default(); width],
             |mut a, b| {
                 a.iter_mut().zip(&b).for_each(|(a, b)| a.merge(b));
                 a

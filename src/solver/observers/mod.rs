@@ -11,8 +11,10 @@ mod front;
 pub mod history;
 pub mod nearest;
 mod reach;
+mod row_fields;
 pub mod schedule;
 pub mod snapshot;
+mod statistics;
 mod tip;
 
 pub use centre_line::{Branch, Vertex};

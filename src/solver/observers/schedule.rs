@@ -1,25 +1,52 @@
 //! At which steps something is written.
 
-use crate::problem::Interval;
+use crate::problem::{Interval, Output};
 use crate::solver::motion::Clock;
 
-/// When an interval says that something is due; always at the start and at the end.
-#[derive(Debug, Clone, Copy)]
-pub struct Schedule(pub Interval);
+/// When something is due: at the start, after intervals, at given times, and at the end.
+#[derive(Debug, Clone)]
+pub struct Schedule {
+    interval: Option<Interval>,
+    /// In ascending order, s.
+    times: Vec<f64>,
+}
 
 impl Schedule {
-    /// Whether something is due now: after the first step that reaches a multiple of the interval, up
+    /// After intervals.
+    pub fn every(interval: Interval) -> Self {
+        Self {
+            interval: Some(interval),
+            times: Vec::new(),
+        }
+    }
+
+    /// Of the outputs of a result.
+    pub fn of_outputs(output: &Output) -> Self {
+        Self {
+            interval: output.every,
+            times: output.times.clone(),
+        }
+    }
+
+    /// Whether something is due now: after the first step that reaches a multiple of the interval or a given time, up
     /// to rounding.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;
         }
+        let (time, before) = (clock.time(), clock.time_before());
+        self.reached(time) > self.reached(before) || self.is_interval_over(clock, before)
+    }
+
+    /// Whether the last step, since the time `before` (s), reached a multiple of the interval.
+    fn is_interval_over(&self, clock: &Clock, before: f64) -> bool {
         let passed =
             |seconds, before| multiples(clock.time(), seconds) > multiples(before, seconds);
-        match self.0 {
-            Interval::Steps(steps) => clock.number().is_multiple_of(steps),
-            Interval::Seconds(seconds) => passed(seconds, clock.time_before()),
-            Interval::SecondsAtSteps { seconds, steps } => {
+        match self.interval {
+            None => false,
+            Some(Interval::Steps(steps)) => clock.number().is_multiple_of(steps),
+            Some(Interval::Seconds(seconds)) => passed(seconds, before),
+            Some(Interval::SecondsAtSteps { seconds, steps }) => {
                 // Where steps change, as long before as it would be with the present one.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
@@ -27,22 +54,43 @@ impl Schedule {
         }
     }
 
+    /// How many of the given times have been reached at a time (s), up to rounding.
+    fn reached(&self, time: f64) -> usize {
+        self.times
+            .partition_point(|given| given * (1.0 - ROUNDING) <= time)
+    }
+
     /// How many times something is due in the whole run, if the step keeps its size.
     pub fn count(&self, clock: &Clock) -> u64 {
-        let last = clock.last();
-        let multiples = |number: u64| match self.0 {
-            Interval::Steps(steps) => (number / steps) as f64,
-            Interval::Seconds(seconds) => multiples(number as f64 * clock.step(), seconds),
-            Interval::SecondsAtSteps { seconds, steps } => {
+        let (last, step) = (clock.last(), clock.step());
+        let multiples = |number: u64| match self.interval {
+            None => 0.0,
+            Some(Interval::Steps(steps)) => (number / steps) as f64,
+            Some(Interval::Seconds(seconds)) => multiples(number as f64 * step, seconds),
+            Some(Interval::SecondsAtSteps { seconds, steps }) => {
                 let rounds = (number / steps) as f64;
-                multiples(rounds * steps as f64 * clock.step(), seconds).min(rounds)
+                multiples(rounds * steps as f64 * step, seconds).min(rounds)
             }
         };
         let [whole, before] = [last, last - 1].map(multiples);
         // At the end as well, which may be a multiple itself.
-        1 + (whole as u64).min(last) + u64::from(whole == before)
+        let intervals = 1 + (whole as u64).min(last) + u64::from(whole == before);
+        let steps = self.times.iter().map(|given| {
+            // The first step at or after the time, up to rounding.
+            let steps = (given * (1.0 - ROUNDING) / step).ceil();
+            steps as u64
+        });
+        let mut steps: Vec<u64> = steps.collect();
+        steps.dedup();
+        let is_further = |number: &&u64| {
+            (1..last).contains(*number) && multiples(**number) == multiples(**number - 1)
+        };
+        intervals + steps.iter().filter(is_further).count() as u64
     }
 }
+
+/// A time of the clock may fall short of a given time by this share, its round-off.
+const ROUNDING: f64 = 1e-12;
 
 /// How many times an interval (s) has passed at a time (s), up to rounding.
 fn multiples(time: f64, seconds: f64) -> f64 {
@@ -53,8 +101,9 @@ fn multiples(time: f64, seconds: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn due(interval: Interval, step: f64, last: u64) -> Vec<u64> {
-        let schedule = Schedule(interval);
+    fn due(interval: Option<Interval>, times: &[f64], step: f64, last: u64) -> Vec<u64> {
+        let times = times.to_vec();
+        let schedule = Schedule { interval, times };
         let mut clock = Clock::new(step, last as f64 * step);
         let mut due = vec![0];
         while !clock.is_over() {
@@ -69,6 +118,7 @@ mod tests {
 
     #[test]
     fn seconds_and_steps() {
+        let due = |interval, step, last| due(Some(interval), &[], step, last);
         assert_eq!(due(Interval::Seconds(0.3), 0.1, 10), [0, 3, 6, 9, 10]);
         assert_eq!(due(Interval::Seconds(0.25), 0.1, 10), [0, 3, 5, 8, 10]);
         assert_eq!(due(Interval::Steps(4), 0.1, 10), [0, 4, 8, 10]);
@@ -77,5 +127,54 @@ mod tests {
         assert_eq!(due(seldom(0.01), 0.1, 10), [0, 4, 8, 10]);
         assert_eq!(due(seldom(0.01), 0.1, 8), [0, 4, 8]);
         assert_eq!(due(seldom(0.6), 0.1, 20), [0, 8, 12, 20]);
+    }
+
+    #[test]
+    fn given_times() {
+        // The first step at or after each, once.
+        assert_eq!(
+            due(None, &[0.3, 0.55, 0.58, 0.7], 0.1, 10),
+            [0, 3, 6, 7, 10]
+        );
+        assert_eq!(due(None, &[0.0, 1.0], 0.1, 10), [0, 10]);
+        assert_eq!(due(None, &[0.93], 0.1, 10), [0, 10]);
+        // Beside an interval.
+        let every = |steps| Some(Interval::Steps(steps));
+        assert_eq!(due(every(4), &[0.35, 0.72], 0.1, 10), [0, 4, 8, 10]);
+        assert_eq!(due(every(4), &[0.1, 0.45], 0.1, 10), [0, 1, 4, 5, 8, 10]);
+        let seconds = Some(Interval::Seconds(0.25));
+        assert_eq!(due(seconds, &[0.4, 0.5], 0.1, 10), [0, 3, 4, 5, 8, 10]);
+        // Steps whose multiples are rounded.
+        for step in [0.1, 1e-8 / 3.0, 7.3e-9] {
+            let times: Vec<f64> = [3, 10, 700, 99_999].map(|k| f64::from(k) * step).to_vec();
+            assert_eq!(
+                due(None, &times, step, 100_000),
+                [0, 3, 10, 700, 99_999, 100_000]
+            );
+        }
+    }
+
+    #[test]
+    fn given_times_with_steps_that_change() {
+        let schedule = Schedule {
+            interval: None,
+            times: vec![0.3, 0.35, 0.6],
+        };
+        let mut clock = Clock::new(0.1, 1.0);
+        let mut due = Vec::new();
+        while !clock.is_over() {
+            clock.advance();
+            if schedule.is_due(&clock) {
+                due.push(clock.time());
+            }
+            if clock.number() == 3 {
+                clock.set_step(0.05);
+            }
+        }
+        let expected = [0.3, 0.35, 0.6, 1.0];
+        assert_eq!(due.len(), expected.len(), "{due:?}");
+        for (due, expected) in due.iter().zip(expected) {
+            assert!((due - expected).abs() < 1e-12, "{due} {expected}");
+        }
     }
 }

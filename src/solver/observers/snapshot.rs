@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
+use crate::component::Component;
 use crate::dimension::{Constraint, Dimension};
 use crate::elastic::Isotropic;
 use crate::material::{PlasticState, determinant};
@@ -103,6 +104,7 @@ impl Snapshot {
             }
             Field::VonMisesStress => {
                 let stress = self.field(simulation, Field::CauchyStress);
+                let von_mises = |stress: &[f64]| Component::VonMises.of(stress);
                 stress.chunks_exact(6).map(von_mises).collect()
             }
             Field::DeformationGradient => {
@@ -117,6 +119,7 @@ impl Snapshot {
                     .flatten()
                     .collect()
             }
+            Field::Strain => strain(simulation),
             Field::Singular => simulation.forces.singular(model),
             // Where none is prescribed.
             Field::Temperature => {
@@ -174,13 +177,54 @@ fn cauchy_stress<const D: usize>(
     kirchhoff
 }
 
-/// Of xx, yy, zz, xy, yz, xz.
-fn von_mises(stress: &[f64]) -> f64 {
-    let [xx, yy, zz, xy, yz, xz] = *stress else {
-        unreachable!("six entries")
+/// Green–Lagrange strain ½(FᵀF − I) of the body in space, row by row: xx, yy, zz, xy, yz, xz.
+fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
+    let gradients = simulation.forces.deformation_gradient(&simulation.model);
+    let mut rows = Vec::with_capacity(6 * gradients.len());
+    for (point, gradient) in gradients.iter().enumerate() {
+        let across = stretch_across(simulation, point, gradient);
+        // Of F − I, so that small strains lose no digits.
+        let mut change = Matrix3::identity() * (across - 1.0);
+        change
+            .view_mut((0, 0), (D, D))
+            .copy_from(&(gradient - SMatrix::identity()));
+        let entry = |a: usize, b: usize| {
+            let product: f64 = (0..3).map(|k| change[(k, a)] * change[(k, b)]).sum();
+            0.5 * (change[(a, b)] + change[(b, a)] + product)
+        };
+        let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+        rows.extend(pairs.map(|(a, b)| entry(a, b)));
+    }
+    rows
+}
+
+/// The stretch of an owned point across the directions of the setting at this deformation gradient: 1 without strain
+/// there.
+fn stretch_across<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    point: usize,
+    gradient: &SMatrix<f64, D, D>,
+) -> f64 {
+    let thermal = 1.0 + free_stretch(simulation, point);
+    let elastic_gradient = gradient / thermal;
+    let in_setting = determinant(&elastic_gradient);
+    // A body turned inside out has no volume to speak of.
+    let in_setting = if in_setting > 0.0 { in_setting } else { 1.0 };
+    let ratio = || elastic(simulation, point).poisson_ratio;
+    let across = match simulation.problem.dimension {
+        Dimension::PlaneStress { .. } => {
+            let plastic = plastic_state(&simulation.fields, point);
+            let (forces, model) = (&simulation.forces, &simulation.model);
+            let by_law = forces.stretch_across(model, point, &elastic_gradient, &plastic);
+            by_law.unwrap_or_else(|| libm::pow(in_setting, -ratio() / (1.0 - ratio())))
+        }
+        Dimension::Line {
+            constraint: Constraint::UniaxialStress,
+            ..
+        } => libm::pow(in_setting, -ratio()),
+        Dimension::PlaneStrain { .. } | Dimension::Line { .. } | Dimension::Space => return 1.0,
     };
-    let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
-    (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+    across * thermal
 }
 
 /// The elastic constants of an owned point's body.

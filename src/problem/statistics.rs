@@ -1,0 +1,70 @@
+//! Sums and extremes of fields over sets, for the history.
+
+use std::ops::Range;
+
+use super::Field;
+use crate::component::Component;
+
+/// Sums and extremes of a field over a set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldStatistics {
+    /// Their name.
+    pub name: String,
+    /// Where they stand in the deck.
+    pub span: Range<usize>,
+    /// Index of the set.
+    pub set: usize,
+    /// The field.
+    pub field: Field,
+    /// The number of a point.
+    pub component: Component,
+    /// One column each.
+    pub of: Vec<Statistic>,
+}
+
+/// A number that follows from the values a of the points of a set and their volumes V.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Statistic {
+    /// Σ a.
+    Sum,
+    /// Σ a V.
+    Integral,
+    /// Σ a V / Σ V.
+    Mean,
+    /// The smallest a.
+    Minimum,
+    /// The largest a.
+    Maximum,
+}
+
+impl Statistic {
+    /// Its name in decks and columns.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sum => "sum",
+            Self::Integral => "integral",
+            Self::Mean => "mean",
+            Self::Minimum => "minimum",
+            Self::Maximum => "maximum",
+        }
+    }
+
+    /// Its SI unit, of a field.
+    pub fn unit(self, field: Field) -> &'static str {
+        match self {
+            Self::Sum | Self::Mean | Self::Minimum | Self::Maximum => field.unit(),
+            Self::Integral => match field.unit() {
+                "m" => "m^4",
+                "m/s" => "m^4/s",
+                "m/s^2" => "m^4/s^2",
+                "m^5" => "m^8",
+                "N/m^3" => "N",
+                "Pa" => "Pa m^3",
+                "J/m^3" => "J",
+                "K" => "K m^3",
+                // Of a field without a unit.
+                _ => "m^3",
+            },
+        }
+    }
+}

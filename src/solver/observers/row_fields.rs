@@ -1,0 +1,37 @@
+//! The fields that a row of the history reads.
+
+use crate::problem::Field;
+use crate::solver::Simulation;
+
+use super::snapshot::Snapshot;
+
+/// Fields at the moment of a snapshot; each is computed once.
+pub struct RowFields<'s> {
+    snapshot: &'s Snapshot,
+    computed: Vec<(Field, Vec<f64>)>,
+}
+
+impl<'s> RowFields<'s> {
+    /// None yet.
+    pub fn new(snapshot: &'s Snapshot) -> Self {
+        Self {
+            snapshot,
+            computed: Vec::new(),
+        }
+    }
+
+    /// A field over the owned points, as [`Snapshot::field`] has it.
+    pub fn get<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        field: Field,
+    ) -> &[f64] {
+        let known = self.computed.iter().position(|(known, _)| *known == field);
+        let index = known.unwrap_or_else(|| {
+            let values = self.snapshot.field(simulation, field);
+            self.computed.push((field, values));
+            self.computed.len() - 1
+        });
+        &self.computed[index].1
+    }
+}
