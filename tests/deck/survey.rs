@@ -152,7 +152,7 @@ fn loads_on_a_layer_of_another_depth() {
         &pulled("x > 9", ""),
         &[
             "[condition.pull] traction: acts on a layer about 3.00e0 m thick but is divided by the \
-             spacing, 1 m; give the layer's `depth`",
+             spacing, 1 m; give the thickness of the layer as `depth`",
         ],
     );
     warns(&pulled("x > 9", ", depth = 3"), &[]);
