@@ -1,8 +1,8 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, Static,
-    THERMAL_EXPANSION, VolumeCorrection, common_keys,
+    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, Rule,
+    Static, THERMAL_EXPANSION, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
 use crate::deck::spanned::Spanned;
@@ -57,6 +57,20 @@ fn fill(deck: &mut Deck, problem: &Problem) {
             body.spacing = body.spacing.take().or(grid.spacing.clone());
         }
         body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
+    }
+    let pairs = deck
+        .interface
+        .pair
+        .values_mut()
+        .zip(&problem.interface.pairs);
+    for (pair, resolved) in pairs {
+        let rule = match resolved.rule {
+            problem::InterfaceRule::None => Rule::None,
+            problem::InterfaceRule::Own => Rule::Own,
+            problem::InterfaceRule::Average => Rule::Average,
+            problem::InterfaceRule::Minimum => Rule::Minimum,
+        };
+        pair.get_mut().rule.get_or_insert(Spanned::new(0..0, rule));
     }
     if let (Some(table), Some(refinement)) = (&mut deck.refinement, &problem.refinement) {
         let table = table.get_mut();

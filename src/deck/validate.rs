@@ -38,7 +38,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let volume_correction = volume_correction(scope, deck, &bodies)?;
     let jitter = jitter(scope, deck)?;
     let family = family(scope, deck)?;
-    let interface = interface::interface(scope, deck, &bodies)?;
+    let interface = interface::interface(scope, deck, dimension, &bodies, &damages)?;
     let contact = contact::contact(scope, deck, &bodies)?;
     let refinement = refinement::refinement(scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
