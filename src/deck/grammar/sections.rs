@@ -49,7 +49,7 @@ use Form::{Array, Key, Named, NamedKind, Table};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
-pub const SECTIONS: [Section; 36] = [
+pub const SECTIONS: [Section; 37] = [
     Section::new("title", Key, Free),
     Section::new("dimension", Key, Fixed),
     Section::new("thickness", Key, Fixed),
@@ -57,6 +57,8 @@ pub const SECTIONS: [Section; 36] = [
     Section::new("constraint", Key, Fixed),
     // Parameters count where they are used.
     Section::new("parameters", Table, Free),
+    // Tables count where they are used, too.
+    Section::new("table", Named, Free).referred_to(),
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),
     Section::new("interface.pair", Named, Fixed),
@@ -156,6 +158,7 @@ impl Deck {
             }));
         }
         let mut found = Vec::new();
+        add(&mut found, "table", &self.table);
         add(&mut found, "material", &self.material);
         add(&mut found, "damage", &self.damage);
         add(&mut found, "body", &self.body);
