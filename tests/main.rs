@@ -46,6 +46,7 @@ mod physics {
     mod relaxation;
     mod stable_step;
     mod stages;
+    mod tables;
     mod waves;
 }
 

@@ -9,10 +9,10 @@ use fissure::dimension::Dimension;
 use fissure::error::Warning;
 use fissure::problem::Problem;
 use fissure::problem::{
-    Block, Body, ContactModel, ContactRule, DamageRule, PointSource, RigidMotion, RigidShape,
-    Sense, Time,
+    Block, Body, ContactModel, ContactRule, DamageRule, InterfaceDamage, PointSource, RigidMotion,
+    RigidShape, Sense, Time,
 };
-use fissure::solver::assign::block_laws;
+use fissure::solver::assign::{block_laws, pair_damage_laws};
 use fissure::solver::calibration::separation_energy_ratio;
 use fissure::survey::{BodyFigures, Cost, Interior, Survey};
 
@@ -191,6 +191,35 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     for (pair, bonds) in &survey.joints {
         let [a, b] = pair.map(|body| &problem.bodies[body].name);
         report.line(&format!("{a} and {b}"), count(*bonds));
+    }
+    let damage = problem.interface.pairs.iter().filter_map(|pair| {
+        let words = match (&pair.damage, pair_damage_laws(problem, pair)) {
+            (InterfaceDamage::Unbreakable, _) => "none".to_owned(),
+            (_, laws) => pair_damage(laws?),
+        };
+        let [a, b] = &pair.bodies;
+        Some((format!("{a} and {b}"), words))
+    });
+    let damage: Vec<_> = damage.collect();
+    if !damage.is_empty() {
+        report.heading("damage of bonds between bodies");
+    }
+    for (bodies, words) in damage {
+        report.line(&bodies, words);
+    }
+}
+
+/// Thresholds of the bonds of a pair with damage of its own, one if both ends have the same.
+fn pair_damage(laws: [DamageLaw; 2]) -> String {
+    let [first, second] = laws.map(|law| format!("{:.4e}", law.critical()));
+    let values = if first == second {
+        first
+    } else {
+        format!("{first} and {second}")
+    };
+    match laws[0] {
+        DamageLaw::CriticalStretch(_) => format!("critical stretch {values}"),
+        DamageLaw::BondEnergy(_) => format!("critical energy {values} J/m⁶"),
     }
 }
 

@@ -70,6 +70,33 @@ impl CriticalStretch {
         toughness * toughness / effective
     }
 
+    /// The critical stretch of bonds between two bodies that begin to open at a stress σ (Pa) normal to their interface: the
+    /// mean of the strains σ/E′ of both bodies in tension along the normal, which is the stretch of a bond along it that
+    /// lies in both by halves. E′ is E in 3-D, plane stress and uniaxial stress, E/(1−ν²) in plane strain and
+    /// E(1−ν)/((1+ν)(1−2ν)) under uniaxial strain.
+    pub fn from_strength(dimension: Dimension, bodies: [Isotropic; 2], strength: f64) -> f64 {
+        let [a, b] = bodies.map(|elastic| strength / Self::tensile_modulus(dimension, elastic));
+        0.5 * (a + b)
+    }
+
+    /// Stress over strain in tension along one direction, without load across it, Pa.
+    pub fn tensile_modulus(dimension: Dimension, elastic: Isotropic) -> f64 {
+        let (modulus, nu) = (elastic.youngs_modulus, elastic.poisson_ratio);
+        match dimension {
+            Dimension::Space
+            | Dimension::PlaneStress { .. }
+            | Dimension::Line {
+                constraint: Constraint::UniaxialStress,
+                ..
+            } => modulus,
+            Dimension::PlaneStrain { .. } => modulus / (1.0 - nu * nu),
+            Dimension::Line {
+                constraint: Constraint::UniaxialStrain,
+                ..
+            } => modulus * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)),
+        }
+    }
+
     /// The threshold of a point with this strength, 1 without scatter, whose intact bonds have this smallest stretch:
     /// s0 times the strength takes the place of s0.
     #[inline(always)]

@@ -111,7 +111,8 @@ impl Comparison<'_> {
             (old, new) => {
                 let values = [self.expression(0, old), self.expression(1, new)];
                 let same = match &values {
-                    [Some(old), Some(new)] => old == new,
+                    // A later end may need more rows of a table.
+                    [Some(old), Some(new)] => new.extends(old),
                     _ => old == new,
                 };
                 if !same {

@@ -1,10 +1,11 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, Static,
-    THERMAL_EXPANSION, VolumeCorrection, common_keys,
+    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, Rule,
+    Static, THERMAL_EXPANSION, Table, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
+use super::resolve::Scope;
 use crate::deck::spanned::Spanned;
 use crate::dimension::{Constraint, Dimension};
 use crate::error::{Error, Result};
@@ -15,9 +16,14 @@ use crate::problem::{self, CheckpointRule, HorizonRule, Interval, Problem};
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn explain(deck: &Deck, problem: &Problem) -> Result<String> {
+pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> {
     let mut deck = deck.clone();
     fill(&mut deck, problem);
+    // A file may change before a restart.
+    for (name, table) in &mut deck.table {
+        let [times, values] = scope.tables[name].rows();
+        *table.get_mut() = Table::of_rows(times, values);
+    }
     toml::to_string(&deck).map_err(|error| Error::run(format!("cannot write the deck: {error}")))
 }
 
@@ -57,6 +63,20 @@ fn fill(deck: &mut Deck, problem: &Problem) {
             body.spacing = body.spacing.take().or(grid.spacing.clone());
         }
         body.horizon = body.horizon.take().or(Some(grid.horizon.clone()));
+    }
+    let pairs = deck
+        .interface
+        .pair
+        .values_mut()
+        .zip(&problem.interface.pairs);
+    for (pair, resolved) in pairs {
+        let rule = match resolved.rule {
+            problem::InterfaceRule::None => Rule::None,
+            problem::InterfaceRule::Own => Rule::Own,
+            problem::InterfaceRule::Average => Rule::Average,
+            problem::InterfaceRule::Minimum => Rule::Minimum,
+        };
+        pair.get_mut().rule.get_or_insert(Spanned::new(0..0, rule));
     }
     if let (Some(table), Some(refinement)) = (&mut deck.refinement, &problem.refinement) {
         let table = table.get_mut();

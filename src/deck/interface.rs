@@ -1,20 +1,34 @@
 //! The bonds between the bodies of a deck, validated.
 
-use super::grammar::{self, Deck, Rule};
-use super::resolve::{Scope, find};
-use crate::deck::spanned::Spanned;
-use crate::error::Result;
-use crate::problem;
+use indexmap::IndexMap;
 
-/// Validates the rules of the bonds between bodies.
+use super::grammar::{self, Deck, Rule};
+use super::number::Number;
+use super::resolve::{Scope, find};
+use crate::damage::CriticalStretch;
+use crate::deck::spanned::Spanned;
+use crate::dimension::Dimension;
+use crate::error::Result;
+use crate::message::format_number;
+use crate::problem::{self, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Toughness};
+
+/// What stands for damage in a pair whose bonds never break.
+const UNBREAKABLE: &str = "none";
+
+/// The largest ratio of the stiffnesses of two bodies whose interface has a strength.
+const MAX_STIFFNESS_RATIO: f64 = 10.0;
+
+/// Validates the rules of the bonds between bodies, and damage that these have of their own.
 ///
 /// # Errors
-/// On bodies whose laws no bond can have, a rule that the laws of a pair do not allow, and on pairs that
+/// On bodies whose laws no bond can have, a rule or damage that the laws of a pair do not allow, and on pairs that
 /// are none or are given twice.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
+    dimension: Dimension,
     bodies: &[problem::Body],
+    damages: &IndexMap<String, problem::Damage>,
 ) -> Result<problem::Interface> {
     let mut pairs: Vec<(String, [usize; 2], &Spanned<Rule>)> = Vec::new();
     let default = Spanned::new(
@@ -31,7 +45,12 @@ pub fn interface(
     };
     for (name, table) in &deck.interface.pair {
         let key = format!("[interface.pair.{name}]");
+        let place = table.span();
         let table = table.get_ref();
+        if table.rule.is_none() && table.damage.is_none() && table.strength.is_none() {
+            let message = format!("{key}: give `rule`, `damage` or `strength`");
+            return Err(scope.error(place, message));
+        }
         let pair = pair(scope, &key, table, bodies)?;
         if let Some((earlier, ..)) = pairs.iter().find(|(_, other, _)| *other == pair) {
             let [a, b] = pair.map(|body| &bodies[body].name);
@@ -39,9 +58,23 @@ pub fn interface(
                 format!("{key} bodies: {earlier} has the bonds between `{a}` and `{b}` already");
             return Err(scope.error(table.bodies.span(), message));
         }
-        let names = pair.map(|body| bodies[body].name.clone());
-        interface.pairs.push((names, rule(&table.rule)));
-        pairs.push((key, pair, &table.rule));
+        let own_rule = table.rule.as_ref().unwrap_or(all);
+        let of_pair = Damages {
+            scope,
+            key: &key,
+            dimension,
+            bodies: pair.map(|body| &bodies[body]),
+            has_bonds: rule(own_rule) != InterfaceRule::None,
+        };
+        let (damage, span) = of_pair.damage(table, damages)?;
+        interface.pairs.push(InterfacePair {
+            name: name.clone(),
+            bodies: pair.map(|body| bodies[body].name.clone()),
+            rule: rule(own_rule),
+            damage,
+            span,
+        });
+        pairs.push((key, pair, own_rule));
     }
     for second in 1..bodies.len() {
         for first in 0..second {
@@ -57,6 +90,103 @@ pub fn interface(
         }
     }
     Ok(interface)
+}
+
+/// Damage of the bonds of a pair.
+struct Damages<'a> {
+    scope: &'a Scope<'a>,
+    key: &'a str,
+    dimension: Dimension,
+    bodies: [&'a problem::Body; 2],
+    has_bonds: bool,
+}
+
+impl Damages<'_> {
+    /// When the bonds break, and where that stands in the deck.
+    fn damage(
+        &self,
+        table: &grammar::Pair,
+        damages: &IndexMap<String, problem::Damage>,
+    ) -> Result<(InterfaceDamage, std::ops::Range<usize>)> {
+        let (scope, key) = (self.scope, self.key);
+        let name = table.damage.as_ref();
+        let (what, span) = match (name, &table.strength) {
+            (None, None) => return Ok((InterfaceDamage::OfBodies, 0..0)),
+            (Some(_), Some(strength)) => {
+                let message = format!(
+                    "{key} strength: gives the critical stretch of the bonds, which `damage` gives already; take one of them"
+                );
+                return Err(scope.error(strength.span(), message));
+            }
+            (Some(name), None) => ("damage", name.span()),
+            (None, Some(strength)) => ("strength", strength.span()),
+        };
+        if !self.has_bonds {
+            let message = format!(
+                "{key} {what}: no bonds join these bodies, by `rule = \"none\"`; give the pair another `rule`"
+            );
+            return Err(scope.error(span, message));
+        }
+        if let Some(strength) = &table.strength {
+            let damage = self.of_strength(strength)?;
+            return Ok((InterfaceDamage::Own(damage), span));
+        }
+        let name = name.expect("damage is given");
+        if name.get_ref() == UNBREAKABLE {
+            if damages.contains_key(UNBREAKABLE) {
+                let message = format!(
+                    "{key} damage: `{UNBREAKABLE}` means bonds that never break; give [damage.{UNBREAKABLE}] another name"
+                );
+                return Err(scope.error(span, message));
+            }
+            return Ok((InterfaceDamage::Unbreakable, span));
+        }
+        let names = damages.keys().map(String::as_str);
+        let index = scope.find_used("damage", name, names, &format!("{key} damage"))?;
+        Ok((InterfaceDamage::Own(damages[index].clone()), span))
+    }
+
+    /// The critical stretch that belongs to a strength.
+    fn of_strength(&self, strength: &Number) -> Result<problem::Damage> {
+        let key = format!("{} strength", self.key);
+        let stress = self.scope.positive(strength, &key)?;
+        let error = |message: String| {
+            let message = format!("{key}: {message}");
+            Err(self.scope.error(strength.span(), message))
+        };
+        for body in self.bodies {
+            let law = &body.material.law;
+            let declaration = law.declaration;
+            if declaration.critical_stretch.is_none() {
+                return error(format!(
+                    "bonds of `{}` break by their work, at which the stress depends on their length; give `damage`",
+                    declaration.name
+                ));
+            }
+            if !(declaration.invariants)(&law.values).conservative {
+                return error(format!(
+                    "the stress in `{}` does not follow from the stretch alone; give `damage`",
+                    declaration.name
+                ));
+            }
+        }
+        let elastic = self.bodies.map(|body| body.material.elastic);
+        let [a, b] =
+            elastic.map(|elastic| CriticalStretch::tensile_modulus(self.dimension, elastic));
+        let ratio = (a / b).max(b / a);
+        if ratio > MAX_STIFFNESS_RATIO {
+            return error(format!(
+                "is for bodies whose stiffnesses differ by a factor of {MAX_STIFFNESS_RATIO} at most, and these differ by \
+                 {}; give `damage` with a `critical_stretch`",
+                format_number((10.0 * ratio).round() / 10.0)
+            ));
+        }
+        let critical = CriticalStretch::from_strength(self.dimension, elastic, stress);
+        Ok(problem::Damage::new(
+            DamageRule::CriticalStretch,
+            Toughness::CriticalStretch(critical),
+        ))
+    }
 }
 
 fn rule(rule: &Spanned<Rule>) -> problem::InterfaceRule {

@@ -27,6 +27,7 @@ mod sets;
 mod shapes;
 pub mod source;
 pub mod spanned;
+mod tables;
 mod time;
 mod toml_error;
 mod validate;
@@ -118,18 +119,22 @@ impl Deck {
     /// # Errors
     /// As [`read`].
     pub fn problem(&self) -> Result<Problem> {
-        let scope = Scope::of(&self.source, &self.grammar)?;
-        let mut problem = validate::validate(&scope, &self.grammar)?;
-        problem.warnings = lints::lints(&scope, &self.grammar, &problem)?;
+        self.problem_in(&Scope::of(&self.source, &self.grammar)?)
+    }
+
+    fn problem_in(&self, scope: &Scope) -> Result<Problem> {
+        let mut problem = validate::validate(scope, &self.grammar)?;
+        problem.warnings = lints::lints(scope, &self.grammar, &problem)?;
         Ok(problem)
     }
 
-    /// The deck as TOML with every default written out.
+    /// The deck as TOML with every default written out, and the rows of tables in place of their files.
     ///
     /// # Errors
     /// As [`read`].
     pub fn explain(&self) -> Result<String> {
-        explain::explain(&self.grammar, &self.problem()?)
+        let scope = Scope::of(&self.source, &self.grammar)?;
+        explain::explain(&scope, &self.grammar, &self.problem_in(&scope)?)
     }
 }
 

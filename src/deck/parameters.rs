@@ -21,15 +21,8 @@ const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free
 pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<()> {
     for name in written.keys() {
         let text = name.get_ref();
-        let identifier = text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-            && !text.is_empty()
-            && !text.starts_with(|c: char| c.is_ascii_digit());
-        if !identifier || RESERVED.contains(&text.as_str()) {
-            let message = format!(
-                "[parameters] {text}: not a name for a parameter; it must consist of letters, \
-                 digits and `_`, start with no digit, and be none of {}",
-                RESERVED.join(", ")
-            );
+        if let Some(fault) = name_fault(text) {
+            let message = format!("[parameters] {text}: not a name for a parameter; {fault}");
             return Err(scope.error(name.span(), message));
         }
     }
@@ -48,6 +41,20 @@ pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<(
         }
     }
     Ok(())
+}
+
+/// Why expressions cannot use a name, if they cannot.
+pub fn name_fault(name: &str) -> Option<String> {
+    let is_identifier = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        && !name.is_empty()
+        && !name.starts_with(|c: char| c.is_ascii_digit());
+    let is_possible = is_identifier && !RESERVED.contains(&name);
+    (!is_possible).then(|| {
+        format!(
+            "it must consist of letters, digits and `_`, start with no digit, and be none of {}",
+            RESERVED.join(", ")
+        )
+    })
 }
 
 /// Gives a parameter another value or expression.

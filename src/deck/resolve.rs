@@ -2,17 +2,18 @@
 
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
+use std::sync::Arc;
 
 use indexmap::{IndexMap, IndexSet};
 use nalgebra::Vector3;
 
 use super::grammar::{Deck, DimensionName, Tables, Text};
 use super::number::{Number, Vector, Written};
-use super::parameters;
 use super::source::Source;
+use super::{names, parameters, tables};
 use crate::deck::spanned::Spanned;
 use crate::error::{Error, Result};
-use crate::expression::{Expression, POSITION_AND_TIME, Variable};
+use crate::expression::{Expression, POSITION_AND_TIME, Table, Variable};
 use crate::message::format_number;
 use crate::message::suggestion;
 
@@ -25,6 +26,8 @@ pub struct Scope<'a> {
     pub source: &'a Source,
     /// Named numbers.
     pub parameters: IndexMap<String, f64>,
+    /// Named tables.
+    pub tables: IndexMap<String, Arc<Table>>,
     /// Number of components of a vector.
     pub dimension: usize,
     /// Section and name of the tables that [`Self::find_used`] has found.
@@ -32,14 +35,15 @@ pub struct Scope<'a> {
 }
 
 impl<'a> Scope<'a> {
-    /// Evaluates the parameters, which may build on one another in any order.
+    /// Evaluates the parameters, which may build on one another in any order, and reads the tables.
     ///
     /// # Errors
-    /// On a name that hides a variable, on an unknown name and on a circle.
+    /// On a name that hides a variable, on an unknown name, on a circle and on a wrong table.
     pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {
             source,
             parameters: IndexMap::new(),
+            tables: IndexMap::new(),
             dimension: match deck.dimension.get_ref() {
                 DimensionName::Line => 1,
                 DimensionName::PlaneStress | DimensionName::PlaneStrain => 2,
@@ -48,6 +52,8 @@ impl<'a> Scope<'a> {
             used: RefCell::default(),
         };
         parameters::evaluate(&mut scope, &deck.parameters)?;
+        names::names(&scope, deck)?;
+        tables::read(&mut scope, deck)?;
         Ok(scope)
     }
 
@@ -151,9 +157,13 @@ impl<'a> Scope<'a> {
                 Variable::X | Variable::T | Variable::R => true,
             })
             .collect();
-        let names: Vec<&str> = self.parameters.keys().map(String::as_str).collect();
+        let names = self.parameters.keys().chain(self.tables.keys());
+        let names: Vec<&str> = names.map(String::as_str).collect();
         let lookup = |name: &str| self.parameters.get(name).copied();
-        let parsed = Expression::parse(text, &lookup, &names, &allowed).map_err(|error| {
+        let tables = self.tables.iter();
+        let tables: Vec<_> = tables.map(|(name, table)| (name.as_str(), table)).collect();
+        let parsed = Expression::parse_with_tables(text, &lookup, &names, &allowed, &tables);
+        let parsed = parsed.map_err(|error| {
             let span = number.span();
             // Where the string has escapes, the whole of it is marked.
             let raw = self.source.text.get(span.clone()).unwrap_or_default();
@@ -167,7 +177,23 @@ impl<'a> Scope<'a> {
             };
             self.error(marked, format!("{key}: {}", error.message))
         })?;
+        for table in parsed.tables() {
+            self.use_table(table);
+        }
         self.finite(parsed, number, key)
+    }
+
+    /// The name of a table.
+    pub fn table_name(&self, table: &Arc<Table>) -> &str {
+        let mut tables = self.tables.iter();
+        let found = tables.find(|(_, known)| Arc::ptr_eq(known, table));
+        found.map_or("", |(name, _)| name)
+    }
+
+    /// Note that a table is used.
+    fn use_table(&self, table: &Arc<Table>) {
+        let name = self.table_name(table).to_owned();
+        self.used.borrow_mut().insert(("table", name));
     }
 
     /// The expression, unless it is a constant that is not finite.

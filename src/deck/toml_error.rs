@@ -352,6 +352,9 @@ friction = 0.1
 bodies = ['a', 'b']
 [rigid.NAME]
 mass = 1
+[table.NAME]
+times = [0, 1]
+values = [0, 1]
 ";
 
     /// The first line of the error of a deck.

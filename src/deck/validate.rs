@@ -6,8 +6,8 @@ use super::grammar::{
 use super::number::{Edges, Number};
 use super::resolve::{Scope, resolve_each};
 use super::{
-    bodies, conditions, contact, damage, history, interface, materials, names, outputs, refinement,
-    rigid, sets, shapes, time,
+    bodies, conditions, contact, damage, history, interface, materials, outputs, refinement, rigid,
+    sets, shapes, tables, time,
 };
 use crate::deck::spanned::Spanned;
 use crate::dimension::{Constraint, Dimension};
@@ -20,7 +20,6 @@ use crate::problem::{self, Problem};
 /// # Errors
 /// The first mistake, with its place in the deck, the key and what would be right.
 pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
-    names::names(scope, deck)?;
     let dimension = dimension(scope, deck)?;
     let horizon = scope.length(&deck.grid.get_ref().horizon, "[grid] horizon")?;
     let spacing = match &deck.grid.get_ref().spacing {
@@ -38,7 +37,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let volume_correction = volume_correction(scope, deck, &bodies)?;
     let jitter = jitter(scope, deck)?;
     let family = family(scope, deck)?;
-    let interface = interface::interface(scope, deck, &bodies)?;
+    let interface = interface::interface(scope, deck, dimension, &bodies, &damages)?;
     let contact = contact::contact(scope, deck, &bodies)?;
     let refinement = refinement::refinement(scope, deck, &bodies)?;
     let cracks = resolve_each(&deck.crack, |name, table| shapes::crack(scope, name, table))?;
@@ -47,7 +46,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     let spacing = single(&deck.grid, spacing);
     let conditions = conditions::conditions(scope, deck, &sets, spacing)?;
     conditions::temperatures_act(scope, &conditions, bodies.iter().map(|body| &body.material))?;
-    Ok(Problem {
+    let problem = Problem {
         warnings: Vec::new(),
         title: deck.title.get_ref().clone(),
         places: places(deck),
@@ -75,7 +74,9 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
         balance: outputs::balance(scope, deck)?,
         sets,
         time,
-    })
+    };
+    tables::cover_the_run(scope, &problem)?;
+    Ok(problem)
 }
 
 fn places(deck: &Deck) -> problem::Places {

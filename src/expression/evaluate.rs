@@ -1,7 +1,9 @@
 //! The postfix code of an expression, its folding of constants, and the arithmetic of its
 //! operations.
 
-use super::Variable;
+use std::sync::Arc;
+
+use super::{Table, Variable};
 
 /// Largest magnitude of an integer exponent that is raised by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
@@ -20,6 +22,8 @@ pub(super) enum Instruction {
     Constant(f64),
     /// Pushes the value of a variable.
     Variable(Variable),
+    /// Pushes the value of the table with this number.
+    Table(usize),
     /// Replaces the topmost value.
     Unary(Unary),
     /// Replaces the two topmost values by one.
@@ -263,7 +267,9 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     let mut largest = 0;
     for instruction in code {
         match instruction {
-            Instruction::Constant(_) | Instruction::Variable(_) => size += 1,
+            Instruction::Constant(_) | Instruction::Variable(_) | Instruction::Table(_) => {
+                size += 1;
+            }
             Instruction::Unary(_) => {}
             Instruction::Binary(_) => size -= 1,
             Instruction::Ternary(_) => size -= 2,
@@ -280,7 +286,7 @@ pub(super) fn is_truth(code: &[Instruction]) -> bool {
     for instruction in code {
         let truth = match instruction {
             Instruction::Constant(value) => *value == 0.0 || *value == 1.0,
-            Instruction::Variable(_) => false,
+            Instruction::Variable(_) | Instruction::Table(_) => false,
             Instruction::Unary(operation) => {
                 let operand = take(&mut truths);
                 match operation {
@@ -318,16 +324,21 @@ pub(super) fn is_truth(code: &[Instruction]) -> bool {
 
 /// The code's value with the variables x, y, z, t, where `stack_size` is what
 /// the function of that name says.
-pub(super) fn evaluate(code: &[Instruction], stack_size: usize, variables: [f64; 4]) -> f64 {
+pub(super) fn evaluate(
+    code: &[Instruction],
+    tables: &[Arc<Table>],
+    stack_size: usize,
+    variables: [f64; 4],
+) -> f64 {
     match code {
         [Instruction::Constant(value)] => *value,
-        _ if stack_size <= SHALLOW_STACK => run::<SHALLOW_STACK>(code, variables),
-        _ => run::<DEEP_STACK>(code, variables),
+        _ if stack_size <= SHALLOW_STACK => run::<SHALLOW_STACK>(code, tables, variables),
+        _ => run::<DEEP_STACK>(code, tables, variables),
     }
 }
 
 /// Runs the code on a stack of a fixed size.
-fn run<const SIZE: usize>(code: &[Instruction], variables: [f64; 4]) -> f64 {
+fn run<const SIZE: usize>(code: &[Instruction], tables: &[Arc<Table>], variables: [f64; 4]) -> f64 {
     let mut stack = [0.0; SIZE];
     let mut size = 0;
     for instruction in code {
@@ -338,6 +349,10 @@ fn run<const SIZE: usize>(code: &[Instruction], variables: [f64; 4]) -> f64 {
             }
             Instruction::Variable(variable) => {
                 stack[size] = variables[variable.slot()];
+                size += 1;
+            }
+            Instruction::Table(number) => {
+                stack[size] = tables[number].at(variables[Variable::T.slot()]);
                 size += 1;
             }
             Instruction::Unary(operation) => {

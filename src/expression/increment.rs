@@ -5,8 +5,10 @@
 //! its operands, by identities such as sin b − sin a = 2 cos((a + b)/2) sin((b − a)/2); so the error is one of
 //! the change.
 
-use super::Variable;
+use std::sync::Arc;
+
 use super::evaluate::{Binary, Instruction, Ternary, Unary};
+use super::{Table, Variable};
 
 /// A value, and how it changes.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +24,12 @@ impl Moving {
 }
 
 /// By how much the code's value changes while the time does so by `step`, from the variables x, y, z, t on.
-pub(super) fn increment(code: &[Instruction], variables: [f64; 4], step: f64) -> f64 {
+pub(super) fn increment(
+    code: &[Instruction],
+    tables: &[Arc<Table>],
+    variables: [f64; 4],
+    step: f64,
+) -> f64 {
     let mut stack: Vec<Moving> = Vec::with_capacity(code.len());
     let take = |stack: &mut Vec<Moving>| stack.pop().expect("postfix code has its operands");
     for instruction in code {
@@ -32,6 +39,13 @@ pub(super) fn increment(code: &[Instruction], variables: [f64; 4], step: f64) ->
                 value: variables[variable.slot()],
                 change: if variable == Variable::T { step } else { 0.0 },
             },
+            Instruction::Table(number) => {
+                let (table, time) = (&tables[number], variables[Variable::T.slot()]);
+                Moving {
+                    value: table.at(time),
+                    change: table.increment(time, step),
+                }
+            }
             Instruction::Unary(operation) => unary(operation, take(&mut stack)),
             Instruction::Binary(operation) => {
                 let right = take(&mut stack);

@@ -21,7 +21,7 @@
 //!
 //! The variables are `x`, `y`, `z` and `t`, as far as they are allowed where the expression stands;
 //! the only constant is `pi`. These names, and not those of functions, hide parameters of the same
-//! name. The functions are:
+//! name. Names of [tables](Table) are values by time, and may be used where `t` may be. The functions are:
 //!
 //! - `sin` `cos` `tan` `asin` `acos` `atan` `atan2(y, x)` `sinh` `cosh` `tanh`, in radians;
 //! - `exp`, `log` (natural), `log10`, `sqrt`, `abs`, `floor`, `ceil`, `hypot(a, b)`;
@@ -44,12 +44,15 @@ mod evaluate;
 mod increment;
 mod names;
 mod parse;
+mod table;
 mod token;
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::error::{self, Error};
 use evaluate::Instruction;
+pub use table::Table;
 
 /// A variable that an expression may use at evaluation time, beside named parameters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -140,6 +143,8 @@ pub struct Expression {
     code: Vec<Instruction>,
     /// The most values that the code has on its stack at once.
     stack_size: usize,
+    /// Tables that the code reads, by number, in the order of their first use.
+    tables: Vec<Arc<Table>>,
 }
 
 impl Expression {
@@ -177,16 +182,75 @@ impl Expression {
         known_names: &[&str],
         variables: &[Variable],
     ) -> Result<Self, ExpressionError> {
+        Self::parse_with_tables(text, parameters, known_names, variables, &[])
+    }
+
+    /// As [`Self::parse`], with the names of these tables.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::parse`], and if a table is named where `t` may not be used.
+    pub fn parse_with_tables(
+        text: &str,
+        parameters: &dyn Fn(&str) -> Option<f64>,
+        known_names: &[&str],
+        variables: &[Variable],
+        tables: &[(&str, &Arc<Table>)],
+    ) -> Result<Self, ExpressionError> {
         let scope = names::Scope {
             parameters,
             known_names,
             variables,
+            tables,
         };
-        let code = parse::parse(text, &scope)?;
+        let mut code = parse::parse(text, &scope)?;
+        // Expressions with the same tables are equal whatever other tables there are.
+        let mut used: Vec<usize> = Vec::new();
+        for instruction in &mut code {
+            if let Instruction::Table(number) = instruction {
+                let known = used.iter().position(|known| known == number);
+                let own = known.unwrap_or_else(|| {
+                    used.push(*number);
+                    used.len() - 1
+                });
+                *number = own;
+            }
+        }
         Ok(Self {
             stack_size: evaluate::stack_size(&code),
             code,
+            tables: used
+                .iter()
+                .map(|number| tables[*number].1.clone())
+                .collect(),
         })
+    }
+
+    /// The values of a table, whose first and last segment go on beyond its rows.
+    pub fn of_table(table: Table) -> Self {
+        Self {
+            code: vec![Instruction::Table(0)],
+            stack_size: 1,
+            tables: vec![Arc::new(table)],
+        }
+    }
+
+    /// The tables that the expression reads.
+    pub fn tables(&self) -> &[Arc<Table>] {
+        &self.tables
+    }
+
+    /// Whether the expression is the same as another one up to the end of the tables of that one.
+    pub fn extends(&self, other: &Self) -> bool {
+        let mut tables = self.tables.iter().zip(&other.tables);
+        self.code == other.code
+            && self.tables.len() == other.tables.len()
+            && tables.all(|(own, other)| own.extends(other))
+    }
+
+    /// Whether a name is that of a function.
+    pub fn is_function(name: &str) -> bool {
+        names::is_function(name)
     }
 
     /// The expression that has the same value everywhere and always.
@@ -194,20 +258,21 @@ impl Expression {
         Self {
             code: vec![Instruction::Constant(value)],
             stack_size: 1,
+            tables: Vec::new(),
         }
     }
 
     /// The value at a position and a time.
     pub fn evaluate(&self, position: [f64; 3], time: f64) -> f64 {
         let [x, y, z] = position;
-        evaluate::evaluate(&self.code, self.stack_size, [x, y, z, time])
+        evaluate::evaluate(&self.code, &self.tables, self.stack_size, [x, y, z, time])
     }
 
     /// By how much the value changes from a time on while the time goes on by a step, or back by a negative
     /// one; with an error of rounding that is one of the change, not of the value.
     pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
         let [x, y, z] = position;
-        increment::increment(&self.code, [x, y, z, time], step)
+        increment::increment(&self.code, &self.tables, [x, y, z, time], step)
     }
 
     /// Whether the value is not 0.
@@ -220,9 +285,10 @@ impl Expression {
         evaluate::is_truth(&self.code)
     }
 
-    /// Whether the variable occurs in the expression.
+    /// Whether the value depends on the variable; tables depend on `t`.
     pub fn uses(&self, variable: Variable) -> bool {
         self.code.contains(&Instruction::Variable(variable))
+            || variable == Variable::T && !self.tables.is_empty()
     }
 
     /// The value, if no variable occurs in the expression.

@@ -1,7 +1,9 @@
 //! The functions, and what the other names in an expression mean.
 
-use super::Variable;
+use std::sync::Arc;
+
 use super::evaluate::{Binary, Instruction, Ternary, Unary};
+use super::{Table, Variable};
 
 /// How many of the known names an error message lists.
 const MOST_NAMES_LISTED: usize = 16;
@@ -59,6 +61,13 @@ pub(super) struct Scope<'a> {
     pub(super) known_names: &'a [&'a str],
     /// The variables that may be used.
     pub(super) variables: &'a [Variable],
+    /// Tables by name.
+    pub(super) tables: &'a [(&'a str, &'a Arc<Table>)],
+}
+
+/// Whether a function has that name.
+pub(super) fn is_function(name: &str) -> bool {
+    FUNCTIONS.iter().any(|(known, _)| *known == name)
 }
 
 impl Scope<'_> {
@@ -67,8 +76,10 @@ impl Scope<'_> {
         if let Some((_, function)) = FUNCTIONS.iter().find(|(known, _)| *known == name) {
             return Ok(*function);
         }
-        let is_value =
-            name == PI || Variable::from_name(name).is_some() || (self.parameters)(name).is_some();
+        let is_value = name == PI
+            || Variable::from_name(name).is_some()
+            || (self.parameters)(name).is_some()
+            || self.table(name).is_some();
         let message = if is_value {
             format!("`{name}` is not a function; to multiply, write `{name} * (…)`")
         } else {
@@ -80,6 +91,11 @@ impl Scope<'_> {
             )
         };
         Err(message)
+    }
+
+    /// The number of the table of that name.
+    fn table(&self, name: &str) -> Option<usize> {
+        self.tables.iter().position(|(known, _)| *known == name)
     }
 
     /// What pushes the value of that name, or the message about it.
@@ -100,7 +116,16 @@ impl Scope<'_> {
         if let Some(value) = (self.parameters)(name) {
             return Ok(Instruction::Constant(value));
         }
-        Err(if FUNCTIONS.iter().any(|(known, _)| *known == name) {
+        if let Some(number) = self.table(name) {
+            return if self.variables.contains(&Variable::T) {
+                Ok(Instruction::Table(number))
+            } else {
+                Err(format!(
+                    "`{name}` cannot be used here: a table is a value by time, and this expression may not use `t`"
+                ))
+            };
+        }
+        Err(if is_function(name) {
             format!("`{name}` is a function: write `{name}(…)`")
         } else if self.known_names.contains(&name) {
             format!("`{name}` has no value that could be used here")

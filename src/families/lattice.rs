@@ -296,7 +296,8 @@ impl BondLattice {
 
     /// Make unbreakable every bond with an end (local index) for which `protected` holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
-        let mut breakable = vec![u8::MAX; self.store.intact.len()];
+        let all = || vec![u8::MAX; self.store.intact.len()];
+        let mut breakable = self.store.breakable.take().unwrap_or_else(all);
         self.for_each(|byte, lane, ends| {
             if ends.into_iter().any(&protected) {
                 breakable[byte] &= !(1 << lane);

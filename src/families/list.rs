@@ -162,7 +162,8 @@ impl BondList {
 
     /// Make unbreakable every bond with an end (local index) for which `protected` holds.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
-        let mut breakable = vec![u8::MAX; self.neighbours.len()];
+        let all = || vec![u8::MAX; self.neighbours.len()];
+        let mut breakable = self.store.breakable.take().unwrap_or_else(all);
         for row in 0..self.points.len() {
             let protected_i = protected(self.points[row] as usize);
             for group in self.starts[row]..self.starts[row + 1] {

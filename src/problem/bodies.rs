@@ -112,23 +112,74 @@ pub enum FamilyRule {
 pub struct Interface {
     /// The rule of pairs without one of their own.
     pub rule: InterfaceRule,
-    /// Pairs of bodies, by name, with a rule of their own.
-    pub pairs: Vec<([String; 2], InterfaceRule)>,
+    /// Pairs of bodies that have a rule or damage of their own.
+    pub pairs: Vec<InterfacePair>,
+}
+
+/// The bonds between two bodies.
+#[derive(Debug, Clone)]
+pub struct InterfacePair {
+    /// Its name in the deck.
+    pub name: String,
+    /// Names of the two bodies, in any order.
+    pub bodies: [String; 2],
+    /// Constants of the bonds.
+    pub rule: InterfaceRule,
+    /// When the bonds break.
+    pub damage: InterfaceDamage,
+    /// Where that stands in the deck.
+    pub span: Range<usize>,
+}
+
+/// When the bonds between two bodies break.
+#[derive(Debug, Clone, PartialEq)]
+pub enum InterfaceDamage {
+    /// By the damage of both bodies: at the smaller of two thresholds.
+    OfBodies,
+    /// Never.
+    Unbreakable,
+    /// By damage of their own, whatever that of the bodies is.
+    Own(Damage),
 }
 
 impl Interface {
+    /// The pair of two bodies, in any order, if it is listed.
+    fn pair(&self, here: &Body, there: &Body) -> Option<&InterfacePair> {
+        self.pairs.iter().find(|pair| {
+            let [a, b] = &pair.bodies;
+            (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)
+        })
+    }
+
     /// The rule of the bonds between two bodies; the same for both orders. Within a body each end has its
     /// own constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
         }
-        let joins = |names: &[String; 2]| {
-            let [a, b] = [&names[0], &names[1]];
-            (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)
-        };
-        let own = self.pairs.iter().find(|(names, _)| joins(names));
-        own.map_or(self.rule, |(_, rule)| *rule)
+        let own = self.pair(here, there);
+        own.map_or(self.rule, |pair| pair.rule)
+    }
+
+    /// When the bonds between two bodies break; the same for both orders. Within a body its own damage counts.
+    pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
+        let own = self.pair(here, there);
+        own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
+    }
+}
+
+impl InterfacePair {
+    /// Damage of its own, if it has any.
+    pub fn own_damage(&self) -> Option<&Damage> {
+        match &self.damage {
+            InterfaceDamage::Own(damage) => Some(damage),
+            InterfaceDamage::OfBodies | InterfaceDamage::Unbreakable => None,
+        }
+    }
+
+    /// Whether a body is one of the two.
+    pub fn has(&self, body: &Body) -> bool {
+        self.bodies.contains(&body.name)
     }
 }
 

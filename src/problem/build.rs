@@ -168,6 +168,14 @@ impl Action {
     }
 }
 
+impl Problem {
+    /// Whether any bonds can break.
+    pub fn has_damage(&self) -> bool {
+        self.bodies.iter().any(|body| body.damage.is_some())
+            || (self.interface.pairs.iter()).any(|pair| pair.own_damage().is_some())
+    }
+}
+
 impl Material {
     /// A material without damping and thermal expansion; the density is in kg/m³.
     pub fn new(law: Law, density: f64, elastic: Isotropic) -> Self {

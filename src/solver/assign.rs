@@ -11,10 +11,11 @@ use crate::material::{Built, Given, PairLaw};
 use crate::memory::check_room;
 use crate::points::distance_squared;
 use crate::problem::{
-    self, Block, Body, DamageRule, InterfaceRule, Problem, Toughness, VolumeCorrection,
+    self, Block, Body, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Problem,
+    Toughness, VolumeCorrection,
 };
 
-use super::bonds::{BlockLaws, Interaction};
+use super::bonds::{BlockLaws, Interaction, PairReads};
 use super::model::Model;
 
 /// The elastic constants and the horizon (m) that an end of bonds has.
@@ -77,6 +78,56 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
         damage_is_possible(problem, body)?;
         expansion_is_possible(problem, body)?;
     }
+    for pair in &problem.interface.pairs {
+        if let Some(damage) = pair.own_damage() {
+            pair_damage_is_possible(problem, pair, damage)?;
+        }
+    }
+    Ok(())
+}
+
+/// An error if the bonds between two bodies cannot break by damage of their own.
+fn pair_damage_is_possible(
+    problem: &Problem,
+    pair: &InterfacePair,
+    damage: &problem::Damage,
+) -> Result<()> {
+    let error = |message: String| {
+        let message = format!("[interface.pair.{}] damage: {message}", pair.name);
+        Err(Error::input(message).at(&pair.span))
+    };
+    let of_points = [
+        (damage.alpha > 0.0, "alpha"),
+        (damage.weibull.is_some(), "weibull_modulus"),
+    ];
+    if let Some((_, key)) = of_points.into_iter().find(|(is, _)| *is) {
+        return error(format!(
+            "`{key}` belongs to the points of a body and not to the bonds of a pair; give the pair damage without it"
+        ));
+    }
+    if damage.rule.is_unmeasured() {
+        let message =
+            "`calibration = \"opening\"` is measured on a block of one body; take \"energy\"";
+        return error(message.to_owned());
+    }
+    let bodies = problem.bodies.iter().filter(|body| pair.has(body));
+    for body in bodies.clone() {
+        let fault = body.material.law.damage_fault(damage);
+        let fault = fault.or_else(|| damage_fault(problem, body, damage));
+        if let Some(fault) = fault {
+            return error(format!("[body.{}]: {fault}", body.name));
+        }
+    }
+    let mut by_work = bodies.map(|body| (breaks_by_work(body, damage), &body.name));
+    if let (Some((first, a)), Some((second, b))) = (by_work.next(), by_work.next())
+        && first != second
+    {
+        let [work, stretch] = if first { [a, b] } else { [b, a] };
+        return error(format!(
+            "bonds break by their work in `{work}` and by their stretch in the bond-based law of `{stretch}`; take \
+             `critical_stretch` damage, or the same kind of law in both bodies"
+        ));
+    }
     Ok(())
 }
 
@@ -116,14 +167,11 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         let message = format!("[body.{}] damage: {message}", body.name);
         Err(Error::input(message).at(&body.span))
     };
-    if let DamageRule::Energy { calibration, .. } = damage.rule
-        && !calibration.is_for(problem.dimension.count())
-    {
-        return error(format!(
-            "the calibration {calibration:?} has no formula in this dimension"
-        ));
-    }
-    let meets = |other: &Body| problem.interface.between(body, other) != InterfaceRule::None;
+    let meets = |other: &Body| {
+        let interface = &problem.interface;
+        interface.between(body, other) != InterfaceRule::None
+            && *interface.damage_between(body, other) == InterfaceDamage::OfBodies
+    };
     let of_other_kind = problem.bodies.iter().find(|other| {
         let differs = |damage| breaks_by_work(other, damage) != by_work;
         other.damage.as_ref().is_some_and(differs) && meets(other)
@@ -136,32 +184,45 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
             other.name
         ));
     }
+    damage_fault(problem, body, damage).map_or(Ok(()), error)
+}
+
+/// Why bonds of a body cannot break by this damage in this problem, if they cannot.
+fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
+    if let DamageRule::Energy { calibration, .. } = damage.rule
+        && !calibration.is_for(problem.dimension.count())
+    {
+        return Some(format!(
+            "the calibration {calibration:?} has no formula in this dimension"
+        ));
+    }
     if damage.rule.is_unmeasured() {
         let message = "what opening the body costs has not been measured: take the problem that \
                        `solver::calibration::calibrated` returns";
-        return error(message.to_owned());
+        return Some(message.to_owned());
     }
     let by_energy = damage.rule != DamageRule::CriticalStretch;
     if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {
-        return error("a critical stretch is no measure of energy".to_owned());
+        return Some("a critical stretch is no measure of energy".to_owned());
     }
-    if !by_work {
-        return Ok(());
+    if !breaks_by_work(body, damage) || problem.volume_correction == VolumeCorrection::None {
+        return None;
     }
     let block = Block::unrefined(body);
-    let influenced = build(problem, body, constants(problem, &block, &block)).influence;
-    if influenced.is_some() && problem.volume_correction != VolumeCorrection::None {
-        return error(
-            "energy damage needs a constant influence, or \
-             `[grid] volume_correction = \"none\"`"
-                .to_owned(),
-        );
-    }
-    Ok(())
+    let constants = constants(problem, &block, &block);
+    let influence = build(problem, body, Some(damage), constants).influence;
+    influence.is_some().then(|| {
+        "energy damage needs a constant influence, or `[grid] volume_correction = \"none\"`".to_owned()
+    })
 }
 
-/// What the law of a body is made from.
-fn given<'a>(problem: &Problem, body: &'a Body, constants: Constants) -> Given<'a> {
+/// What the law of a body is made from, for bonds that break by this damage.
+fn given<'a>(
+    problem: &Problem,
+    body: &'a Body,
+    damage: Option<&problem::Damage>,
+    constants: Constants,
+) -> Given<'a> {
     // A critical stretch that the problem gives itself holds for all bonds.
     let itself =
         |damage: &problem::Damage| matches!(damage.toughness, Toughness::CriticalStretch(_));
@@ -170,13 +231,18 @@ fn given<'a>(problem: &Problem, body: &'a Body, constants: Constants) -> Given<'
         elastic: constants.elastic,
         horizon: constants.horizon,
         values: &body.material.law.values,
-        from_fracture_energy: body.damage.as_ref().is_some_and(|damage| !itself(damage)),
+        from_fracture_energy: damage.is_some_and(|damage| !itself(damage)),
     }
 }
 
-/// The law of a body with these constants.
-fn build(problem: &Problem, body: &Body, constants: Constants) -> Built {
-    (body.material.law.declaration.build)(&given(problem, body, constants))
+/// The law of a body with these constants, for bonds that break by this damage.
+fn build(
+    problem: &Problem,
+    body: &Body,
+    damage: Option<&problem::Damage>,
+    constants: Constants,
+) -> Built {
+    (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
 /// The share of a block's cells in the families of a horizon.
@@ -212,18 +278,49 @@ pub fn cutoffs(problem: &Problem) -> Vec<f64> {
 /// What the points of a block follow.
 pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     let constants = constants(problem, block, block);
+    let body = block.body;
+    let damage = body.damage.as_ref();
     BlockLaws {
-        law: build(problem, block.body, constants).law,
-        damage: damage(problem, block.body, constants),
-        weibull: (block.body.damage.as_ref()).and_then(|damage| damage.weibull),
+        law: build(problem, body, damage, constants).law,
+        damage: damage.map(|damage| damage_law(problem, body, damage, constants)),
+        weibull: damage.and_then(|damage| damage.weibull),
+        pairs: pair_reads(problem, body),
     }
 }
 
-/// The damage law of a block.
-fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<DamageLaw> {
-    let damage = body.damage.as_ref()?;
+/// What the criteria of the pairs of a body with damage of their own read.
+fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
+    let block = Block::unrefined(body);
+    let mut reads = PairReads::default();
+    for pair in problem.interface.pairs.iter().filter(|pair| pair.has(body)) {
+        if let Some(damage) = pair.own_damage() {
+            let law = damage_law(problem, body, damage, constants(problem, &block, &block));
+            reads.add(&law);
+        }
+    }
+    reads
+}
+
+/// The damage laws that a pair of bodies has of its own, those of both bodies in their order in the problem; `None` if the
+/// damage of the bodies counts.
+pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[DamageLaw; 2]> {
+    let damage = pair.own_damage()?;
+    let mut bodies = problem.bodies.iter().filter(|body| pair.has(body));
+    let [first, second] = [bodies.next()?, bodies.next()?].map(Block::unrefined);
+    Some([(&first, &second), (&second, &first)].map(|(here, there)| {
+        damage_law(problem, here.body, damage, constants(problem, here, there))
+    }))
+}
+
+/// The damage law of bonds at an end with these constants.
+fn damage_law(
+    problem: &Problem,
+    body: &Body,
+    damage: &problem::Damage,
+    constants: Constants,
+) -> DamageLaw {
     let (dimension, elastic) = (problem.dimension, constants.elastic);
-    let given = given(problem, body, constants);
+    let given = given(problem, body, Some(damage), constants);
     let of_law = body.material.law.declaration.critical_stretch;
     let stretch = |energy: f64| match of_law {
         Some(stretch) => stretch(&given, energy),
@@ -236,10 +333,7 @@ fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<Damage
         }
         Toughness::CriticalStretch(critical) => {
             let alpha = damage.alpha;
-            return Some(DamageLaw::CriticalStretch(CriticalStretch {
-                critical,
-                alpha,
-            }));
+            return DamageLaw::CriticalStretch(CriticalStretch { critical, alpha });
         }
     };
     let energy = match damage.rule {
@@ -247,7 +341,7 @@ fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<Damage
         DamageRule::Energy { calibration, .. } => energy * calibration.share(dimension),
     };
     let (critical, alpha) = (stretch(energy), damage.alpha);
-    Some(match damage.rule {
+    match damage.rule {
         DamageRule::Energy { work, .. } if breaks_by_work(body, damage) => {
             DamageLaw::BondEnergy(BondEnergy {
                 critical: BondEnergy::from_energy(dimension, energy, constants.horizon),
@@ -257,7 +351,28 @@ fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<Damage
             })
         }
         _ => DamageLaw::CriticalStretch(CriticalStretch { critical, alpha }),
-    })
+    }
+}
+
+/// When the bonds of a pair with damage of its own break. Each end has the damage law of its own constants, and the ends
+/// of the bonds have these stiffnesses.
+fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
+    use DamageLaw::{BondEnergy, CriticalStretch};
+    match laws {
+        [CriticalStretch(i), CriticalStretch(j)] if i.critical == j.critical => {
+            Criterion::Stretch(i.critical)
+        }
+        [CriticalStretch(i), CriticalStretch(j)] => {
+            // Each end takes what its own stretch takes, and never that of the other point.
+            let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
+            let conversion = StretchConversion { ratios, stiffness };
+            Criterion::StretchBetween([i.critical, j.critical], conversion)
+        }
+        [BondEnergy(i), BondEnergy(j)] => {
+            Criterion::Work([0.5 * i.critical, 0.5 * j.critical], i.rule)
+        }
+        _ => unreachable!("a pair breaks by stretch or by work"),
+    }
 }
 
 /// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
@@ -336,12 +451,20 @@ pub fn assign<const D: usize>(
     let give = |mut bonds: BlockBonds| {
         let indices = bonds.blocks();
         let [here, there] = indices.map(|block| problem.block(block));
+        let own_damage = problem.interface.damage_between(here.body, there.body);
         let ends = [(here, there), (there, here)].map(|(block, other)| {
             let constants = constants(problem, &block, &other);
             let horizon = constants.horizon;
+            let own_damage = match own_damage {
+                InterfaceDamage::Own(damage) => Some(damage),
+                InterfaceDamage::OfBodies | InterfaceDamage::Unbreakable => None,
+            };
+            let damage = own_damage.or(block.body.damage.as_ref());
             End {
                 stiffness: bond_stiffness(&constants, problem.dimension),
-                built: build(problem, block.body, constants),
+                built: build(problem, block.body, damage, constants),
+                own_damage: own_damage
+                    .map(|damage| damage_law(problem, block.body, damage, constants)),
                 horizon,
                 share: cell_share(problem, &other, horizon),
             }
@@ -349,7 +472,11 @@ pub fn assign<const D: usize>(
         weigh(problem, model, &mut bonds, &ends)?;
         let horizons = ends.each_ref().map(|end| end.horizon);
         let stiffness = ends.each_ref().map(|end| end.stiffness);
-        let criterion = criterion(problem, blocks, indices, (horizons, stiffness), per_point);
+        let criterion = match (own_damage, ends.each_ref().map(|end| end.own_damage)) {
+            (InterfaceDamage::Unbreakable, _) => Criterion::Never,
+            (_, [Some(own), Some(far)]) => pair_criterion([own, far], stiffness),
+            _ => criterion(problem, blocks, indices, (horizons, stiffness), per_point),
+        };
         let [own, far] = ends.map(|end| end.built.law);
         Ok(Interaction {
             bonds,
@@ -366,6 +493,8 @@ struct End {
     built: Built,
     /// As [`bond_stiffness`].
     stiffness: f64,
+    /// The damage law of a pair with damage of its own.
+    own_damage: Option<DamageLaw>,
     /// m.
     horizon: f64,
     /// The share of the other body's cells in its families.

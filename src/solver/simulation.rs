@@ -7,7 +7,7 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Initial, Problem, Stage, Time};
+use crate::problem::{Action, Condition, Damage, Initial, Problem, Stage, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
@@ -211,7 +211,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             damping: model.damping.iter().any(|rate| *rate > 0.0),
             equilibria: problem.is_quasi_static(),
             relaxation: problem.has_relaxation(),
-            damage: problem.bodies.iter().any(|body| body.damage.is_some()),
+            damage: problem.has_damage(),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
             coarsening: refinement::may_coarsen(problem),
@@ -589,7 +589,7 @@ fn starts_deformed(problem: &Problem) -> bool {
         let action = &condition.action;
         matches!(action, Action::Displacement(_) | Action::Temperature(_))
     };
-    problem.bodies.iter().any(|body| body.damage.is_some())
+    problem.has_damage()
         && (problem.initials.iter().any(displaced) || problem.conditions.iter().any(placed))
 }
 
@@ -631,38 +631,56 @@ fn pre_crack<const D: usize>(
     counts.into_iter().map(Cell::into_inner).collect()
 }
 
-/// Makes the bonds of no-failure zones unbreakable.
+/// Makes the bonds of no-failure zones unbreakable: those of bodies, and those of pairs of bodies with damage of their own.
 fn protect<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
     comm: &dyn Communicator,
     forces: &mut Forces<D>,
 ) {
-    let laws = problem
+    let body_of = |block: usize| problem.block(block).body;
+    let mut protected = vec![0.0; model.volume.len()];
+    for body in &problem.bodies {
+        if let Some(damage) = &body.damage {
+            let is_own = |block| body_of(block).name == body.name;
+            mark_no_failure(problem, model, damage, is_own, &mut protected);
+        }
+    }
+    let no_failure = |damage: &Damage| !damage.no_failure.is_empty();
+    let mut damages = problem
         .bodies
         .iter()
         .filter_map(|body| body.damage.as_ref());
-    let mut sets: Vec<usize> = laws
-        .flat_map(|law| law.no_failure.iter().copied())
-        .collect();
-    sets.sort_unstable();
-    sets.dedup();
-    if sets.is_empty() {
-        return;
+    if damages.any(no_failure) {
+        forces.protect(comm, &model.block, &mut protected, |_| true);
     }
-    let mut protected = vec![0.0; model.volume.len()];
-    for set in sets {
-        for point in members(problem, model, set) {
-            let block = usize::from(model.block[point as usize]);
-            let body = problem.block(block).body;
-            if body
-                .damage
-                .as_ref()
-                .is_some_and(|law| law.no_failure.contains(&set))
-            {
-                protected[point as usize] = 1.0;
+    for pair in &problem.interface.pairs {
+        let Some(damage) = pair.own_damage().filter(|damage| no_failure(damage)) else {
+            continue;
+        };
+        let is_own = |block| pair.has(body_of(block));
+        protected.fill(0.0);
+        mark_no_failure(problem, model, damage, is_own, &mut protected);
+        forces.protect(comm, &model.block, &mut protected, |[i, j]| {
+            problem.body_of(i) != problem.body_of(j) && is_own(i) && is_own(j)
+        });
+    }
+}
+
+/// Sets the entries of the no-failure points of a damage law to 1, in blocks for which `is_own` holds.
+fn mark_no_failure<const D: usize>(
+    problem: &Problem,
+    model: &Model<D>,
+    damage: &Damage,
+    is_own: impl Fn(usize) -> bool,
+    protected: &mut [f64],
+) {
+    for set in &damage.no_failure {
+        for point in members(problem, model, *set) {
+            let point = point as usize;
+            if is_own(usize::from(model.block[point])) {
+                protected[point] = 1.0;
             }
         }
     }
-    forces.protect(comm, &model.block, &mut protected);
 }

@@ -204,8 +204,7 @@ fn saved_width(problem: &Problem) -> usize {
         0
     };
     let worked = usize::from(!problem.conditions.is_empty());
-    let breaks = problem.bodies.iter().any(|body| body.damage.is_some());
-    let broken = if breaks { 4 } else { 0 };
+    let broken = if problem.has_damage() { 4 } else { 0 };
     let damped = problem
         .bodies
         .iter()

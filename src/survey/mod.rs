@@ -18,12 +18,12 @@ pub use size::{Size, size};
 pub use speed::{Speed, speed};
 
 use crate::comm::total;
-use crate::damage::DamageLaw;
+use crate::damage::{CriticalStretch, DamageLaw};
 use crate::error::Warning;
 use crate::message::format_number;
 use crate::problem::{Block, PointSource, Problem, Selector, Stage, StepRule};
 use crate::solver::Simulation;
-use crate::solver::assign::block_laws;
+use crate::solver::assign::{block_laws, pair_damage_laws};
 use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
@@ -135,17 +135,28 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    for body in &problem.bodies {
-        let critical = match block_laws(problem, &Block::unrefined(body)).damage {
-            Some(DamageLaw::CriticalStretch(law)) => law.critical,
-            _ => continue,
+    let of_bodies = problem.bodies.iter().filter_map(|body| {
+        let law = block_laws(problem, &Block::unrefined(body)).damage?;
+        Some((format!("[body.{}]", body.name), &body.span, law))
+    });
+    let of_pairs = problem.interface.pairs.iter().filter_map(|pair| {
+        let laws = pair_damage_laws(problem, pair)?;
+        let law = if laws[0].critical() > laws[1].critical() {
+            laws[0]
+        } else {
+            laws[1]
+        };
+        Some((format!("[interface.pair.{}]", pair.name), &pair.span, law))
+    });
+    for (section, span, law) in of_bodies.chain(of_pairs) {
+        let DamageLaw::CriticalStretch(CriticalStretch { critical, .. }) = law else {
+            continue;
         };
         let mut warn = |consequence: String| {
-            let name = &body.name;
             let message = format!(
-                "[body.{name}] damage: its bonds break at a stretch of {critical:.3}{consequence}"
+                "{section} damage: its bonds break at a stretch of {critical:.3}{consequence}"
             );
-            warnings.push(Warning::new(message).at(&body.span));
+            warnings.push(Warning::new(message).at(span));
         };
         if critical >= LARGEST_STRETCH {
             warn(format!(", at {:.3} times their length", 1.0 + critical));

@@ -95,9 +95,16 @@ fn cost_in<const D: usize>(
     rule: &str,
     growth: f64,
 ) -> f64 {
-    simulate::<D, _>(&text(dimension, ratio, law, rule), |mut simulation| {
+    cost_of_deck::<D>(mode, &text(dimension, ratio, law, rule), growth)
+}
+
+/// As [`cost_in`], of the body or bodies of a deck as [`text`] writes it.
+fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
+    let pulled_only = !deck.contains("tension_only = false");
+    simulate::<D, _>(deck, |mut simulation| {
         // The direction of the cut's normal; slides are along the first axis of the others.
         let axis = if D == 1 { 0 } else { 1 };
+        let horizon = simulation.problem.horizon;
         let mut grow = |end: f64, moved: &dyn Fn(f64) -> [f64; 2]| {
             let mut size = 4e-3;
             while size < end {
@@ -121,8 +128,7 @@ fn cost_in<const D: usize>(
             // Bonds that lean against it are shorter at first.
             Mode::Slanted(angle) => {
                 let (sin, cos) = angle.to_radians().sin_cos();
-                let pulled_only = !rule.contains("tension_only = false");
-                let end = f64::from(ratio) * if pulled_only { 2.2 } else { 0.4 };
+                let end = horizon * if pulled_only { 2.2 } else { 0.4 };
                 grow(end, &|size| [sin * size, cos * size]);
             }
         }
@@ -429,6 +435,178 @@ fn of_all_modes_by_energy_where_pressed_bonds_break_too() {
     }
 }
 
+/// The deck of [`text`] with the damage of the body for a pair of bodies alone, which meet at the cut; the bodies have the
+/// damage that is given as keys of `[damage.own.…]`, or none.
+fn pair_text(dimension: &str, ratio: u32, law: &str, rule: &str, own: Option<&str>) -> String {
+    let whole = text(dimension, ratio, law, rule);
+    let (before, body) = whole.split_once("[body.block]").unwrap();
+    let damage = own.map_or("", |_| "damage = 'own'");
+    let corners = body.split_once("shape.box").unwrap().1;
+    let part = |name: &str, lower: bool| {
+        let vector = |text: &str| -> Vec<String> {
+            let inside = text.split_once('[').unwrap().1.split_once(']').unwrap().0;
+            inside.split(", ").map(str::to_owned).collect()
+        };
+        let (first, second) = corners.split_once("upper").unwrap();
+        let mut corners = [vector(first), vector(second)];
+        let axis = usize::from(corners[0].len() > 1);
+        corners[usize::from(lower)][axis] = "0".to_owned();
+        let [from, to] = corners.map(|corner| corner.join(", "));
+        format!(
+            "[body.{name}]
+            material = 'rubber'
+            {damage}
+            shape.box = {{ lower = [{from}], upper = [{to}] }}
+            "
+        )
+    };
+    let own = own.map_or(String::new(), |keys| format!("damage.own.{keys}"));
+    format!(
+        "{before}
+        [interface.pair.glue]
+        bodies = ['upper', 'lower']
+        damage = 'brittle'
+        {}{}
+        [time]
+        end = 1
+        ",
+        part("lower", true),
+        part("upper", false)
+    )
+    .replacen("[grid]", &format!("{own}\n[grid]"), 1)
+}
+
+#[test]
+fn in_a_pair_of_bodies_with_damage_of_its_own() {
+    let tough = format!(
+        "{STRETCH} = {{ fracture_energy = {} }}",
+        8.0 * FRACTURE_ENERGY
+    );
+    let weak = format!(
+        "{STRETCH} = {{ fracture_energy = {} }}",
+        FRACTURE_ENERGY / 8.0
+    );
+    let tough_by_work = tough.replace(STRETCH, ENERGY);
+    let soft = ordinary(0.1, "constant");
+    for (law, rule, owns) in [
+        (PMB, STRETCH, vec![None, Some(&tough), Some(&weak)]),
+        (NORMALISED, STRETCH, vec![Some(&tough)]),
+        (&*soft, STRETCH, vec![None]),
+        // The pair breaks by work and its bodies by stretch.
+        (&*soft, ENERGY, vec![None, Some(&tough)]),
+        (CORRESPONDENCE, ENERGY, vec![None, Some(&tough_by_work)]),
+    ] {
+        let whole = cost::<2>("plane-stress", 3, law, rule, 0.02);
+        assert!((0.9..1.1).contains(&whole), "{law}: {whole}");
+        for own in owns {
+            let deck = pair_text("plane-stress", 3, law, rule, own.map(String::as_str));
+            let pair = cost_of_deck::<2>(Mode::Opening, &deck, 0.02);
+            assert!(
+                (pair / whole - 1.0).abs() < 1e-6,
+                "{law} {own:?}: {pair} for {whole}"
+            );
+        }
+    }
+    let line = cost::<1>("uniaxial-stress", 3, PMB, STRETCH, 0.02);
+    let deck = pair_text("uniaxial-stress", 3, PMB, STRETCH, Some(&tough));
+    let pair = cost_of_deck::<1>(Mode::Opening, &deck, 0.02);
+    assert!((pair / line - 1.0).abs() < 1e-6, "{pair} for {line}");
+}
+
+#[test]
+fn in_the_bodies_of_a_pair_their_own_damage_counts() {
+    // The cut between the halves lies within the lower body, whose damage is as tough as that of the whole block; the pair
+    // above it is weak.
+    let within = |own: &str, pair: &str| {
+        let deck = pair_text("plane-stress", 3, PMB, STRETCH, Some(own));
+        let deck = deck.replace(
+            &format!("fracture_energy = {FRACTURE_ENERGY}\n"),
+            &format!("{pair}\n"),
+        );
+        // The border of the bodies, all others stay.
+        let deck = deck.replace("upper = [3.5, 0]", "upper = [3.5, 2]");
+        let deck = deck.replace("lower = [-3.5, 0]", "lower = [-3.5, 2]");
+        cost_of_deck::<2>(Mode::Opening, &deck, 0.02)
+    };
+    let own = format!("{STRETCH} = {{ fracture_energy = {FRACTURE_ENERGY} }}");
+    let whole = cost::<2>("plane-stress", 3, PMB, STRETCH, 0.02);
+    // Bonds across the cut that reach the upper body have the toughness of the pair.
+    let same = within(&own, &format!("fracture_energy = {FRACTURE_ENERGY}"));
+    let weak = within(&own, "fracture_energy = 0.02");
+    assert!((same / whole - 1.0).abs() < 1e-6, "{same} for {whole}");
+    assert!(
+        weak < 0.995 * whole && weak > 0.7 * whole,
+        "{weak} of {whole}"
+    );
+}
+
+#[test]
+fn in_a_pair_that_never_breaks() {
+    let weak = format!(
+        "{STRETCH} = {{ fracture_energy = {} }}",
+        FRACTURE_ENERGY / 8.0
+    );
+    let deck = pair_text("plane-stress", 3, PMB, STRETCH, Some(&weak));
+    let deck = deck.replace("damage = 'brittle'", "damage = 'none'");
+    simulate::<2, _>(&deck, |mut simulation| {
+        let is_upper = |y: f64| y > 0.0;
+        displace(&mut simulation, |[x, y, z]| {
+            [x, if is_upper(y) { y + 0.5 } else { y }, z]
+        });
+        let mut broken = 0;
+        simulation.forces.for_each_broken(|_, _| broken += 1);
+        assert_eq!(broken, 0);
+        // Within the bodies they do.
+        displace(&mut simulation, |[x, y, z]| [x, 1.2 * y, z]);
+        let mut within = [0, 0];
+        let model = &simulation.model;
+        simulation.forces.for_each_broken(|i, j| {
+            let [a, b] = [i, j].map(|point| is_upper(model.position(point)[1]));
+            within[usize::from(a == b)] += 1;
+        });
+        assert!(within[0] == 0 && within[1] > 0, "{within:?}");
+    });
+}
+
+#[test]
+fn in_a_pair_of_unlike_bodies() {
+    // Moduli and horizons of their own; the bodies alone would cost 100 times as much.
+    let cost = |law: [&str; 2], rule: &str, spacing: f64| {
+        let text = format!(
+            "dimension = 'plane-strain'
+            grid = {{ spacing = {spacing}, horizon = 3 }}
+            material.soft.{}
+            material.hard.{}
+            damage.glue.{rule} = {{ fracture_energy = {FRACTURE_ENERGY} }}
+            damage.tough.{rule} = {{ fracture_energy = '100*{FRACTURE_ENERGY}' }}
+            body.soft = {{ material = 'soft', damage = 'tough', shape.box = {{ lower = [0, 0], upper = [24, 6] }} }}
+            [body.hard]
+            material = 'hard'
+            damage = 'tough'
+            spacing = '{spacing}/2'
+            horizon = 1.5
+            shape.box = {{ lower = [0, 6], upper = [24, 10] }}
+            [interface.pair.glue]
+            bodies = ['soft', 'hard']
+            damage = 'glue'
+            [time]
+            end = 1
+            ",
+            law[0], law[1]
+        );
+        opening_cost(&text, 6.0)
+    };
+    let hard = PMB.replace("3e3", "12e3");
+    let costs = [1.0, 0.5].map(|spacing| cost([PMB, &hard], STRETCH, spacing));
+    let [coarse, fine] = costs;
+    assert!((0.85..1.0).contains(&coarse), "{costs:?}");
+    assert!((0.92..1.0).contains(&fine), "{costs:?}");
+    let hard = ordinary(0.2, "constant").replace("3e3", "12e3");
+    let soft = ordinary(0.2, "constant");
+    let by_work = cost([&soft, &hard], ENERGY, 1.0);
+    assert!((0.8..1.05).contains(&by_work), "{by_work}");
+}
+
 /// The energy per area that opening costs at a height in two bodies that meet at y = 7, as a share of G0; the upper one has
 /// half the horizon and half the spacing of the lower one, which is given.
 fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
@@ -449,7 +627,12 @@ fn cost_at(height: f64, law: &str, rule: &str, spacing: f64) -> f64 {
         end = 1
         "
     );
-    simulate::<2, _>(&text, |mut simulation| {
+    opening_cost(&text, height)
+}
+
+/// The energy per area that opening costs at a height in a plate 24 m wide, as a share of G0.
+fn opening_cost(text: &str, height: f64) -> f64 {
+    simulate::<2, _>(text, |mut simulation| {
         let mut opening = 1e-2;
         while opening < 0.4 {
             displace(&mut simulation, |[x, y, z]| {

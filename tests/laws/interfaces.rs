@@ -225,3 +225,97 @@ fn pieces_that_are_worked_on_between_messages_do_not_cut_vectors() {
         assert!(forces(width, 1) == forces(width, 2), "width {width}");
     }
 }
+
+/// Bonds broken between the bodies and within them, on one rank without damage in the bodies.
+fn broken_by_kind<const D: usize>(simulation: &Simulation<D>) -> [usize; 2] {
+    let mut broken = [0, 0];
+    let block = &simulation.model.block;
+    simulation
+        .forces
+        .for_each_broken(|i, j| broken[usize::from(block[i] == block[j])] += 1);
+    broken
+}
+
+#[test]
+fn an_interface_opens_at_the_strain_of_its_strength() {
+    // Under a uniform strain the bonds along the normal reach their critical stretch first.
+    let strength = 0.02;
+    for (dimension, law, modulus) in [
+        (
+            "plane-stress",
+            "pmb = { density = 1, youngs_modulus = 2 }",
+            2.0,
+        ),
+        (
+            "plane-strain",
+            "pmb = { density = 1, youngs_modulus = 2 }",
+            2.0 / (1.0 - 0.0625),
+        ),
+        (
+            "plane-strain",
+            "ordinary = { density = 1, youngs_modulus = 2, poisson_ratio = 0.4 }",
+            2.0 / (1.0 - 0.16),
+        ),
+    ] {
+        let deck = format!(
+            "dimension = '{dimension}'
+            grid = {{ spacing = 1, horizon = 3 }}
+            interface.pair.seam = {{ bodies = ['low', 'high'], strength = {strength} }}
+            material.rubber.{law}
+            body.low = {{ material = 'rubber', shape.box = {{ lower = [0, 0], upper = [8, 6] }} }}
+            body.high = {{ material = 'rubber', shape.box = {{ lower = [0, 6], upper = [8, 12] }} }}
+            time.end = 1
+            "
+        );
+        for (share, opens) in [(0.999, false), (1.001, true)] {
+            simulate::<2, _>(&deck, |mut simulation| {
+                let strain = share * strength / modulus;
+                displace(&mut simulation, |[x, y, z]| [x, (1.0 + strain) * y, z]);
+                let [across, within] = broken_by_kind(&simulation);
+                assert_eq!(
+                    (across > 0, within),
+                    (opens, 0),
+                    "{dimension} {law} {share}"
+                );
+            });
+        }
+    }
+}
+
+#[test]
+fn a_bar_opens_at_the_stress_of_its_strength() {
+    // Equilibria under a stress at its ends. Bodies of unlike stiffness open a little earlier, because most of a bond may lie
+    // in the softer one.
+    let opens = |modulus: f64, share: f64| {
+        let deck = format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            interface.pair.seam = {{ bodies = ['left', 'right'], strength = 0.02 }}
+            material.soft.pmb = {{ density = 1, youngs_modulus = 2 }}
+            material.hard.pmb = {{ density = 1, youngs_modulus = {modulus} }}
+            body.left = {{ material = 'soft', shape.box = {{ lower = [0], upper = [20] }} }}
+            body.right = {{ material = 'hard', shape.box = {{ lower = [20], upper = [40] }} }}
+            set.end.where = 'x < 3'
+            set.tip.where = 'x > 37'
+            condition.hold = {{ set = 'end', displacement = [0] }}
+            condition.pull = {{ set = 'tip', traction = ['{share}*0.02'], depth = 3 }}
+            time = {{ end = 1, method = 'static', static.load_steps = 1 }}
+            "
+        );
+        simulate::<1, _>(&deck, |mut simulation| {
+            for _ in 0..100 {
+                simulation.advance();
+                if simulation.is_over() {
+                    break;
+                }
+            }
+            let [across, within] = broken_by_kind(&simulation);
+            assert_eq!(within, 0);
+            across > 0
+        })
+    };
+    for (modulus, least, most) in [(2.0, 0.99, 1.01), (4.0, 0.88, 0.94), (20.0, 1.2, 1.3)] {
+        let found = [opens(modulus, least), opens(modulus, most)];
+        assert_eq!(found, [false, true], "{modulus}");
+    }
+}

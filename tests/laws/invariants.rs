@@ -643,6 +643,52 @@ pub(super) fn same_bits<const D: usize>(text: &str) {
     assert!(whole(continued) == wanted, "after a restart: {text}");
 }
 
+/// The same for pairs of bodies whose bonds have damage of their own, by stretch and by work, and unlike ends.
+#[test]
+fn damage_of_a_pair_has_the_same_bits_on_any_ranks_and_after_a_restart() {
+    let ordinary = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    let pmb = "pmb = { density = 2, youngs_modulus = 5 }";
+    let correspondence =
+        "correspondence = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3 }";
+    for (law, damage) in [
+        (pmb, "critical_stretch = { fracture_energy = 2e-4 }"),
+        (ordinary, "critical_stretch = { critical_stretch = 4e-3 }"),
+        (
+            ordinary,
+            "energy = { fracture_energy = 2e-4, family_correction = 1 }",
+        ),
+        (correspondence, "energy = { fracture_energy = 2e-4 }"),
+    ] {
+        for (family, hard) in [
+            ("lattice", "horizon = 2.5"),
+            ("list", "spacing = 0.5, horizon = 2"),
+        ] {
+            let text = format!(
+                "dimension = 'plane-stress'
+                grid = {{ spacing = 1, horizon = 3, family = 'auto' }}
+                interface.pair.glue = {{ bodies = ['low', 'high'], damage = 'glue' }}
+                material.soft.{law}
+                material.hard.{}
+                damage.glue.{damage}
+                body.low = {{ material = 'soft', shape.box = {{ lower = [0, 0], upper = [12, 6] }} }}
+                body.high = {{ material = 'hard', {hard}, shape.box = {{ lower = [0, 6], upper = [12, 11] }} }}
+                initial.shake.velocity = ['0.02*sin(x)', '0.04*(y > 6) + 0.01*cos(y)']
+                time = {{ end = 9, step = 0.1 }}
+                ",
+                law.replace("youngs_modulus = 5", "youngs_modulus = 9")
+            )
+            .replace("'auto'", &format!("'{}'", if family == "list" { family } else { "auto" }));
+            simulate::<2, _>(&text, |mut simulation| {
+                (0..STEPS).for_each(|_| simulation.advance());
+                let mut broken = 0;
+                simulation.forces.for_each_broken(|_, _| broken += 1);
+                assert!(broken > 0, "no bond breaks: {text}");
+            });
+            same_bits::<2>(&text);
+        }
+    }
+}
+
 /// What several ranks have saved as if one had.
 fn joined(parts: Vec<Saved>) -> Saved {
     let mut parts = parts.into_iter();

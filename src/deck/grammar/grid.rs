@@ -91,7 +91,7 @@ pub struct Interface {
     /// there are none, however near the bodies are. If not given, `"own"`, or `"none"` with `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Pairs of bodies with a rule of their own, by any name.
+    /// Pairs of bodies with a rule or damage of their own, by any name.
     #[serde(default)]
     pub pair: Tables<Pair>,
 }
@@ -102,8 +102,16 @@ pub struct Interface {
 pub struct Pair {
     /// Names of the two bodies, in any order.
     pub bodies: Spanned<Vec<Text>>,
-    /// As for all pairs.
-    pub rule: Spanned<Rule>,
+    /// As for all pairs, whose rule it is if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rule: Option<Spanned<Rule>>,
+    /// Name of the damage law of these bonds, whatever that of the bodies is, or `"none"`: they never break. If neither this
+    /// nor `strength` is given, they break at the smaller threshold of both bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damage: Option<Text>,
+    /// Stress in Pa, normal to the interface, at which these bonds begin to open; their critical stretch follows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strength: Option<Number>,
 }
 
 /// What constants bonds between blocks have, if there are any.

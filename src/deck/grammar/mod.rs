@@ -14,6 +14,7 @@ mod outputs;
 mod refinement;
 mod rigid;
 mod sections;
+mod table;
 mod time;
 
 use indexmap::IndexMap;
@@ -32,6 +33,7 @@ pub use outputs::*;
 pub use refinement::*;
 pub use rigid::*;
 pub use sections::*;
+pub use table::Table;
 pub use time::*;
 
 /// A string with its place in the deck.
@@ -61,6 +63,9 @@ pub struct Deck {
     /// Named numbers for use in expressions; may build on one another.
     #[serde(default)]
     pub parameters: IndexMap<Text, Number>,
+    /// Values by time, by name, for use in expressions of `t`.
+    #[serde(default)]
+    pub table: Tables<Table>,
     /// Spacing and horizon.
     pub grid: Spanned<Grid>,
     /// The bonds between blocks.

@@ -57,6 +57,8 @@ pub const SECTIONS: [Section; 37] = [
     Section::new("constraint", Key, Fixed),
     // Parameters count where they are used.
     Section::new("parameters", Table, Free),
+    // Tables count where they are used, too.
+    Section::new("table", Named, Free).referred_to(),
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),
     Section::new("interface.pair", Named, Fixed),
@@ -157,6 +159,7 @@ impl Deck {
             }));
         }
         let mut found = Vec::new();
+        add(&mut found, "table", &self.table);
         add(&mut found, "material", &self.material);
         add(&mut found, "damage", &self.damage);
         add(&mut found, "body", &self.body);

@@ -26,8 +26,10 @@ impl LimitsRead {
         };
         Self {
             thresholds: blocks.iter().any(BlockLaws::has_thresholds),
-            truncation_factors: any(|law| law.family_correction() > 0.0),
-            rotations: any(DamageLaw::is_objective_work)
+            truncation_factors: any(|law| law.family_correction() > 0.0)
+                || blocks.iter().any(|block| block.pairs.truncation_factors),
+            rotations: (any(DamageLaw::is_objective_work)
+                || blocks.iter().any(|block| block.pairs.rotations))
                 && !blocks.iter().all(|block| block.law.counts::<D>().central),
         }
     }

@@ -49,7 +49,7 @@ pub use bond_inputs::BondInputs;
 pub use broken::Broken;
 pub use evaluate::{Acting, ForceTimes};
 pub use force::BondUpdate;
-pub use interaction::{BlockLaws, Interaction};
+pub use interaction::{BlockLaws, Interaction, PairReads};
 pub use measure::Stored;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
@@ -151,7 +151,7 @@ impl<const D: usize> Forces<D> {
         let numbers = PointNumbers::new(&blocks, model);
         let read = LimitsRead::by::<D>(&blocks);
         let limits = LimitColumns::new::<D>(read, numbers.read, model.volume.len());
-        let breaks = blocks.iter().any(|block| block.damage.is_some());
+        let breaks = blocks.iter().any(BlockLaws::has_breakable_bonds);
         let has_history = (blocks.iter()).any(|block| block.law.counts::<D>().bond_history > 0);
         for interaction in &mut interactions {
             let width = history_width::<D>(interaction);
@@ -399,9 +399,15 @@ impl<const D: usize> Forces<D> {
         self.halo.update_ghosts(comm, &mut components);
     }
 
-    /// Makes the bonds unbreakable that have an end whose entry is 1; the ghosts' entries are
-    /// brought from their owners. `block` is that of the owned points. Collective.
-    pub fn protect(&mut self, comm: &dyn Communicator, block: &[u16], protected: &mut [f64]) {
+    /// Makes those bonds unbreakable that join blocks for which `between` holds and have an end whose entry is 1; the
+    /// ghosts' entries are brought from their owners. `block` is that of the owned points. Collective.
+    pub fn protect(
+        &mut self,
+        comm: &dyn Communicator,
+        block: &[u16],
+        protected: &mut [f64],
+        between: impl Fn([usize; 2]) -> bool,
+    ) {
         self.bring(comm, protected);
         let mut in_block = vec![0.0_f64; self.blocks.len()];
         for (block, protected) in block.iter().zip(&*protected) {
@@ -411,7 +417,7 @@ impl<const D: usize> Forces<D> {
         comm.max(&mut in_block);
         for interaction in &mut self.interactions {
             let blocks = interaction.bonds.blocks();
-            if blocks.into_iter().any(|block| in_block[block] == 1.0) {
+            if between(blocks) && blocks.into_iter().any(|block| in_block[block] == 1.0) {
                 let is_protected = |point: usize| protected[point] == 1.0;
                 interaction.bonds.protect(is_protected);
             }

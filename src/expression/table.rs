@@ -1,0 +1,138 @@
+//! Values by time, linear between the rows of a table.
+
+/// A function of time, from rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// s, each above the one before.
+    times: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Table {
+    /// A table of times (s) and as many values.
+    ///
+    /// # Errors
+    /// If there are fewer than two rows, or the times do not grow: the number of the row, from 0, and what is wrong.
+    pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
+        if times.len() < 2 || times.len() != values.len() {
+            let message = format!("needs two rows or more, has {}", times.len());
+            return Err((times.len().saturating_sub(1), message));
+        }
+        for (k, pair) in times.windows(2).enumerate() {
+            if pair[1] <= pair[0] {
+                let message = format!(
+                    "time must be larger than in the row before, {:?}, is {:?}",
+                    pair[0], pair[1]
+                );
+                return Err((k + 1, message));
+            }
+        }
+        Ok(Self { times, values })
+    }
+
+    /// The first and the last time, s.
+    pub fn range(&self) -> [f64; 2] {
+        [self.times[0], self.times[self.times.len() - 1]]
+    }
+
+    /// Times (s) and values of the rows.
+    pub fn rows(&self) -> [&[f64]; 2] {
+        [&self.times, &self.values]
+    }
+
+    /// Whether the rows begin with those of another table.
+    pub(super) fn extends(&self, other: &Self) -> bool {
+        self.times.starts_with(&other.times) && self.values.starts_with(&other.values)
+    }
+
+    /// The value at a time (s). Before the first and after the last row the first and the last segment go on: the last step
+    /// may pass the end of the run by a part of a step, and the velocity of a support is that of its motion around a time.
+    pub(super) fn at(&self, time: f64) -> f64 {
+        let k = self.segment(time);
+        let [from, to] = [self.values[k], self.values[k + 1]];
+        if time == self.times[k + 1] {
+            return to;
+        }
+        from + (to - from) * ((time - self.times[k]) / (self.times[k + 1] - self.times[k]))
+    }
+
+    /// The change of the value from a time on while the time changes by a step, s. Within a segment its round-off is that of
+    /// the change, not of the value.
+    pub(super) fn increment(&self, time: f64, step: f64) -> f64 {
+        let end = time + step;
+        let k = self.segment(0.5 * (time + end));
+        let is_first = k == 0;
+        let is_last = k + 2 == self.times.len();
+        let within = |time: f64| {
+            (is_first || self.times[k] <= time) && (is_last || time <= self.times[k + 1])
+        };
+        if within(time) && within(end) {
+            let slope = (self.values[k + 1] - self.values[k]) / (self.times[k + 1] - self.times[k]);
+            return slope * step;
+        }
+        self.at(end) - self.at(time)
+    }
+
+    /// The first row of the segment of a time (s), which is the first or last one beyond the rows.
+    fn segment(&self, time: f64) -> usize {
+        let after = self.times.partition_point(|row| *row <= time);
+        after.clamp(1, self.times.len() - 1) - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        Table::new(vec![0.0, 1.0, 3.0, 3.5], vec![0.0, 2.0, -2.0, -2.0]).unwrap()
+    }
+
+    #[test]
+    fn values_are_linear_between_rows_and_go_on_beyond_them() {
+        let table = table();
+        for (time, value) in [
+            (0.0, 0.0),
+            (0.25, 0.5),
+            (1.0, 2.0),
+            (2.0, 0.0),
+            (3.0, -2.0),
+            (3.2, -2.0),
+            (3.5, -2.0),
+            (-1.0, -2.0),
+            (9.0, -2.0),
+        ] {
+            assert_eq!(table.at(time), value, "{time}");
+        }
+    }
+
+    #[test]
+    fn increments_are_differences_of_values() {
+        let table = table();
+        for (time, step) in [
+            (0.0, 0.5),
+            (0.5, 1.0),
+            (1.0, 2.0),
+            (3.0, -1.5),
+            (2.0, 4.0),
+            (-1.0, 1.5),
+        ] {
+            let difference = table.at(time + step) - table.at(time);
+            assert!((table.increment(time, step) - difference).abs() < 1e-15);
+        }
+        // Without the round-off of the values.
+        let steep = Table::new(vec![0.0, 1.0], vec![1e6, 1e6 + 1.0]).unwrap();
+        assert_eq!(steep.increment(0.3, 1e-9), 1e-9);
+    }
+
+    #[test]
+    fn times_grow() {
+        let wrong = Table::new(vec![0.0, 1.0, 1.0], vec![0.0; 3]).unwrap_err();
+        assert_eq!(wrong.0, 2);
+        assert_eq!(
+            wrong.1,
+            "time must be larger than in the row before, 1.0, is 1.0"
+        );
+        assert!(Table::new(vec![0.0], vec![0.0]).is_err());
+    }
+}
