@@ -77,6 +77,26 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
         damage_is_possible(problem, body)?;
         expansion_is_possible(problem, body)?;
     }
+    horizons_are_possible(problem)
+}
+
+/// An error if a law cannot have the horizon of some of its bonds.
+fn horizons_are_possible(problem: &Problem) -> Result<()> {
+    for here in problem.blocks() {
+        let law = &here.body.material.law;
+        let Some(fault) = law.declaration.horizon_fault else {
+            continue;
+        };
+        let of_bonds = |there: Block| {
+            let constants = constants(problem, &here, &there);
+            fault(&given(problem, here.body, constants))
+        };
+        if let Some(fault) = problem.blocks().find_map(of_bonds) {
+            let name = law.declaration.name;
+            let message = format!("[body.{}] law `{name}`: {fault}", here.body.name);
+            return Err(Error::input(message).at(&here.body.horizon_place));
+        }
+    }
     Ok(())
 }
 
@@ -125,8 +145,12 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     }
     let meets = |other: &Body| problem.interface.between(body, other) != InterfaceRule::None;
     let of_other_kind = problem.bodies.iter().find(|other| {
-        let differs = |damage| breaks_by_work(other, damage) != by_work;
-        other.damage.as_ref().is_some_and(differs) && meets(other)
+        let other_by_work = match &other.damage {
+            Some(damage) => breaks_by_work(other, damage),
+            None if other.can_break() => false,
+            None => return false,
+        };
+        other_by_work != by_work && meets(other)
     });
     if let Some(other) = of_other_kind {
         return error(format!(
@@ -171,6 +195,12 @@ fn given<'a>(problem: &Problem, body: &'a Body, constants: Constants) -> Given<'
         values: &body.material.law.values,
         from_fracture_energy: body.damage.as_ref().is_some_and(|damage| !itself(damage)),
     }
+}
+
+/// The stretch at which bonds of a body with these constants break by their own law, if they do.
+fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) -> Option<f64> {
+    let own = body.material.law.declaration.own_critical_stretch?;
+    Some(own(&given(problem, body, constants)))
 }
 
 /// The law of a body with these constants.
@@ -220,6 +250,13 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
 
 /// The damage law of a block.
 fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<DamageLaw> {
+    if let Some(critical) = own_critical_stretch(problem, body, constants) {
+        let alpha = 0.0;
+        return Some(DamageLaw::CriticalStretch(CriticalStretch {
+            critical,
+            alpha,
+        }));
+    }
     let damage = body.damage.as_ref()?;
     let (dimension, elastic) = (problem.dimension, constants.elastic);
     let given = given(problem, body, constants);
@@ -260,14 +297,20 @@ fn damage(problem: &Problem, body: &Body, constants: Constants) -> Option<Damage
 }
 
 /// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
-/// without damage has none. The horizons (m) and stiffnesses are those of the ends of the bonds.
+/// without damage has none.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
     ends: [usize; 2],
-    (horizons, stiffness): ([f64; 2], [f64; 2]),
+    of_ends: &[End; 2],
     per_point: bool,
 ) -> Criterion {
+    // Where both ends soften, a bond breaks once neither bears anything.
+    if let [Some(i), Some(j)] = of_ends.each_ref().map(|end| end.own_critical_stretch) {
+        return Criterion::Stretch(i.max(j));
+    }
+    let horizons = of_ends.each_ref().map(|end| end.horizon);
+    let stiffness = of_ends.each_ref().map(|end| end.stiffness);
     let laws = ends.map(|block| blocks[block].damage);
     let critical = laws.map(|law| law.map(|law| law.critical()));
     let Some(smallest) = critical.into_iter().flatten().reduce(f64::min) else {
@@ -282,9 +325,9 @@ fn criterion(
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
     // A critical stretch that is given holds for bonds of any horizon.
-    let is_given = ends.map(|block| {
-        let damage = problem.block(block).body.damage.as_ref();
-        damage.is_some_and(|damage| matches!(damage.toughness, Toughness::CriticalStretch(_)))
+    let is_given = ends.map(|block| match &problem.block(block).body.damage {
+        Some(damage) => matches!(damage.toughness, Toughness::CriticalStretch(_)),
+        None => problem.block(block).body.can_break(),
     });
     let stretch_ratios: HorizonRatios = horizons.map(|horizon| {
         let ratio = |k: usize| (problem.block(ends[k]).horizon / horizon).sqrt();
@@ -341,14 +384,13 @@ pub fn assign<const D: usize>(
             End {
                 stiffness: bond_stiffness(&constants, problem.dimension),
                 built: build(problem, block.body, constants),
+                own_critical_stretch: own_critical_stretch(problem, block.body, constants),
                 horizon,
                 share: cell_share(problem, &other, horizon),
             }
         });
         weigh(problem, model, &mut bonds, &ends)?;
-        let horizons = ends.each_ref().map(|end| end.horizon);
-        let stiffness = ends.each_ref().map(|end| end.stiffness);
-        let criterion = criterion(problem, blocks, indices, (horizons, stiffness), per_point);
+        let criterion = criterion(problem, blocks, indices, &ends, per_point);
         let [own, far] = ends.map(|end| end.built.law);
         Ok(Interaction {
             bonds,
@@ -363,6 +405,8 @@ pub fn assign<const D: usize>(
 /// An end of the bonds between two blocks.
 struct End {
     built: Built,
+    /// As of [`own_critical_stretch`].
+    own_critical_stretch: Option<f64>,
     /// As [`bond_stiffness`].
     stiffness: f64,
     /// m.

@@ -7,7 +7,7 @@ use crate::comm::{self, Communicator, Found, agree, least};
 use crate::error::{Error, ErrorKind, Result};
 use crate::partition::{Cost, distribute_by_cost};
 use crate::points::Point;
-use crate::problem::{Action, Condition, Initial, Problem, Stage, Time};
+use crate::problem::{Action, Body, Condition, Initial, Problem, Stage, Time};
 use crate::refine::Grids;
 use crate::{families, points};
 
@@ -211,7 +211,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             damping: model.damping.iter().any(|rate| *rate > 0.0),
             equilibria: problem.is_quasi_static(),
             relaxation: problem.has_relaxation(),
-            damage: problem.bodies.iter().any(|body| body.damage.is_some()),
+            damage: problem.bodies.iter().any(Body::can_break),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
             coarsening: refinement::may_coarsen(problem),
@@ -588,7 +588,7 @@ fn starts_deformed(problem: &Problem) -> bool {
         let action = &condition.action;
         matches!(action, Action::Displacement(_) | Action::Temperature(_))
     };
-    problem.bodies.iter().any(|body| body.damage.is_some())
+    problem.bodies.iter().any(Body::can_break)
         && (problem.initials.iter().any(displaced) || problem.conditions.iter().any(placed))
 }
 

@@ -204,7 +204,7 @@ fn saved_width(problem: &Problem) -> usize {
         0
     };
     let worked = usize::from(!problem.conditions.is_empty());
-    let breaks = problem.bodies.iter().any(|body| body.damage.is_some());
+    let breaks = problem.bodies.iter().any(Body::can_break);
     let broken = if breaks { 4 } else { 0 };
     let damped = problem
         .bodies

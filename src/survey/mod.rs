@@ -135,7 +135,9 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    for body in &problem.bodies {
+    // A bond that softens is none that stretches so far under force.
+    let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
+    for body in of_damage {
         let critical = match block_laws(problem, &Block::unrefined(body)).damage {
             Some(DamageLaw::CriticalStretch(law)) => law.critical,
             _ => continue,
