@@ -32,6 +32,7 @@ mod laws {
     mod ordinary_history;
     mod plasticity;
     mod slender_bodies;
+    mod softening;
     mod thermal;
 }
 

@@ -159,7 +159,7 @@ fn measured(body: &Body, figures: &BodyFigures) -> Map<String, Value> {
         let range = json!({ "least": least, "median": median, "most": most });
         entry.insert("neighbours".to_owned(), range);
     }
-    let damage = body.damage.is_some();
+    let damage = body.can_break();
     entry.insert("has_damage".to_owned(), json!(damage));
     entry
 }

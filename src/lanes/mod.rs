@@ -61,6 +61,12 @@ impl Lanes {
         self.map(f64::sqrt)
     }
 
+    /// Exponential; a call for each lane, the same on every processor.
+    #[inline(always)]
+    pub fn exp(self) -> Self {
+        self.map(libm::exp)
+    }
+
     /// The smaller of each pair of lanes; of a NaN and a number, the number in `other`.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {

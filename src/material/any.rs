@@ -115,6 +115,14 @@ impl AnyLaw {
         with_law!(self, law => of::<_, D>(law))
     }
 
+    /// Whether the law has [`Law::lost_stiffness`].
+    pub fn softens<const D: usize>(&self) -> bool {
+        fn of<L: Law<D>, const D: usize>(_: &L) -> bool {
+            L::SOFTENS
+        }
+        with_law!(self, law => of::<_, D>(law))
+    }
+
     /// Entries of T⊗Y of eight bonds (see [`ForceState::dyad`]) times two factors; 0 beyond the dimension.
     #[inline(never)]
     pub fn stress_contribution<const D: usize>(
@@ -259,6 +267,11 @@ impl<const D: usize> Law<D> for AnyLaw {
     #[inline(never)]
     fn dissipated(&self, length: Lanes, history: &Self::BondHistory) -> Lanes {
         with_law!(self, law => Law::<D>::dissipated(law, length, &first(history)))
+    }
+
+    #[inline(never)]
+    fn lost_stiffness(&self, history: &Self::BondHistory) -> Lanes {
+        with_law!(self, law => Law::<D>::lost_stiffness(law, &first(history)))
     }
 
     #[inline(never)]

@@ -36,6 +36,11 @@ pub struct Declaration {
     /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break by
     /// their stretch.
     pub critical_stretch: Option<fn(&Given, f64) -> f64>,
+    /// The stretch at which bonds of the law break by themselves; its bodies have no damage law. `None` if a damage law
+    /// says when they break.
+    pub own_critical_stretch: Option<fn(&Given) -> f64>,
+    /// What is wrong with the law at a horizon, if anything can be.
+    pub horizon_fault: Option<fn(&Given) -> Option<String>>,
     /// Whether the law scales the critical stretch of each bond itself, with these values of its keys.
     pub scales_thresholds: fn(&Values) -> bool,
     /// Makes the law.
@@ -60,10 +65,17 @@ impl Declaration {
             elastic: None,
             breaks_by_energy: false,
             critical_stretch: None,
+            own_critical_stretch: None,
+            horizon_fault: None,
             scales_thresholds: |_| false,
             build,
             examples: &[""],
         }
+    }
+
+    /// Whether bonds can break without a damage law.
+    pub fn breaks_by_itself(&self) -> bool {
+        self.own_critical_stretch.is_some()
     }
 
     /// Whether the law is there in this setting, with the defaults of its keys.

@@ -22,6 +22,7 @@ mod plastic_state;
 mod pmb;
 mod registration;
 pub mod rotation;
+mod softening_pmb;
 mod symmetric;
 mod tensor_pmb;
 
@@ -42,6 +43,7 @@ registration::register! {
     $
     pmb::Pmb,
     elastic_plastic_pmb::ElasticPlasticPmb,
+    softening_pmb::SofteningPmb,
     normalised::Normalised,
     tensor_pmb::TensorPmb,
     linear_microelastic::LinearMicroelastic,
@@ -123,6 +125,9 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// Whether [`Self::toughness_scale`] is not 1.
     const SCALED: bool = false;
+
+    /// Whether [`Self::lost_stiffness`] is not 0.
+    const SOFTENS: bool = false;
 
     /// Whether the stress of a point is the mean of stresses of its bonds, and so is [`Self::stress_across`].
     const HAS_BOND_STRESS_ACROSS: bool = false;
@@ -280,6 +285,13 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// What a bond, broken or not, has dissipated at one end without breaking, J/m⁶.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
+        Lanes::splat(0.0)
+    }
+
+    /// The share of its stiffness that an intact bond has lost at one end, from 0 to 1: it counts as broken to that
+    /// share in the damage of the point.
+    #[inline(always)]
+    fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 

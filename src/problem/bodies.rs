@@ -34,6 +34,11 @@ pub struct Body {
 }
 
 impl Body {
+    /// Whether its bonds can break, by a damage law or by the law of its material.
+    pub fn can_break(&self) -> bool {
+        self.damage.is_some() || self.material.law.declaration.breaks_by_itself()
+    }
+
     /// Whether its points are the centres of the cells of a lattice, or its Gauss points.
     pub fn is_on_lattice(&self, jitter: Option<Jitter>) -> bool {
         jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })

@@ -171,7 +171,7 @@ impl Action {
 impl Problem {
     /// Whether any bonds can break.
     pub fn has_damage(&self) -> bool {
-        self.bodies.iter().any(|body| body.damage.is_some())
+        self.bodies.iter().any(Body::can_break)
             || (self.interface.pairs.iter()).any(|pair| pair.own_damage().is_some())
     }
 }

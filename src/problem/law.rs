@@ -90,6 +90,12 @@ impl Law {
 
     /// Why bodies of the law can have no such damage, if they cannot.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
+        if self.declaration.breaks_by_itself() {
+            return Some(format!(
+                "bonds of the law `{}` break where they have softened; leave out `damage`",
+                self.declaration.name
+            ));
+        }
         let (can, way): (fn(&Declaration) -> bool, _) = match damage.rule {
             DamageRule::CriticalStretch => (
                 |law| law.critical_stretch.is_some(),

@@ -83,7 +83,7 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
             pair_damage_is_possible(problem, pair, damage)?;
         }
     }
-    Ok(())
+    horizons_are_possible(problem)
 }
 
 /// An error if the bonds between two bodies cannot break by damage of their own.
@@ -131,6 +131,26 @@ fn pair_damage_is_possible(
     Ok(())
 }
 
+/// An error if a law cannot have the horizon of some of its bonds.
+fn horizons_are_possible(problem: &Problem) -> Result<()> {
+    for here in problem.blocks() {
+        let law = &here.body.material.law;
+        let Some(fault) = law.declaration.horizon_fault else {
+            continue;
+        };
+        let of_bonds = |there: Block| {
+            let constants = constants(problem, &here, &there);
+            fault(&given(problem, here.body, None, constants))
+        };
+        if let Some(fault) = problem.blocks().find_map(of_bonds) {
+            let name = law.declaration.name;
+            let message = format!("[body.{}] law `{name}`: {fault}", here.body.name);
+            return Err(Error::input(message).at(&here.body.horizon_place));
+        }
+    }
+    Ok(())
+}
+
 /// An error if a material expands whose law has no potential, as one that flows, where strain is 0 across the setting:
 /// the stress there changes how it flows, and the law does not know it.
 fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
@@ -173,8 +193,12 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
             && *interface.damage_between(body, other) == InterfaceDamage::OfBodies
     };
     let of_other_kind = problem.bodies.iter().find(|other| {
-        let differs = |damage| breaks_by_work(other, damage) != by_work;
-        other.damage.as_ref().is_some_and(differs) && meets(other)
+        let other_by_work = match &other.damage {
+            Some(damage) => breaks_by_work(other, damage),
+            None if other.can_break() => false,
+            None => return false,
+        };
+        other_by_work != by_work && meets(other)
     });
     if let Some(other) = of_other_kind {
         return error(format!(
@@ -212,7 +236,8 @@ fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Opt
     let constants = constants(problem, &block, &block);
     let influence = build(problem, body, Some(damage), constants).influence;
     influence.is_some().then(|| {
-        "energy damage needs a constant influence, or `[grid] volume_correction = \"none\"`".to_owned()
+        "energy damage needs a constant influence, or `[grid] volume_correction = \"none\"`"
+            .to_owned()
     })
 }
 
@@ -233,6 +258,12 @@ fn given<'a>(
         values: &body.material.law.values,
         from_fracture_energy: damage.is_some_and(|damage| !itself(damage)),
     }
+}
+
+/// The stretch at which bonds of a body with these constants break by their own law, if they do.
+fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) -> Option<f64> {
+    let own = body.material.law.declaration.own_critical_stretch?;
+    Some(own(&given(problem, body, None, constants)))
 }
 
 /// The law of a body with these constants, for bonds that break by this damage.
@@ -282,10 +313,20 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     let damage = body.damage.as_ref();
     BlockLaws {
         law: build(problem, body, damage, constants).law,
-        damage: damage.map(|damage| damage_law(problem, body, damage, constants)),
+        damage: own_critical_stretch(problem, body, constants)
+            .map(softened)
+            .or_else(|| damage.map(|damage| damage_law(problem, body, damage, constants))),
         weibull: damage.and_then(|damage| damage.weibull),
         pairs: pair_reads(problem, body),
     }
+}
+
+/// Of a law whose bonds break where they have softened.
+fn softened(critical: f64) -> DamageLaw {
+    DamageLaw::CriticalStretch(CriticalStretch {
+        critical,
+        alpha: 0.0,
+    })
 }
 
 /// What the criteria of the pairs of a body with damage of their own read.
@@ -376,14 +417,20 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
 }
 
 /// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
-/// without damage has none. The horizons (m) and stiffnesses are those of the ends of the bonds.
+/// without damage has none.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
     ends: [usize; 2],
-    (horizons, stiffness): ([f64; 2], [f64; 2]),
+    of_ends: &[End; 2],
     per_point: bool,
 ) -> Criterion {
+    // Where both ends soften, a bond breaks once neither bears anything.
+    if let [Some(i), Some(j)] = of_ends.each_ref().map(|end| end.own_critical_stretch) {
+        return Criterion::Stretch(i.max(j));
+    }
+    let horizons = of_ends.each_ref().map(|end| end.horizon);
+    let stiffness = of_ends.each_ref().map(|end| end.stiffness);
     let laws = ends.map(|block| blocks[block].damage);
     let critical = laws.map(|law| law.map(|law| law.critical()));
     let Some(smallest) = critical.into_iter().flatten().reduce(f64::min) else {
@@ -398,9 +445,9 @@ fn criterion(
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
     // A critical stretch that is given holds for bonds of any horizon.
-    let is_given = ends.map(|block| {
-        let damage = problem.block(block).body.damage.as_ref();
-        damage.is_some_and(|damage| matches!(damage.toughness, Toughness::CriticalStretch(_)))
+    let is_given = ends.map(|block| match &problem.block(block).body.damage {
+        Some(damage) => matches!(damage.toughness, Toughness::CriticalStretch(_)),
+        None => problem.block(block).body.can_break(),
     });
     let stretch_ratios: HorizonRatios = horizons.map(|horizon| {
         let ratio = |k: usize| (problem.block(ends[k]).horizon / horizon).sqrt();
@@ -465,17 +512,17 @@ pub fn assign<const D: usize>(
                 built: build(problem, block.body, damage, constants),
                 own_damage: own_damage
                     .map(|damage| damage_law(problem, block.body, damage, constants)),
+                own_critical_stretch: own_critical_stretch(problem, block.body, constants),
                 horizon,
                 share: cell_share(problem, &other, horizon),
             }
         });
         weigh(problem, model, &mut bonds, &ends)?;
-        let horizons = ends.each_ref().map(|end| end.horizon);
         let stiffness = ends.each_ref().map(|end| end.stiffness);
         let criterion = match (own_damage, ends.each_ref().map(|end| end.own_damage)) {
             (InterfaceDamage::Unbreakable, _) => Criterion::Never,
             (_, [Some(own), Some(far)]) => pair_criterion([own, far], stiffness),
-            _ => criterion(problem, blocks, indices, (horizons, stiffness), per_point),
+            _ => criterion(problem, blocks, indices, &ends, per_point),
         };
         let [own, far] = ends.map(|end| end.built.law);
         Ok(Interaction {
@@ -491,6 +538,8 @@ pub fn assign<const D: usize>(
 /// An end of the bonds between two blocks.
 struct End {
     built: Built,
+    /// As of [`own_critical_stretch`].
+    own_critical_stretch: Option<f64>,
     /// As [`bond_stiffness`].
     stiffness: f64,
     /// The damage law of a pair with damage of its own.

@@ -135,7 +135,9 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    let of_bodies = problem.bodies.iter().filter_map(|body| {
+    // A bond that softens is none that stretches so far under force.
+    let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
+    let of_bodies = of_damage.filter_map(|body| {
         let law = block_laws(problem, &Block::unrefined(body)).damage?;
         Some((format!("[body.{}]", body.name), &body.span, law))
     });

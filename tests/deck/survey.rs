@@ -260,10 +260,7 @@ fn volume_that_is_lost() {
     );
     let found = warnings(&overlap);
     assert_eq!(found.len(), 1, "{found:?}");
-    assert!(
-        found[0].contains("volume and mass are 1.1"),
-        "{found:?}"
-    );
+    assert!(found[0].contains("volume and mass are 1.1"), "{found:?}");
 }
 
 #[test]
@@ -289,7 +286,10 @@ fn areas_for_volumes() {
     assert!(of(1e-3).is_empty(), "{:?}", of(1e-3));
     let found = of(1.0);
     assert_eq!(found.len(), 1, "{found:?}");
-    assert!(found[0].contains("check that volumes are in m³"), "{found:?}");
+    assert!(
+        found[0].contains("check that volumes are in m³"),
+        "{found:?}"
+    );
 }
 
 #[test]

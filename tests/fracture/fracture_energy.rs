@@ -26,7 +26,7 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
     };
     // Only the ends of bonds that cross matter, and where laws sum over families, those families.
     let reach = f64::from(ratio);
-    let alone = ["pmb", "elastic_plastic_pmb"];
+    let alone = ["pmb", "elastic_plastic_pmb", "softening_pmb"];
     let wide = if alone.iter().any(|name| law.starts_with(name)) {
         reach
     } else {
@@ -43,6 +43,16 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
         "3d" => "[0.5, 0, 0.5]",
         _ => "[0.5, 0]",
     };
+    // Bonds that soften break by their own law.
+    let (damage, of_body) = if law.starts_with("softening_pmb") {
+        (String::new(), "")
+    } else {
+        let energy = format!("fracture_energy = {FRACTURE_ENERGY}\nalpha = 0\n{more}");
+        (
+            format!("[damage.brittle.{rule}]\n{energy}"),
+            "damage = 'brittle'",
+        )
+    };
     format!(
         "dimension = '{dimension}'
         {constraint}
@@ -53,13 +63,10 @@ fn text(dimension: &str, ratio: u32, law: &str, rule: &str) -> String {
         volume_correction = 'exact'
         [material]
         rubber.{law}
-        [damage.brittle.{rule}]
-        fracture_energy = {FRACTURE_ENERGY}
-        alpha = 0
-        {more}
+        {damage}
         [body.block]
         material = 'rubber'
-        damage = 'brittle'
+        {of_body}
         shape.box = {{ lower = {}, upper = {} }}
         [time]
         end = 1
@@ -120,6 +127,8 @@ fn cost_of_deck<const D: usize>(mode: Mode, deck: &str, growth: f64) -> f64 {
             }
         };
         match mode {
+            // Softening bonds bear something up to larger stretches.
+            Mode::Opening if deck.contains("softening_pmb") => grow(20.0, &|size| [0.0, size]),
             Mode::Opening => grow(0.5, &|size| [0.0, size]),
             Mode::SlideAndOpening(slide) => {
                 grow(slide, &|size| [size, 0.0]);
@@ -214,6 +223,28 @@ fn of_the_elastic_plastic_law() {
     // Bonds that break before they yield.
     let law = "elastic_plastic_pmb = { density = 1, youngs_modulus = 3e3, yield_stretch = 0.05 }";
     in_the_plane(law, 1.0);
+}
+
+#[test]
+fn of_the_softening_law() {
+    // The bonds of the coarsest lattice would break at a stretch of about 0.02 without softening. What they have dissipated
+    // follows from their largest stretch, so that steps may be long.
+    for curve in ["bilinear", "trilinear", "exponential"] {
+        let law = format!(
+            "softening_pmb = {{ density = 1, youngs_modulus = 3e3, strength_stretch = 0.005, \
+             fracture_energy = {FRACTURE_ENERGY}, curve = '{curve}' }}"
+        );
+        for setting in ["uniaxial-stress", "uniaxial-strain"] {
+            let costs = [3, 6].map(|ratio| cost::<1>(setting, ratio, &law, "", 0.02));
+            compare(&format!("{setting} {curve}"), costs, 1.0, [0.06, 0.018]);
+        }
+        for setting in ["plane-stress", "plane-strain"] {
+            let costs = [3, 6].map(|ratio| cost::<2>(setting, ratio, &law, "", 0.02));
+            compare(&format!("{setting} {curve}"), costs, 1.0, [0.04, 0.013]);
+        }
+        let costs = [2, 3].map(|ratio| cost::<3>("3d", ratio, &law, "", 0.05));
+        compare(&format!("3d {curve}"), costs, 1.0, [0.06, 0.03]);
+    }
 }
 
 #[test]

@@ -45,6 +45,7 @@ fn row(law: &Declaration) -> String {
     force += match (law.critical_stretch, law.breaks_by_energy) {
         (Some(_), _) => "; can break",
         (None, true) => "; can break by energy",
+        (None, false) if law.breaks_by_itself() => "; breaks by itself",
         (None, false) => "; cannot break",
     };
     let cells = format!("{force} @ {}", keys(law.keys).join("; "));

@@ -451,6 +451,7 @@ fn with_a_fixed_history_the_force_is_the_slope_of_the_energy() {
         "ordinary_plastic",
         "ordinary_viscoelastic",
         "elastic_plastic_pmb",
+        "softening_pmb",
     ];
     for case in cases().filter(|case| names.contains(&case.law.name)) {
         let cut = "crack.notch.segment = { from = [-1, 9], to = [9, 9] }\n";

@@ -533,6 +533,15 @@ fn blocks_of_a_law_whose_bonds_remember() {
 }
 
 #[test]
+fn blocks_of_a_law_whose_bonds_soften() {
+    let law = "softening_pmb = { density = 2, youngs_modulus = 5, strength_stretch = 0.01, \
+               critical_stretch = 0.03, curve = 'exponential' }";
+    let deck = with_one_law(law).replace("damage = 'brittle'", "");
+    same_with_either_family("softening", &deck);
+    same_everywhere("softening-balance", &(deck + "\n" + RESTLESS), true);
+}
+
+#[test]
 fn scattered_points_from_a_file() {
     same_everywhere("block", BLOCK, true);
     let law = "[material.rubber.elastic_plastic_pmb]\nyield_stretch = 0.02";

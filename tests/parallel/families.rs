@@ -218,6 +218,21 @@ fn bonds_that_remember() {
     compare::<2>(&deck(PLANE, "elastic_plastic_pmb", keys, grid, "0.25"));
 }
 
+#[test]
+fn bonds_that_soften() {
+    let keys = ", strength_stretch = 0.01, critical_stretch = 0.3, curve = 'exponential'";
+    let grid = "horizon = 2.3\nvolume_correction = 'linear'";
+    for template in [SOLID, PLANE] {
+        let deck = deck(template, "softening_pmb", keys, grid, "0");
+        let deck = deck.replace("damage = 'brittle'\n", "");
+        if template == SOLID {
+            compare::<3>(&deck);
+        } else {
+            compare::<2>(&deck);
+        }
+    }
+}
+
 /// A plate from a file, regular but for what `place` does to it, written with few digits.
 fn plate_from_file(place: impl Fn(f64) -> f64) -> String {
     let mut text = String::from("x y volume block\n");

@@ -222,10 +222,7 @@ fn a_restart_compares_the_rows_and_not_the_file() {
         folder.write("u.csv", &format!("t,ux\n{rows}"));
         let text = deck::read(&path, &[]).unwrap().explain().unwrap();
         assert!(!text.contains("u.csv"), "{text}");
-        Source {
-            path: "explained.toml".into(),
-            text,
-        }
+        Source::new("explained.toml", text)
     };
     let old = explained("0,0\n0.5,0.1\n2,0.3\n");
     let against = |rows: &str| deck::differences(&old, &explained(rows)).unwrap();

@@ -441,6 +441,14 @@ fn bonds_that_remember_go_on_as_if_they_had_never_stopped() {
 }
 
 #[test]
+fn bonds_that_soften_go_on_as_if_they_had_never_stopped() {
+    let law = "softening_pmb = { density = 2440, youngs_modulus = 72e9, strength_stretch = 1e-4, critical_stretch = 6e-4 }";
+    for (name, family) in [("softening", "lattice"), ("softening-listed", "list")] {
+        dissipates(&goes_on(name, law, family));
+    }
+}
+
+#[test]
 fn points_that_flow_go_on_as_if_they_had_never_stopped() {
     let law = "correspondence = { density = 2440, youngs_modulus = 72e9, poisson_ratio = 0.2, yield_stress = 10e6, hardening_modulus = 1e9 }";
     dissipates(&goes_on("flowing", law, "auto"));
@@ -527,6 +535,8 @@ fn goes_on(name: &str, law: &str, family: &str) -> BTreeMap<String, Vec<u64>> {
             plain,
             "energy = { fracture_energy = 135, family_correction = 1 }",
         )
+    } else if law.starts_with("softening") {
+        text.replace("damage = 'brittle', ", "")
     } else {
         text
     };

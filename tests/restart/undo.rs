@@ -145,3 +145,14 @@ fn of_bonds_that_yield_and_break() {
         });
     }
 }
+
+#[test]
+fn of_bonds_that_soften_and_break() {
+    let law = "softening_pmb = { density = 2, youngs_modulus = 5, strength_stretch = 0.01, critical_stretch = 0.03 }";
+    for family in ["lattice", "list"] {
+        let deck = plate(law, 0.0, family).replace("damage = 'brittle', ", "");
+        undone_and_made_again(&deck, |before, after| {
+            breaks(before, after) && after[DISSIPATED] > before[DISSIPATED]
+        });
+    }
+}

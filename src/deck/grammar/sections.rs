@@ -49,7 +49,7 @@ use Form::{Array, Key, Named, NamedKind, Table};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
-pub const SECTIONS: [Section; 37] = [
+pub const SECTIONS: [Section; 38] = [
     Section::new("title", Key, Free),
     Section::new("dimension", Key, Fixed),
     Section::new("thickness", Key, Fixed),

@@ -22,6 +22,9 @@ pub struct Stored {
     pub energy: Vec<f64>,
     /// Volume of the intact neighbours in the point's own family, m³.
     pub volume: Vec<f64>,
+    /// That volume times the share of its stiffness that each bond has lost, m³; empty where no law softens or where it
+    /// was not asked for.
+    pub softened: Vec<f64>,
     /// Number of intact neighbours, those included that have the point in their family only.
     pub neighbours: Vec<f64>,
     /// Energy density that bonds have dissipated without breaking, J/m³; empty where no law can or energies
@@ -69,6 +72,7 @@ impl<const D: usize> Forces<D> {
         Stored {
             energy,
             volume,
+            softened: Vec::new(),
             neighbours,
             dissipated: if self.has_history {
                 dissipated
@@ -92,9 +96,25 @@ impl<const D: usize> Forces<D> {
         Stored {
             energy: Vec::new(),
             volume,
+            softened: Vec::new(),
             neighbours,
             dissipated: Vec::new(),
         }
+    }
+
+    /// [`Stored::softened`].
+    pub fn softened(&mut self, model: &Model<D>) -> Vec<f64> {
+        if !self.blocks.iter().any(|block| block.law.softens::<D>()) {
+            return Vec::new();
+        }
+        let mut columns = self.measure(model.owned(), 1, |interaction, sums, source| {
+            let [law, _] = interaction.laws.laws();
+            if law.softens::<D>() {
+                let kernel = measures::Softened { law };
+                sweep_all(&mut interaction.bonds, sums, &kernel, source);
+            }
+        });
+        columns.swap_remove(0)
     }
 
     /// D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.

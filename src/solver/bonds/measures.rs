@@ -91,6 +91,30 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
+/// Sums the volume of the intact neighbours in each point's own family (m³) times the share of its stiffness that the
+/// bond to them has lost.
+#[derive(Clone, Copy)]
+pub struct Softened {
+    /// The law of point i.
+    pub law: AnyLaw,
+}
+
+impl<const D: usize> Kernel<D> for Softened {
+    type Sums = [Lanes; 1];
+    type Broken = [Lanes; 0];
+    type Point = [Lanes; 0];
+    type BondHistory = AnyHistory;
+    type Rotation = [Lanes; 0];
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const WANTED: Wanted = wanted(true);
+
+    #[inline(always)]
+    fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut [Lanes; 1]) {
+        let lost = Law::<D>::lost_stiffness(&self.law, &group.history[0]);
+        sums[0] += simd.keep(lost * group.volume, group.family());
+    }
+}
+
 /// Entries of a symmetric tensor in the order xx, yy, zz, xy, yz, xz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 

@@ -22,6 +22,7 @@ impl Snapshot {
     /// Looks at a run, whose forces are those of the present place.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.stored(&simulation.model);
+        stored.softened = simulation.forces.softened(&simulation.model);
         if let Some(work) = &simulation.fields.plastic_work {
             stored.dissipated.resize(work.len(), 0.0);
             for (dissipated, work) in stored.dissipated.iter_mut().zip(work) {
@@ -33,16 +34,19 @@ impl Snapshot {
 
     /// Without energies: neither for a row of the history nor for [`Field::StrainEnergyDensity`].
     pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
-        let stored = simulation.forces.intact_families(&simulation.model);
+        let mut stored = simulation.forces.intact_families(&simulation.model);
+        stored.softened = simulation.forces.softened(&simulation.model);
         Self { stored }
     }
 
     /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
-    /// al. 2014, eq. 7). A point without family has 0.
+    /// al. 2014, eq. 7). The volume at a bond that softens counts as cut off to the share of its stiffness that it has
+    /// lost. A point without family has 0.
     pub fn damage(&self, family_volume: &PaletteColumn, point: usize) -> f64 {
+        let softened = self.stored.softened.get(point).copied().unwrap_or(0.0);
         match family_volume[point] {
             0.0 => 0.0,
-            whole => 1.0 - self.stored.volume[point] / whole,
+            whole => 1.0 - (self.stored.volume[point] - softened) / whole,
         }
     }
 

@@ -1,0 +1,543 @@
+//! Softening microelastic material: f = c (1 − d) s e where the bond is pulled, with the damage variable d of its
+//! largest stretch κ so far; f = c s e where it is pushed.
+//!
+//! On first loading f/c is F(κ): κ up to the strength stretch s0, then a curve that falls from s0 at s0 to 0 at the
+//! critical stretch sc, and 1 − d = F(κ)/κ. Unloading goes to the origin. Damage does not act under compression, as
+//! where the faces of a crack close.
+//!
+//! | curve | F between s0 and sc |
+//! |---|---|
+//! | bilinear | s0 (sc − κ)/(sc − s0) |
+//! | trilinear | straight from s0 at s0 to β s0 at s0 + γ (sc − s0), and to 0 at sc |
+//! | exponential | s0 (exp(−(κ − s0)/a) − r)/(1 − r), sc = s0 + a ln(1/r) |
+//!
+//! A body that is pulled along an axis, and free across, bears more than E s0: as the bonds along the axis soften, others
+//! come nearer to their strength. s0 follows from the tensile strength f_t so that f_t is the largest stress of that
+//! homogeneous motion, found by quadrature over the directions of the bonds.
+//!
+//! A bond that is pulled to sc takes c |ξ| A with A = ∫ F dκ. One of the prototype law that breaks at s_e takes
+//! c |ξ| s_e²/2: with A = s_e²/2 all bonds across a unit area take the fracture energy for which s_e is the critical
+//! stretch of the prototype law, in every dimension.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::declaration::bond_based_critical_stretch;
+use super::{
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
+    LawFault, Pmb, Values, Word,
+};
+use crate::dimension::{Constraint, Dimension};
+use crate::lanes::{IsaSet, Lanes, WIDTH};
+use crate::message::format_number;
+
+/// The law with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SofteningPmb {
+    /// The elastic part.
+    pub elastic: Pmb,
+    /// s0.
+    pub strength_stretch: f64,
+    /// sc.
+    pub critical_stretch: f64,
+    /// F between s0 and sc.
+    pub curve: SofteningCurve,
+}
+
+/// How the force of a bond falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SofteningCurve {
+    /// Two straight lines that meet at the stretch `kink`, where the force is the share `kink_force` of the strength.
+    Lines {
+        /// s0 + γ (sc − s0).
+        kink: f64,
+        /// β.
+        kink_force: f64,
+    },
+    /// With this decay stretch a.
+    Exponential {
+        /// a.
+        decay: f64,
+    },
+}
+
+/// r: the share of the strength at which an exponential without end has come to sc.
+const RESIDUAL: f64 = 0.01;
+
+/// ln(1/r).
+const DECAYS: f64 = 4.605_170_185_988_092;
+
+/// β and γ of a straight line, and of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t of 3.6 G_F/f_t.
+const STRAIGHT: [f64; 2] = [0.5, 0.5];
+const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
+
+const TENSILE_STRENGTH: Key = Key {
+    name: "tensile_strength",
+    meaning: "f_t, Pa: the largest stress of a body that is pulled along an axis; this or `strength_stretch`",
+    kind: ABOVE_ZERO,
+};
+
+const STRENGTH_STRETCH: Key = Key {
+    name: "strength_stretch",
+    meaning: "the stretch s0 at which a bond begins to soften",
+    kind: ABOVE_ZERO,
+};
+
+const FRACTURE_ENERGY: Key = Key {
+    name: "fracture_energy",
+    meaning: "G_F, J/m²: what all bonds across a unit area take; this or `critical_stretch`",
+    kind: ABOVE_ZERO,
+};
+
+const CRITICAL_STRETCH: Key = Key {
+    name: "critical_stretch",
+    meaning: "the stretch s_c at which a bond bears nothing any more and breaks",
+    kind: ABOVE_ZERO,
+};
+
+const CURVE: Key = Key {
+    name: "curve",
+    meaning: "how the force of a bond falls between s0 and s_c: on a line, on two lines, or as an exponential",
+    kind: Kind::Word(&[
+        Word::new("bilinear"),
+        Word::new("trilinear"),
+        Word::new("exponential"),
+    ]),
+};
+
+const KINK_FORCE: Key = Key {
+    name: "kink_force",
+    meaning: "β of \"trilinear\": the force at the kink over the largest; 1/3 if not given",
+    kind: BELOW_ONE,
+};
+
+const KINK_STRETCH: Key = Key {
+    name: "kink_stretch",
+    meaning: "γ of \"trilinear\": where between s0 and s_c the kink is, as a share; 2/9 if not given",
+    kind: BELOW_ONE,
+};
+
+const ABOVE_ZERO: Kind = Kind::Optional {
+    range: f64::MIN_POSITIVE..f64::INFINITY,
+    words: "above 0",
+};
+
+const BELOW_ONE: Kind = Kind::Optional {
+    range: f64::MIN_POSITIVE..1.0,
+    words: "above 0 and below 1",
+};
+
+impl Declared for SofteningPmb {
+    const DECLARATIONS: &'static [Declaration] = &[Declaration {
+        keys: &[
+            TENSILE_STRENGTH,
+            STRENGTH_STRETCH,
+            FRACTURE_ENERGY,
+            CRITICAL_STRETCH,
+            CURVE,
+            KINK_FORCE,
+            KINK_STRETCH,
+        ],
+        invariants: |_| Invariants {
+            conservative: false,
+            ..Invariants::ALL
+        },
+        fault: Some(fault),
+        own_critical_stretch: Some(|given| stretches(given).1),
+        horizon_fault: Some(horizon_fault),
+        examples: &[
+            "strength_stretch = 0.02, critical_stretch = 0.1",
+            "tensile_strength = 0.1, fracture_energy = 0.05, curve = 'trilinear'",
+            "strength_stretch = 0.03, fracture_energy = 0.05, curve = 'exponential'",
+        ],
+        ..Declaration::new(
+            "softening_pmb",
+            "f = c (1 − d) s e, where d ≥ 0 of a bond follows from its largest stretch so that the force of a pulled \
+             bond falls from s0 to s_c, where it breaks",
+            build,
+        )
+    }];
+}
+
+fn number(values: &Values, key: &Key) -> Option<f64> {
+    values.get(key.name).map(|_| values.number(key.name))
+}
+
+/// Two measures, or none, of the strength or of the end; a kink of a curve without one; an end before the strength.
+fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
+    for [first, second] in [
+        [&TENSILE_STRENGTH, &STRENGTH_STRETCH],
+        [&FRACTURE_ENERGY, &CRITICAL_STRETCH],
+    ] {
+        let (key, message) = match [first, second].map(|key| number(values, key).is_some()) {
+            [true, true] => {
+                let message = format!("`{}` is given already; give one of them", first.name);
+                (Some(second.name), message)
+            }
+            [false, false] => {
+                let message = format!("needs `{}` or `{}`", first.name, second.name);
+                (None, message)
+            }
+            _ => continue,
+        };
+        return Some(LawFault { key, message });
+    }
+    let kinks = [KINK_FORCE, KINK_STRETCH];
+    let kink = kinks.iter().find(|key| number(values, key).is_some())?;
+    (values.word(CURVE.name) != "trilinear").then(|| LawFault {
+        key: Some(kink.name),
+        message: "is for `curve = \"trilinear\"`".to_owned(),
+    })
+}
+
+/// β and γ of a curve of lines.
+fn kink(values: &Values) -> [f64; 2] {
+    if values.word(CURVE.name) == "bilinear" {
+        return STRAIGHT;
+    }
+    let [force, stretch] = CONCRETE;
+    [
+        number(values, &KINK_FORCE).unwrap_or(force),
+        number(values, &KINK_STRETCH).unwrap_or(stretch),
+    ]
+}
+
+/// ∫ F dκ from s0 to sc over s0 (sc − s0).
+fn fullness(values: &Values) -> f64 {
+    if values.word(CURVE.name) == "exponential" {
+        1.0 / DECAYS - RESIDUAL / (1.0 - RESIDUAL)
+    } else {
+        let [force, stretch] = kink(values);
+        0.5 * (force + stretch)
+    }
+}
+
+/// The modulus of a bar that is pulled along its axis in a setting, Pa.
+fn tensile_modulus(given: &Given) -> f64 {
+    let (modulus, ratio) = (given.elastic.youngs_modulus, given.elastic.poisson_ratio);
+    match given.dimension {
+        Dimension::PlaneStrain { .. } => modulus / (1.0 - ratio * ratio),
+        Dimension::Line {
+            constraint: Constraint::UniaxialStrain,
+            ..
+        } => modulus * 1.2,
+        Dimension::PlaneStress { .. }
+        | Dimension::Space
+        | Dimension::Line {
+            constraint: Constraint::UniaxialStress,
+            ..
+        } => modulus,
+    }
+}
+
+/// sc for an s0.
+fn critical_stretch(given: &Given, strength: f64) -> f64 {
+    let values = given.values;
+    number(values, &CRITICAL_STRETCH).unwrap_or_else(|| {
+        let energy = values.number(FRACTURE_ENERGY.name);
+        let elastic = bond_based_critical_stretch(given, energy);
+        let softening = 0.5 * (elastic * elastic - strength * strength);
+        strength + softening / (strength * fullness(values))
+    })
+}
+
+/// Iterations for s0 from f_t. The largest stress changes little with sc/s0: each gains more than half a digit.
+const STRENGTH_ITERATIONS: u32 = 8;
+
+/// s0 and sc.
+fn stretches(given: &Given) -> (f64, f64) {
+    let values = given.values;
+    if let Some(strength) = number(values, &STRENGTH_STRETCH) {
+        return (strength, critical_stretch(given, strength));
+    }
+    let first = values.number(TENSILE_STRENGTH.name) / tensile_modulus(given);
+    let mut strength = first;
+    for _ in 0..STRENGTH_ITERATIONS {
+        let critical = critical_stretch(given, strength);
+        if critical <= strength {
+            break;
+        }
+        let unit = SofteningPmb {
+            elastic: Pmb { micromodulus: 1.0 },
+            strength_stretch: 1.0,
+            critical_stretch: critical / strength,
+            curve: curve(values, 1.0, critical / strength),
+        };
+        strength = first / unit.largest_tension(given.dimension);
+    }
+    (strength, critical_stretch(given, strength))
+}
+
+/// F between these s0 and sc.
+fn curve(values: &Values, strength: f64, critical: f64) -> SofteningCurve {
+    let falls = critical - strength;
+    if values.word(CURVE.name) == "exponential" {
+        return SofteningCurve::Exponential {
+            decay: falls / DECAYS,
+        };
+    }
+    let [kink_force, kink_stretch] = kink(values);
+    SofteningCurve::Lines {
+        kink: strength + kink_stretch * falls,
+        kink_force,
+    }
+}
+
+/// With four digits.
+fn rounded(number: f64) -> String {
+    let digits = format!("{number:.3e}");
+    digits.parse().map_or(digits, format_number)
+}
+
+/// Bonds that would break before they soften: with a long horizon they hold more than the fracture energy at their
+/// strength.
+fn horizon_fault(given: &Given) -> Option<String> {
+    let (strength, critical) = stretches(given);
+    if critical > strength {
+        return None;
+    }
+    let values = given.values;
+    Some(match number(values, &FRACTURE_ENERGY) {
+        Some(energy) => {
+            let elastic = bond_based_critical_stretch(given, energy);
+            let held = (strength / elastic).powi(2);
+            format!(
+                "`fracture_energy`, {} J/m², must be above the {} J/m² that bonds of a horizon of {} m hold where \
+                 they begin to soften; take a horizon below {} m",
+                format_number(energy),
+                rounded(energy * held),
+                format_number(given.horizon),
+                rounded(given.horizon / held),
+            )
+        }
+        None => format!(
+            "`critical_stretch`, {}, must be above the stretch at which bonds begin to soften, {}",
+            format_number(critical),
+            format_number(strength)
+        ),
+    })
+}
+
+fn build(given: &Given) -> Built {
+    let (strength_stretch, critical_stretch) = stretches(given);
+    Built::plain(SofteningPmb {
+        elastic: Pmb::of(given),
+        strength_stretch,
+        critical_stretch,
+        curve: curve(given.values, strength_stretch, critical_stretch),
+    })
+}
+
+/// Directions of the bonds between an axis and the plane normal to it, in the quadrature of the stress.
+const DIRECTIONS: usize = 64;
+
+/// Growth of the strain from one motion to the next, the share of the largest stress below which no larger one is
+/// expected, and the most motions.
+const STRAIN_GROWTH: f64 = 1.02;
+const PAST_LARGEST: f64 = 0.95;
+const MOST_STRAINS: usize = 400;
+
+/// Iterations for the strain across.
+const ACROSS_ITERATIONS: usize = 25;
+
+impl SofteningPmb {
+    /// F, on first loading.
+    fn first_loading(&self, stretch: Lanes) -> Lanes {
+        let zero = Lanes::splat(0.0);
+        let pulled = stretch.max(zero);
+        pulled * self.secant(pulled) + stretch.min(zero)
+    }
+
+    /// The largest stress of a homogeneous body that is pulled along an axis, and free across, over the stress at the
+    /// strength stretch without softening.
+    pub fn largest_tension(&self, dimension: Dimension) -> f64 {
+        let in_space = match dimension {
+            Dimension::Line { .. } => return 1.0,
+            Dimension::PlaneStress { .. } | Dimension::PlaneStrain { .. } => false,
+            Dimension::Space => true,
+        };
+        // Squares of the cosine and of the sine of the angle to the axis, and what a direction counts.
+        let directions: [[Lanes; 3]; DIRECTIONS / WIDTH] = std::array::from_fn(|group| {
+            let angle = |lane: usize| {
+                let middle = (WIDTH * group + lane) as f64 + 0.5;
+                middle / DIRECTIONS as f64 * FRAC_PI_2
+            };
+            let lanes = |of: fn(f64) -> f64| Lanes(std::array::from_fn(|lane| of(angle(lane))));
+            let weight = if in_space {
+                lanes(libm::sin)
+            } else {
+                Lanes::splat(1.0)
+            };
+            let (cos, sin) = (lanes(libm::cos), lanes(libm::sin));
+            [cos * cos, sin * sin, weight]
+        });
+        // Stress along and across.
+        let stress = |along: f64, across: f64| {
+            let mut sums = [Lanes::splat(0.0); 2];
+            for [cos2, sin2, weight] in directions {
+                let force = self.first_loading(cos2 * along + sin2 * across) * weight;
+                sums[0] += force * cos2;
+                sums[1] += force * sin2;
+            }
+            sums.map(Lanes::sum)
+        };
+        let free_across = |along: f64| {
+            // Pressed as much as it is pulled, it is pressed across.
+            let (mut low, mut high) = (-along, 0.0);
+            for _ in 0..ACROSS_ITERATIONS {
+                let middle = 0.5 * (low + high);
+                if stress(along, middle)[1] > 0.0 {
+                    high = middle;
+                } else {
+                    low = middle;
+                }
+            }
+            stress(along, 0.5 * (low + high))[0]
+        };
+        let elastic = free_across(self.strength_stretch);
+        let (mut strain, mut largest) = (self.strength_stretch, elastic);
+        for _ in 0..MOST_STRAINS {
+            strain *= STRAIN_GROWTH;
+            let now = free_across(strain);
+            largest = largest.max(now);
+            if now < PAST_LARGEST * largest {
+                break;
+            }
+        }
+        largest / elastic
+    }
+}
+
+impl Described for SofteningPmb {
+    fn described(&self) -> Vec<(&'static str, String)> {
+        let mut facts = self.elastic.described();
+        facts.push(("strength stretch", format!("{:.4e}", self.strength_stretch)));
+        facts
+    }
+}
+
+impl SofteningPmb {
+    /// Largest stretches from s0 to sc.
+    #[inline(always)]
+    fn in_softening(&self, largest: Lanes) -> Lanes {
+        largest
+            .max(Lanes::splat(self.strength_stretch))
+            .min(Lanes::splat(self.critical_stretch))
+    }
+
+    /// How far stretches have come from one to another, as a share.
+    #[inline(always)]
+    fn way(stretch: Lanes, from: f64, to: f64) -> Lanes {
+        let way = (stretch - Lanes::splat(from)) * (1.0 / (to - from));
+        way.max(Lanes::splat(0.0)).min(Lanes::splat(1.0))
+    }
+
+    /// F over s0 for largest stretches from s0 to sc.
+    #[inline(always)]
+    fn relative_force(&self, largest: Lanes) -> Lanes {
+        let one = Lanes::splat(1.0);
+        match self.curve {
+            SofteningCurve::Lines { kink, kink_force } => {
+                let first = Self::way(largest, self.strength_stretch, kink);
+                let second = Self::way(largest, kink, self.critical_stretch);
+                (one - first) * (1.0 - kink_force) + (one - second) * kink_force
+            }
+            SofteningCurve::Exponential { decay } => {
+                let decays = (Lanes::splat(self.strength_stretch) - largest) * (1.0 / decay);
+                let force = (decays.exp() - Lanes::splat(RESIDUAL)) * (1.0 / (1.0 - RESIDUAL));
+                force.max(Lanes::splat(0.0)).min(one)
+            }
+        }
+    }
+
+    /// ∫ F dκ from s0 over s0, for largest stretches from s0 to sc.
+    #[inline(always)]
+    fn relative_area(&self, largest: Lanes) -> Lanes {
+        let one = Lanes::splat(1.0);
+        match self.curve {
+            SofteningCurve::Lines { kink, kink_force } => {
+                let first = Self::way(largest, self.strength_stretch, kink);
+                let second = Self::way(largest, kink, self.critical_stretch);
+                let to_kink = first * (one - first * (0.5 * (1.0 - kink_force)));
+                let to_end = second * (one - second * 0.5);
+                to_kink * (kink - self.strength_stretch)
+                    + to_end * (kink_force * (self.critical_stretch - kink))
+            }
+            SofteningCurve::Exponential { decay } => {
+                let decays = (largest - Lanes::splat(self.strength_stretch)) * (1.0 / decay);
+                let whole = one - (decays * -1.0).exp() - decays * RESIDUAL;
+                whole * (decay / (1.0 - RESIDUAL))
+            }
+        }
+    }
+
+    /// 1 − d of bonds with these largest stretches.
+    #[inline(always)]
+    fn secant(&self, largest: Lanes) -> Lanes {
+        if largest.above(self.strength_stretch) == 0 {
+            return Lanes::splat(1.0);
+        }
+        let largest = self.in_softening(largest);
+        self.relative_force(largest) * self.strength_stretch / largest
+    }
+}
+
+impl<const D: usize> Law<D> for SofteningPmb {
+    type Point = [Lanes; 0];
+    /// κ.
+    type BondHistory = [Lanes; 1];
+    type ReferenceSum = [Lanes; 0];
+    type Sum = [Lanes; 0];
+    type Force = Along;
+    const ISA_SET: IsaSet = IsaSet::Avx2;
+    const FORCE_READS_STRETCH: bool = true;
+    const SOFTENS: bool = true;
+
+    #[inline(always)]
+    fn bond_history(
+        &self,
+        bond: &Bond<D>,
+        _: &[Lanes; 0],
+        [before]: &[Lanes; 1],
+        _: f64,
+    ) -> [Lanes; 1] {
+        [bond.stretch.max(*before)]
+    }
+
+    #[inline(always)]
+    fn force(&self, bond: &Bond<D>, _: &[Lanes; 0], [largest]: &[Lanes; 1]) -> Along {
+        let (zero, extension) = (Lanes::splat(0.0), bond.extension_over_deformed);
+        let elastic = extension.max(zero) * self.secant(*largest) + extension.min(zero);
+        Along(elastic * (bond.inverse * (0.5 * self.elastic.micromodulus)))
+    }
+
+    #[inline(always)]
+    fn bond_energy(&self, bond: &Bond<D>, _: &[Lanes; 0], [largest]: &[Lanes; 1]) -> Lanes {
+        let zero = Lanes::splat(0.0);
+        let (pulled, pushed) = (bond.stretch.max(zero), bond.stretch.min(zero));
+        let squares = pulled * pulled * self.secant(*largest) + pushed * pushed;
+        squares * bond.length * (0.25 * self.elastic.micromodulus)
+    }
+
+    /// What pulling to κ takes less what unloading from there gives back.
+    #[inline(always)]
+    fn dissipated(&self, length: Lanes, [largest]: &[Lanes; 1]) -> Lanes {
+        if largest.above(self.strength_stretch) == 0 {
+            return Lanes::splat(0.0);
+        }
+        let strength = self.strength_stretch;
+        let largest = self.in_softening(*largest);
+        let taken = self.relative_area(largest) + Lanes::splat(0.5 * strength);
+        let stored = self.relative_force(largest) * largest * 0.5;
+        (taken - stored) * length * (0.5 * self.elastic.micromodulus * strength)
+    }
+
+    #[inline(always)]
+    fn lost_stiffness(&self, [largest]: &[Lanes; 1]) -> Lanes {
+        Lanes::splat(1.0) - self.secant(*largest)
+    }
+
+    #[inline(always)]
+    fn stiffness(&self, length: Lanes, end: &[Lanes; 0]) -> Lanes {
+        Law::<D>::stiffness(&self.elastic, length, end)
+    }
+}
