@@ -197,7 +197,7 @@ time.end = 1
             let warnings = lints(&text);
             warnings
                 .iter()
-                .any(|line| line.contains("a comparison is missing"))
+                .any(|line| line.contains("add a comparison"))
         };
         for condition in [
             "y < 1",

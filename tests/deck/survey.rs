@@ -251,7 +251,7 @@ fn volume_that_is_lost() {
         "{found:?}"
     );
     assert!(
-        found[0].contains("are 3.23 % too small; choose a spacing"),
+        found[0].contains("are 3.22 % too small; choose a spacing"),
         "{found:?}"
     );
     // A finer body takes 2.25 rows and columns of the other.
