@@ -243,7 +243,7 @@ def complete(program, deck, out, layout):
     code = wait(start(program, deck, out, layout))
     if code != 0:
         raise Failure(f"ends with code {code}:\n{printed_by(out)}")
-    if "a new result begins" in printed_by(out):
+    if "starting a new result" in printed_by(out):
         raise Failure(f"does not continue its result:\n{printed_by(out)}")
 
 

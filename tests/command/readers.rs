@@ -139,7 +139,7 @@ fn a_result_of_some_points_in_single_precision() {
         let output = finish(&mut command);
         let printed = text(&output);
         assert!(
-            printed.contains(told) && printed.contains("a new result begins"),
+            printed.contains(told) && printed.contains("starting a new result"),
             "{printed}"
         );
         run("small3", &small, 1, &["--overwrite"]);

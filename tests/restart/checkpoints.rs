@@ -694,7 +694,7 @@ fn columns_of_the_history_keep_their_meaning() {
     // Rows at other times mean the same.
     let deck = plate("1e-5", "").replace("every_steps = 50,", "every_steps = 25,");
     let printed = continued_with(&folder, "often", &deck);
-    assert!(!printed.contains("a new result begins"), "{printed}");
+    assert!(!printed.contains("starting a new result"), "{printed}");
 }
 
 #[test]
@@ -829,7 +829,7 @@ fn a_refined_region_is_continued_in_its_result() {
     let output = finish(&mut run(3, &deck, &out, &later));
     let printed = text(&output);
     assert!(output.status.success(), "{printed}");
-    assert!(!printed.contains("a new result begins"), "{printed}");
+    assert!(!printed.contains("starting a new result"), "{printed}");
     let expected = datasets(&result(&whole));
     assert!(expected.contains_key("level 0"));
     assert_eq!(difference(&expected, &datasets(&result(&out))), None);
