@@ -114,7 +114,7 @@ impl Damages<'_> {
             (None, None) => return Ok((InterfaceDamage::OfBodies, 0..0)),
             (Some(_), Some(strength)) => {
                 let message = format!(
-                    "{key} strength: gives the critical stretch of the bonds, which `damage` gives already; take one of them"
+                    "{key} strength: `damage` is given already; give one of `damage` and `strength`"
                 );
                 return Err(scope.error(strength.span(), message));
             }
@@ -123,7 +123,7 @@ impl Damages<'_> {
         };
         if !self.has_bonds {
             let message = format!(
-                "{key} {what}: no bonds join these bodies, by `rule = \"none\"`; give the pair another `rule`"
+                "{key} {what}: `rule = \"none\"` makes no bonds between these bodies; give the pair another `rule`"
             );
             return Err(scope.error(span, message));
         }
@@ -159,7 +159,7 @@ impl Damages<'_> {
             let declaration = law.declaration;
             if declaration.critical_stretch.is_none() {
                 return error(format!(
-                    "bonds of `{}` break by their work, at which the stress depends on their length; give `damage`",
+                    "bonds of `{}` break by work, so a strength does not define them; give `damage`",
                     declaration.name
                 ));
             }

@@ -200,7 +200,7 @@ impl Section<'_> {
         let Some(found) = Isotropic::from_two(pair[0], pair[1]) else {
             let names: Vec<&str> = given.iter().map(|(name, _)| *name).collect();
             return Err(error(format!(
-                "{} contradict each other: moduli must be above 0 and Poisson's ratio between -1 and 0.5",
+                "{} must give moduli above 0 and a Poisson's ratio between -1 and 0.5",
                 names.join(" and ")
             )));
         };

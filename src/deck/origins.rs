@@ -1,4 +1,4 @@
-//! Where the parts of a deck come from that the command line has put together.
+//! Source locations in a deck merged from several files.
 
 use std::ops::Range;
 use std::path::PathBuf;

@@ -72,11 +72,10 @@ fn merge_tables<'k>(
 
 /// Whether a table has one key, which names a choice: the law of a material, the kind of a damage or crack, a shape.
 fn is_choice(path: &[&str]) -> bool {
-    match path {
-        ["material" | "damage" | "crack", _] => true,
-        [.., last] => *last == "shape",
-        [] => false,
-    }
+    matches!(
+        path,
+        ["material" | "damage" | "crack", _] | ["body" | "set" | "rigid", _, "shape"]
+    )
 }
 
 /// Let the tables of an item follow those that are there already, instead of mixing with them by their positions in

@@ -33,7 +33,7 @@ pub struct Source {
 }
 
 /// The line of a changed deck that an error marks is in no file.
-const CHANGED: &str = "\nnote: lines are those of the deck as changed by --set";
+const CHANGED: &str = "\nnote: lines are those of the deck as changed by --with and --set";
 
 impl Source {
     /// The text of a file.

@@ -18,6 +18,9 @@ use crate::problem::{Action, Problem, RigidMotion};
 /// Maximum number of rows.
 const MAX_ROWS: usize = 100_000;
 
+/// Difference of times, as a share of the end, that is round-off.
+const ROUNDING: f64 = 1e-9;
+
 /// Maximum length of a file, bytes.
 const LONGEST: u64 = 1 << 28;
 
@@ -37,11 +40,12 @@ pub fn read(scope: &mut Scope, deck: &Deck) -> Result<()> {
         }
         if Expression::is_function(name) || scope.parameters.contains_key(name) {
             let what = if scope.parameters.contains_key(name) {
-                "of [parameters]"
+                "a parameter"
             } else {
                 "a function"
             };
-            let message = format!("{key}: `{name}` is {what} already; take another name");
+            let message =
+                format!("{key}: `{name}` is already the name of {what}; take another name");
             return Err(scope.error(spanned.span(), message));
         }
         let table = table(scope, &key, spanned)?;
@@ -75,7 +79,7 @@ fn table(scope: &Scope, key: &str, spanned: &Spanned<grammar::Table>) -> Result<
             } else {
                 ("values", "file")
             };
-            let message = format!("{key} {name}: belongs to `{of}`, and `{other}` is given");
+            let message = format!("{key} {name}: is only for `{of}`, but `{other}` is given");
             return Err(scope.error(span, message));
         }
     }
@@ -96,7 +100,7 @@ fn inline(
     times: Option<&Spanned<Vec<Number>>>,
 ) -> Result<Table> {
     let Some(times) = times else {
-        let message = format!("{key} values: needs `times`, as many numbers");
+        let message = format!("{key} values: needs `times` with the same number of entries");
         return Err(scope.error(values.span(), message));
     };
     let numbers = |list: &Spanned<Vec<Number>>, name: &str| {
@@ -107,6 +111,10 @@ fn inline(
             .collect::<Result<Vec<f64>>>()
     };
     let (written, count) = (times.get_ref(), values.get_ref().len());
+    if count > MAX_ROWS {
+        let message = format!("{key} values: has more than {MAX_ROWS} rows, the maximum");
+        return Err(scope.error(values.span(), message));
+    }
     if written.len() != count {
         let message = format!(
             "{key} times: must be as many as `values`, {count}, are {}",
@@ -140,7 +148,8 @@ fn from_file(
     let header = heading(&path).map_err(unreadable)?;
     let length = std::fs::metadata(&path).map_err(unreadable)?.len();
     if length > LONGEST {
-        let message = format!("{key} file: is longer than {LONGEST} bytes; is this a table?");
+        let message =
+            format!("{key} file: is longer than {LONGEST} bytes; check that this is a table");
         return Err(scope.error(file.span(), message));
     }
     let bytes = std::fs::read(&path).map_err(unreadable)?;
@@ -177,7 +186,7 @@ fn from_file(
             })
         };
         if times.len() == MAX_ROWS {
-            let message = format!("a table has {MAX_ROWS} rows at most, and this is one more");
+            let message = format!("has more than {MAX_ROWS} rows, the maximum");
             return Err(at(line, message));
         }
         times.push(number(time)?);
@@ -208,6 +217,12 @@ fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usi
     let value = match &table.column {
         Some(name) => find(name.get_ref())?,
         None if names.len() == 2 => 1 - time,
+        None if names.len() < 2 => {
+            return Err(format!(
+                "needs a column of times and one of values, has only {}",
+                excerpt(&names.join(" "))
+            ));
+        }
         None => {
             return Err(format!(
                 "has {} columns; name the one of the values by `column`: {}",
@@ -228,7 +243,7 @@ fn columns(table: &grammar::Table, names: &[String]) -> std::result::Result<[usi
 /// An error if a table has no rows for a time at which the run needs its value.
 ///
 /// # Errors
-/// As said.
+/// When the rows of a table begin too late or end too early.
 pub fn cover_the_run(scope: &Scope, problem: &Problem) -> Result<()> {
     let mut start = 0.0;
     for stage in problem.all_stages() {
@@ -274,17 +289,19 @@ fn covers(
     [start, end]: [f64; 2],
 ) -> Result<()> {
     let tables = expressions.into_iter().flat_map(Expression::tables);
+    // Ends of runs and stages are often products, such as `3*0.1`.
+    let slack = ROUNDING * end;
     for table in tables {
         let [first, last] = table.range();
-        let (does, at, acts, until) = if first > start {
-            ("begins", first, "acts from", start)
-        } else if last < end {
-            ("ends", last, "acts until", end)
+        let (does, at, needed, until) = if first > start + slack {
+            ("begins", first, "from", start)
+        } else if last < end - slack {
+            ("ends", last, "until", end)
         } else {
             continue;
         };
         let message = format!(
-            "{key}: the table `{}` {does} at t = {} s, and this {acts} {} s; give it rows for all of that time",
+            "{key}: the table `{}` {does} at t = {} s but is needed {needed} {} s; add rows",
             scope.table_name(table),
             format_number(at),
             format_number(until)

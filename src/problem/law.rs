@@ -92,7 +92,7 @@ impl Law {
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
-                "bonds of the law `{}` break where they have softened; leave out `damage`",
+                "`{}` breaks its bonds itself; remove `damage`",
                 self.declaration.name
             ));
         }

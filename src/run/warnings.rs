@@ -100,8 +100,8 @@ impl<'a> Job<'a> {
             return;
         }
         let text = format!(
-            "bonds broke up to one step late: they held {overshoot:.3e} J above their criterion, at a fracture energy of \
-             {fracture:.3e} J. Repeat with half the `safety` and compare",
+            "bonds broke up to one step late: their energy above the criterion, {overshoot:.3e} J, exceeds half of the \
+             fracture energy, {fracture:.3e} J; halve `safety` and compare",
         );
         self.observer.message(&Message::Warning(text));
     }

@@ -135,7 +135,7 @@ fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warnin
 }
 
 fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
-    // A bond that softens is none that stretches so far under force.
+    // Softening bonds carry no force near their critical stretch.
     let of_damage = problem.bodies.iter().filter(|body| body.damage.is_some());
     let of_bodies = of_damage.filter_map(|body| {
         let law = block_laws(problem, &Block::unrefined(body)).damage?;

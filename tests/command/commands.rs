@@ -110,7 +110,7 @@ fn any_key_is_set_from_the_command_line() {
         ),
         (
             "time.safty=0.4",
-            "note: lines are those of the deck as changed by --set",
+            "note: lines are those of the deck as changed by --with and --set",
         ),
         ("time.safety=high", "safety"),
         ("dimension.x=1", "`dimension` is a value, not a section"),
@@ -954,7 +954,7 @@ fn errors_in_an_overlay_name_its_line() {
     assert!(!printed.contains("note: "), "{printed}");
     // What --set gives stands in no file.
     let printed = check(&deck, overlay, &["time.safety=4"]);
-    let note = "note: lines are those of the deck as changed by --set";
+    let note = "note: lines are those of the deck as changed by --with and --set";
     assert!(
         printed.contains("[time] safety: ") && printed.contains(note),
         "{printed}"

@@ -58,7 +58,7 @@ velocity = ['0.1*sin(400*x)', '0.1*cos(300*y)']
 end = 12e-6
 [output]
 every_steps = 7
-times = [1e-6, 5.1e-6]
+times = [0.6e-6, 1.7e-6]
 fields = ['displacement', 'velocity', 'acceleration', 'force_density', 'damage', 'strain_energy_density', 'neighbours', 'newly_broken_bonds']
 [history]
 every_steps = 3

@@ -14,7 +14,7 @@ use crate::deck::spanned::Spanned;
 pub struct Body {
     /// Name of the material.
     pub material: Text,
-    /// Name of the damage law; without it bonds never break.
+    /// Name of the damage law; without it bonds never break, except those of `softening_pmb` and of a pair with damage of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
