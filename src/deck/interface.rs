@@ -157,6 +157,12 @@ impl Damages<'_> {
         for body in self.bodies {
             let law = &body.material.law;
             let declaration = law.declaration;
+            if declaration.breaks_by_itself() {
+                return error(format!(
+                    "bonds of `{}` soften by their own law; remove `strength`",
+                    declaration.name
+                ));
+            }
             if declaration.critical_stretch.is_none() {
                 return error(format!(
                     "bonds of `{}` break by work, so a strength does not define them; give `damage`",

@@ -164,7 +164,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) {
     }
 
-    /// How many numbers points and bonds have; fewer passes and own numbers than the type's where this law needs fewer.
+    /// How many numbers points and bonds have. A law may need fewer passes and own numbers than its type declares.
     fn counts(&self) -> Counts {
         Counts::of::<Self, D>()
     }

@@ -162,7 +162,7 @@ fn number(values: &Values, key: &Key) -> Option<f64> {
     values.get(key.name).map(|_| values.number(key.name))
 }
 
-/// Two measures, or none, of the strength or of the end; a kink of a curve without one; an end before the strength.
+/// Strength or end that is given twice or not at all, or a kink that the curve does not have.
 fn fault(values: &Values, _: Dimension) -> Option<LawFault> {
     for [first, second] in [
         [&TENSILE_STRENGTH, &STRENGTH_STRETCH],

@@ -92,7 +92,7 @@ impl Law {
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
-                "`{}` breaks its bonds itself; remove `damage`",
+                "bonds of `{}` break by their own law; remove `damage`",
                 self.declaration.name
             ));
         }

@@ -101,7 +101,7 @@ impl<'a> Job<'a> {
         }
         let text = format!(
             "bonds broke up to one step late: their energy above the criterion, {overshoot:.3e} J, exceeds half of the \
-             fracture energy, {fracture:.3e} J; halve `safety` and compare",
+             fracture energy, {fracture:.3e} J; repeat with half the time step and compare",
         );
         self.observer.message(&Message::Warning(text));
     }

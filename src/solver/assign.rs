@@ -19,7 +19,7 @@ use super::bonds::{BlockLaws, Interaction, PairReads};
 use super::model::Model;
 
 /// The elastic constants and the horizon (m) that an end of bonds has.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 struct Constants {
     elastic: Isotropic,
     horizon: f64,
@@ -82,8 +82,24 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
         if let Some(damage) = pair.own_damage() {
             pair_damage_is_possible(problem, pair, damage)?;
         }
+        if pair.damage == InterfaceDamage::Unbreakable {
+            softening_can_break(problem, pair)?;
+        }
     }
     horizons_are_possible(problem)
+}
+
+/// An error if bonds that never break would soften.
+fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
+    let softens = |body: &&Body| pair.has(body) && body.material.law.declaration.breaks_by_itself();
+    let Some(body) = problem.bodies.iter().find(softens) else {
+        return Ok(());
+    };
+    let message = format!(
+        "[interface.pair.{}] damage: bonds of `{}` break by their own law; remove `damage`",
+        pair.name, body.material.law.declaration.name
+    );
+    Err(Error::input(message).at(&pair.span))
 }
 
 /// An error if the bonds between two bodies cannot break by damage of their own.
@@ -138,11 +154,15 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
         let Some(fault) = law.declaration.horizon_fault else {
             continue;
         };
-        let of_bonds = |there: Block| {
+        let mut all = Vec::new();
+        for there in problem.blocks() {
             let constants = constants(problem, &here, &there);
-            fault(&given(problem, here.body, None, constants))
-        };
-        if let Some(fault) = problem.blocks().find_map(of_bonds) {
+            if !all.contains(&constants) {
+                all.push(constants);
+            }
+        }
+        let of_bonds = |constants| fault(&given(problem, here.body, None, constants));
+        if let Some(fault) = all.into_iter().find_map(of_bonds) {
             let name = law.declaration.name;
             let message = format!("[body.{}] law `{name}`: {fault}", here.body.name);
             return Err(Error::input(message).at(&here.body.horizon_place));
@@ -151,8 +171,8 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
     Ok(())
 }
 
-/// An error if a material expands whose law has no potential, as one that flows, where strain is 0 across the setting:
-/// the stress there changes how it flows, and the law does not know it.
+/// An error if a material expands whose law has no potential, such as one that flows or softens, where the strain across the
+/// setting is 0: its inelastic strain depends on the stress there, which the law does not know.
 fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let (material, dimension) = (&body.material, problem.dimension);
     let law = &material.law;
@@ -161,8 +181,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
         return Ok(());
     }
     let message = format!(
-        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: thermal stress across it would change how it \
-         flows; use plane stress, uniaxial stress or 3-D, or an elastic law",
+        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: its inelastic strain would depend \
+         on the thermal stress across; use plane stress, uniaxial stress or 3-D, or an elastic law",
         body.name,
         law.declaration.name,
         dimension.name(),
@@ -321,7 +341,7 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     }
 }
 
-/// Of a law whose bonds break where they have softened.
+/// The damage law of bonds that break at the end of their softening.
 fn softened(critical: f64) -> DamageLaw {
     DamageLaw::CriticalStretch(CriticalStretch {
         critical,

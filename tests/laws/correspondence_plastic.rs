@@ -405,7 +405,6 @@ fn a_control_does_not_harden_a_bar_that_yields() {
         ("zero_energy = 'wan2019'", 1.15),
     ] {
         let [load, error] = limit_load(control);
-        println!("{control}: {load}, error {error}");
         assert!(load > free && load < most * free, "{control}: {load}");
         // That of load steps in which the body begins to yield; without control as well.
         assert!(error.abs() < 1e-3, "{control}: {error}");

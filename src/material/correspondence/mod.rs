@@ -12,8 +12,8 @@
 //! density is W(F) + ½ Σ ω z·B z Ṽ = W(F) − ½ P : H + ½ Σ T·η Ṽ, for z has no part along ξ.
 //!
 //! Where a body yields ([`Plastic`]), P follows from F and from what flow has left at the point. The control of the elastic body
-//! is multiplied by a share s that falls with the flow ([`Plastic::control_left`]); else it would carry what the solid no
-//! longer can. As s falls, −Δs times the energy ½ Σ ω z·B z Ṽ of the elastic control is dissipated.
+//! is multiplied by a share s that falls with the flow ([`Plastic::control_left`]): an elastic control would carry load that
+//! the solid cannot. When s changes by Δs, the energy −Δs · ½ Σ ω z·B z Ṽ of the elastic control is dissipated.
 
 mod bond_associated;
 mod control;
@@ -160,6 +160,9 @@ const CONSTANTS: usize = 2;
 /// ½ tr(B H K Hᵀ) of ½ Σ ω η·B η Ṽ that is not of the control (J/m³), and s at the start of the step.
 const OWN: usize = 4;
 
+/// The first of them, which all points have.
+const OWN_OF_ELASTIC: usize = 2;
+
 /// A, and the diagonal and mixed entries of B.
 type Tensors<const D: usize> = ([[Lanes; D]; D], Symmetric<D>);
 
@@ -196,6 +199,13 @@ fn row<S: Simd, const D: usize>(
         sum = simd.multiply_add(symmetric(control, a, b), bond.eta[b], sum);
     }
     sum
+}
+
+impl Correspondence {
+    /// Whether points have a control that falls with their flow.
+    fn control_yields(&self) -> bool {
+        self.plastic.is_some() && self.control != Control::None
+    }
 }
 
 /// η·B η, N/m⁵.
@@ -244,12 +254,12 @@ impl<const D: usize> Law<D> for Correspondence {
 
     fn counts(&self) -> Counts {
         let all = Counts::of::<Self, D>();
-        if self.plastic.is_some() && self.control != Control::None {
+        if self.control_yields() {
             return all;
         }
         Counts {
             passes: 1,
-            own: 2,
+            own: OWN_OF_ELASTIC,
             ..all
         }
     }
@@ -291,6 +301,10 @@ impl<const D: usize> Law<D> for Correspondence {
             plastic.map_or(1.0, |plastic| plastic.control_left(state))
         };
         if pass == 1 {
+            if found[own + 1] > 0.0 {
+                state.control = 0.0;
+                return;
+            }
             let [seen, before] = [found[own + 2], found[own + 3]];
             let after = left(state);
             let energy = (0.5 * sums[0] - seen).max(0.0) / after;
@@ -299,8 +313,8 @@ impl<const D: usize> Law<D> for Correspondence {
             return;
         }
         let shape = ShapeTensor::<D>::new(&sums[..2 * D]);
-        let count = Law::<D>::counts(self).own;
-        found[..own + count].fill(0.0);
+        let control_yields = self.control_yields();
+        found[..own + if control_yields { OWN } else { OWN_OF_ELASTIC }].fill(0.0);
         let before = left(state);
         let moved = from_rows::<D>(&sums[2 * D..]);
         let inverse = shape.inverse_of_rest(self.modulus, constants[0]);
@@ -322,7 +336,7 @@ impl<const D: usize> Law<D> for Correspondence {
         to_rows(&direct, found);
         to_entries(&control, &mut found[D * D..]);
         found[own] = energy - 0.5 * stress.dot(&gradient);
-        if count == OWN {
+        if control_yields {
             found[own + 2] = 0.5 * (control * gradient).dot(&moved);
             found[own + 3] = before;
         }
