@@ -78,8 +78,7 @@ fn is_choice(path: &[&str]) -> bool {
     )
 }
 
-/// Let the tables of an item follow those that are there already, instead of mixing with them by their positions in
-/// their own file: the order of bodies and conditions counts.
+/// Reset the positions of an item's tables, so that they follow those of the deck: the order of bodies and conditions counts.
 fn forget_positions(item: &mut Item) {
     match item {
         Item::Table(table) => {

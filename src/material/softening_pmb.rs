@@ -26,7 +26,9 @@ use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
     LawFault, Pmb, Values, Word,
 };
-use crate::dimension::{Constraint, Dimension};
+use crate::damage::CriticalStretch;
+use crate::dimension::Dimension;
+use crate::elastic::Isotropic;
 use crate::lanes::{IsaSet, Lanes, WIDTH};
 use crate::message::format_number;
 
@@ -211,22 +213,14 @@ fn fullness(values: &Values) -> f64 {
     }
 }
 
-/// The modulus of a bar that is pulled along its axis in a setting, Pa.
+/// The modulus of a bar that is pulled along its axis in a setting, Pa. Bonds have ν = 1/4 under uniaxial strain, whatever is
+/// given there.
 fn tensile_modulus(given: &Given) -> f64 {
-    let (modulus, ratio) = (given.elastic.youngs_modulus, given.elastic.poisson_ratio);
-    match given.dimension {
-        Dimension::PlaneStrain { .. } => modulus / (1.0 - ratio * ratio),
-        Dimension::Line {
-            constraint: Constraint::UniaxialStrain,
-            ..
-        } => modulus * 1.2,
-        Dimension::PlaneStress { .. }
-        | Dimension::Space
-        | Dimension::Line {
-            constraint: Constraint::UniaxialStress,
-            ..
-        } => modulus,
-    }
+    let elastic = Isotropic {
+        poisson_ratio: 0.25,
+        ..given.elastic
+    };
+    CriticalStretch::tensile_modulus(given.dimension, elastic)
 }
 
 /// sc for an s0.

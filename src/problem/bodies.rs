@@ -147,6 +147,16 @@ pub enum InterfaceDamage {
     Own(Damage),
 }
 
+impl InterfaceDamage {
+    /// The damage of the bonds' own, if they have any.
+    pub fn own(&self) -> Option<&Damage> {
+        match self {
+            Self::Own(damage) => Some(damage),
+            Self::OfBodies | Self::Unbreakable => None,
+        }
+    }
+}
+
 impl Interface {
     /// The pair of two bodies, in any order, if it is listed.
     fn pair(&self, here: &Body, there: &Body) -> Option<&InterfacePair> {
@@ -176,10 +186,7 @@ impl Interface {
 impl InterfacePair {
     /// Damage of its own, if it has any.
     pub fn own_damage(&self) -> Option<&Damage> {
-        match &self.damage {
-            InterfaceDamage::Own(damage) => Some(damage),
-            InterfaceDamage::OfBodies | InterfaceDamage::Unbreakable => None,
-        }
+        self.damage.own()
     }
 
     /// Whether a body is one of the two.

@@ -1,11 +1,12 @@
 //! From the problem to the law, the failure rule and the weights of every family.
 
+mod possible;
+
 use crate::damage::{
     BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StretchConversion, WorkRule,
 };
 use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
-use crate::error::{Error, Result};
 use crate::families::{BlockBonds, CellShare, Fault};
 use crate::material::{Built, Given, PairLaw};
 use crate::memory::check_room;
@@ -17,6 +18,7 @@ use crate::problem::{
 
 use super::bonds::{BlockLaws, Interaction, PairReads};
 use super::model::Model;
+pub use possible::laws_are_possible;
 
 /// The elastic constants and the horizon (m) that an end of bonds has.
 #[derive(Clone, Copy, PartialEq)]
@@ -57,208 +59,11 @@ fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
     elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
 }
 
-/// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not go with
-/// that of another body.
-///
-/// # Errors
-/// For problems made in Rust; most of what a deck says is checked where it is read.
-pub fn laws_are_possible(problem: &Problem) -> Result<()> {
-    for body in &problem.bodies {
-        let law = &body.material.law;
-        let fault = law.fault(problem.dimension).map(|fault| fault.message);
-        let damage = body.damage.as_ref();
-        let fault = fault.or_else(|| damage.and_then(|damage| law.damage_fault(damage)));
-        if let Some(fault) = fault {
-            let name = law.declaration.name;
-            return Err(Error::input(format!(
-                "[body.{}] law `{name}`: {fault}",
-                body.name
-            )));
-        }
-        damage_is_possible(problem, body)?;
-        expansion_is_possible(problem, body)?;
-    }
-    for pair in &problem.interface.pairs {
-        if let Some(damage) = pair.own_damage() {
-            pair_damage_is_possible(problem, pair, damage)?;
-        }
-        if pair.damage == InterfaceDamage::Unbreakable {
-            softening_can_break(problem, pair)?;
-        }
-    }
-    horizons_are_possible(problem)
-}
-
-/// An error if bonds that never break would soften.
-fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
-    let softens = |body: &&Body| pair.has(body) && body.material.law.declaration.breaks_by_itself();
-    let Some(body) = problem.bodies.iter().find(softens) else {
-        return Ok(());
-    };
-    let message = format!(
-        "[interface.pair.{}] damage: bonds of `{}` break by their own law; remove `damage`",
-        pair.name, body.material.law.declaration.name
-    );
-    Err(Error::input(message).at(&pair.span))
-}
-
-/// An error if the bonds between two bodies cannot break by damage of their own.
-fn pair_damage_is_possible(
-    problem: &Problem,
-    pair: &InterfacePair,
-    damage: &problem::Damage,
-) -> Result<()> {
-    let error = |message: String| {
-        let message = format!("[interface.pair.{}] damage: {message}", pair.name);
-        Err(Error::input(message).at(&pair.span))
-    };
-    let of_points = [
-        (damage.alpha > 0.0, "alpha"),
-        (damage.weibull.is_some(), "weibull_modulus"),
-    ];
-    if let Some((_, key)) = of_points.into_iter().find(|(is, _)| *is) {
-        return error(format!(
-            "`{key}` belongs to the points of a body and not to the bonds of a pair; give the pair damage without it"
-        ));
-    }
-    if damage.rule.is_unmeasured() {
-        let message =
-            "`calibration = \"opening\"` is measured on a block of one body; take \"energy\"";
-        return error(message.to_owned());
-    }
-    let bodies = problem.bodies.iter().filter(|body| pair.has(body));
-    for body in bodies.clone() {
-        let fault = body.material.law.damage_fault(damage);
-        let fault = fault.or_else(|| damage_fault(problem, body, damage));
-        if let Some(fault) = fault {
-            return error(format!("[body.{}]: {fault}", body.name));
-        }
-    }
-    let mut by_work = bodies.map(|body| (breaks_by_work(body, damage), &body.name));
-    if let (Some((first, a)), Some((second, b))) = (by_work.next(), by_work.next())
-        && first != second
-    {
-        let [work, stretch] = if first { [a, b] } else { [b, a] };
-        return error(format!(
-            "bonds break by their work in `{work}` and by their stretch in the bond-based law of `{stretch}`; take \
-             `critical_stretch` damage, or the same kind of law in both bodies"
-        ));
-    }
-    Ok(())
-}
-
-/// An error if a law cannot have the horizon of some of its bonds.
-fn horizons_are_possible(problem: &Problem) -> Result<()> {
-    for here in problem.blocks() {
-        let law = &here.body.material.law;
-        let Some(fault) = law.declaration.horizon_fault else {
-            continue;
-        };
-        let mut all = Vec::new();
-        for there in problem.blocks() {
-            let constants = constants(problem, &here, &there);
-            if !all.contains(&constants) {
-                all.push(constants);
-            }
-        }
-        let of_bonds = |constants| fault(&given(problem, here.body, None, constants));
-        if let Some(fault) = all.into_iter().find_map(of_bonds) {
-            let name = law.declaration.name;
-            let message = format!("[body.{}] law `{name}`: {fault}", here.body.name);
-            return Err(Error::input(message).at(&here.body.horizon_place));
-        }
-    }
-    Ok(())
-}
-
-/// An error if a material expands whose law has no potential, such as one that flows or softens, where the strain across the
-/// setting is 0: its inelastic strain depends on the stress there, which the law does not know.
-fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
-    let (material, dimension) = (&body.material, problem.dimension);
-    let law = &material.law;
-    let is_conservative = (law.declaration.invariants)(&law.values).conservative;
-    if is_conservative || !dimension.is_confined() || material.expansion.coefficient == 0.0 {
-        return Ok(());
-    }
-    let message = format!(
-        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: its inelastic strain would depend \
-         on the thermal stress across; use plane stress, uniaxial stress or 3-D, or an elastic law",
-        body.name,
-        law.declaration.name,
-        dimension.name(),
-    );
-    Err(Error::input(message).at(&body.span))
-}
-
 /// Whether bonds of a body with this damage break by their work. That of bond-based laws follows from the stretch,
 /// so that theirs break at the one that costs as much.
 fn breaks_by_work(body: &Body, damage: &problem::Damage) -> bool {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     damage.rule != DamageRule::CriticalStretch && !bond_based
-}
-
-/// An error if the bonds of a body break by their energy and something else is in the way of it.
-fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
-    let Some(damage) = &body.damage else {
-        return Ok(());
-    };
-    let by_work = breaks_by_work(body, damage);
-    let error = |message: String| {
-        let message = format!("[body.{}] damage: {message}", body.name);
-        Err(Error::input(message).at(&body.span))
-    };
-    let meets = |other: &Body| {
-        let interface = &problem.interface;
-        interface.between(body, other) != InterfaceRule::None
-            && *interface.damage_between(body, other) == InterfaceDamage::OfBodies
-    };
-    let of_other_kind = problem.bodies.iter().find(|other| {
-        let other_by_work = match &other.damage {
-            Some(damage) => breaks_by_work(other, damage),
-            None if other.can_break() => false,
-            None => return false,
-        };
-        other_by_work != by_work && meets(other)
-    });
-    if let Some(other) = of_other_kind {
-        return error(format!(
-            "its bonds break by another rule than those of body `{}`, to which it may be bonded (by work, as \
-             `energy` has it for laws that are not bond-based, or by stretch); give both the same rule, or set \
-             `[interface] rule = \"none\"`",
-            other.name
-        ));
-    }
-    damage_fault(problem, body, damage).map_or(Ok(()), error)
-}
-
-/// Why bonds of a body cannot break by this damage in this problem, if they cannot.
-fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
-    if let DamageRule::Energy { calibration, .. } = damage.rule
-        && !calibration.is_for(problem.dimension.count())
-    {
-        return Some(format!(
-            "the calibration {calibration:?} has no formula in this dimension"
-        ));
-    }
-    if damage.rule.is_unmeasured() {
-        let message = "what opening the body costs has not been measured: take the problem that \
-                       `solver::calibration::calibrated` returns";
-        return Some(message.to_owned());
-    }
-    let by_energy = damage.rule != DamageRule::CriticalStretch;
-    if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {
-        return Some("a critical stretch is no measure of energy".to_owned());
-    }
-    if !breaks_by_work(body, damage) || problem.volume_correction == VolumeCorrection::None {
-        return None;
-    }
-    let block = Block::unrefined(body);
-    let constants = constants(problem, &block, &block);
-    let influence = build(problem, body, Some(damage), constants).influence;
-    influence.is_some().then(|| {
-        "energy damage needs a constant influence, or `[grid] volume_correction = \"none\"`"
-            .to_owned()
-    })
 }
 
 /// What the law of a body is made from, for bonds that break by this damage.
@@ -518,19 +323,16 @@ pub fn assign<const D: usize>(
     let give = |mut bonds: BlockBonds| {
         let indices = bonds.blocks();
         let [here, there] = indices.map(|block| problem.block(block));
-        let own_damage = problem.interface.damage_between(here.body, there.body);
+        let pair_damage = problem.interface.damage_between(here.body, there.body);
         let ends = [(here, there), (there, here)].map(|(block, other)| {
             let constants = constants(problem, &block, &other);
             let horizon = constants.horizon;
-            let own_damage = match own_damage {
-                InterfaceDamage::Own(damage) => Some(damage),
-                InterfaceDamage::OfBodies | InterfaceDamage::Unbreakable => None,
-            };
-            let damage = own_damage.or(block.body.damage.as_ref());
+            let damage = pair_damage.own().or(block.body.damage.as_ref());
             End {
                 stiffness: bond_stiffness(&constants, problem.dimension),
                 built: build(problem, block.body, damage, constants),
-                own_damage: own_damage
+                pair_damage: pair_damage
+                    .own()
                     .map(|damage| damage_law(problem, block.body, damage, constants)),
                 own_critical_stretch: own_critical_stretch(problem, block.body, constants),
                 horizon,
@@ -539,7 +341,7 @@ pub fn assign<const D: usize>(
         });
         weigh(problem, model, &mut bonds, &ends)?;
         let stiffness = ends.each_ref().map(|end| end.stiffness);
-        let criterion = match (own_damage, ends.each_ref().map(|end| end.own_damage)) {
+        let criterion = match (pair_damage, ends.each_ref().map(|end| end.pair_damage)) {
             (InterfaceDamage::Unbreakable, _) => Criterion::Never,
             (_, [Some(own), Some(far)]) => pair_criterion([own, far], stiffness),
             _ => criterion(problem, blocks, indices, &ends, per_point),
@@ -558,12 +360,12 @@ pub fn assign<const D: usize>(
 /// An end of the bonds between two blocks.
 struct End {
     built: Built,
-    /// As of [`own_critical_stretch`].
+    /// See [`own_critical_stretch`].
     own_critical_stretch: Option<f64>,
     /// As [`bond_stiffness`].
     stiffness: f64,
     /// The damage law of a pair with damage of its own.
-    own_damage: Option<DamageLaw>,
+    pair_damage: Option<DamageLaw>,
     /// m.
     horizon: f64,
     /// The share of the other body's cells in its families.

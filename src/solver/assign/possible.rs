@@ -1,0 +1,205 @@
+//! Which laws and which damage the bodies of a problem can have.
+
+use super::{breaks_by_work, build, constants, given};
+use crate::error::{Error, Result};
+use crate::problem::{
+    self, Block, Body, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Problem,
+    Toughness, VolumeCorrection,
+};
+
+/// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not go with
+/// that of another body.
+///
+/// # Errors
+/// For problems made in Rust; most of what a deck says is checked where it is read.
+pub fn laws_are_possible(problem: &Problem) -> Result<()> {
+    for body in &problem.bodies {
+        let law = &body.material.law;
+        let fault = law.fault(problem.dimension).map(|fault| fault.message);
+        let damage = body.damage.as_ref();
+        let fault = fault.or_else(|| damage.and_then(|damage| law.damage_fault(damage)));
+        if let Some(fault) = fault {
+            let name = law.declaration.name;
+            return Err(Error::input(format!(
+                "[body.{}] law `{name}`: {fault}",
+                body.name
+            )));
+        }
+        damage_is_possible(problem, body)?;
+        expansion_is_possible(problem, body)?;
+    }
+    for pair in &problem.interface.pairs {
+        if let Some(damage) = pair.own_damage() {
+            pair_damage_is_possible(problem, pair, damage)?;
+        }
+        if pair.damage == InterfaceDamage::Unbreakable {
+            softening_can_break(problem, pair)?;
+        }
+    }
+    horizons_are_possible(problem)
+}
+
+/// An error if bonds that never break would soften.
+fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
+    let softens = |body: &&Body| pair.has(body) && body.material.law.declaration.breaks_by_itself();
+    let Some(body) = problem.bodies.iter().find(softens) else {
+        return Ok(());
+    };
+    let message = format!(
+        "[interface.pair.{}] damage: bonds of `{}` break by their own law; remove `damage`",
+        pair.name, body.material.law.declaration.name
+    );
+    Err(Error::input(message).at(&pair.span))
+}
+
+/// An error if the bonds between two bodies cannot break by damage of their own.
+fn pair_damage_is_possible(
+    problem: &Problem,
+    pair: &InterfacePair,
+    damage: &problem::Damage,
+) -> Result<()> {
+    let error = |message: String| {
+        let message = format!("[interface.pair.{}] damage: {message}", pair.name);
+        Err(Error::input(message).at(&pair.span))
+    };
+    let of_points = [
+        (damage.alpha > 0.0, "alpha"),
+        (damage.weibull.is_some(), "weibull_modulus"),
+    ];
+    if let Some((_, key)) = of_points.into_iter().find(|(is, _)| *is) {
+        return error(format!(
+            "`{key}` belongs to the points of a body and not to the bonds of a pair; give the pair damage without it"
+        ));
+    }
+    if damage.rule.is_unmeasured() {
+        let message =
+            "`calibration = \"opening\"` is measured on a block of one body; take \"energy\"";
+        return error(message.to_owned());
+    }
+    let bodies = problem.bodies.iter().filter(|body| pair.has(body));
+    for body in bodies.clone() {
+        let fault = body.material.law.damage_fault(damage);
+        let fault = fault.or_else(|| damage_fault(problem, body, damage));
+        if let Some(fault) = fault {
+            return error(format!("[body.{}]: {fault}", body.name));
+        }
+    }
+    let mut by_work = bodies.map(|body| (breaks_by_work(body, damage), &body.name));
+    if let (Some((first, a)), Some((second, b))) = (by_work.next(), by_work.next())
+        && first != second
+    {
+        let [work, stretch] = if first { [a, b] } else { [b, a] };
+        return error(format!(
+            "bonds break by their work in `{work}` and by their stretch in the bond-based law of `{stretch}`; take \
+             `critical_stretch` damage, or the same kind of law in both bodies"
+        ));
+    }
+    Ok(())
+}
+
+/// An error if a law cannot have the horizon of some of its bonds.
+fn horizons_are_possible(problem: &Problem) -> Result<()> {
+    for here in problem.blocks() {
+        let law = &here.body.material.law;
+        let Some(fault) = law.declaration.horizon_fault else {
+            continue;
+        };
+        let mut all = Vec::new();
+        for there in problem.blocks() {
+            let constants = constants(problem, &here, &there);
+            if !all.contains(&constants) {
+                all.push(constants);
+            }
+        }
+        let of_bonds = |constants| fault(&given(problem, here.body, None, constants));
+        if let Some(fault) = all.into_iter().find_map(of_bonds) {
+            let name = law.declaration.name;
+            let message = format!("[body.{}] law `{name}`: {fault}", here.body.name);
+            return Err(Error::input(message).at(&here.body.horizon_place));
+        }
+    }
+    Ok(())
+}
+
+/// An error if a material expands whose law has no potential, such as one that flows or softens, where the strain across the
+/// setting is 0: its inelastic strain depends on the stress there, which the law does not know.
+fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
+    let (material, dimension) = (&body.material, problem.dimension);
+    let law = &material.law;
+    let is_conservative = (law.declaration.invariants)(&law.values).conservative;
+    if is_conservative || !dimension.is_confined() || material.expansion.coefficient == 0.0 {
+        return Ok(());
+    }
+    let message = format!(
+        "[body.{}] material: `{}` cannot have `thermal_expansion` in {}: its inelastic strain would depend \
+         on the thermal stress across; use plane stress, uniaxial stress or 3-D, or an elastic law",
+        body.name,
+        law.declaration.name,
+        dimension.name(),
+    );
+    Err(Error::input(message).at(&body.span))
+}
+
+/// An error if the bonds of a body break by their energy and something else is in the way of it.
+fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
+    let Some(damage) = &body.damage else {
+        return Ok(());
+    };
+    let by_work = breaks_by_work(body, damage);
+    let error = |message: String| {
+        let message = format!("[body.{}] damage: {message}", body.name);
+        Err(Error::input(message).at(&body.span))
+    };
+    let meets = |other: &Body| {
+        let interface = &problem.interface;
+        interface.between(body, other) != InterfaceRule::None
+            && *interface.damage_between(body, other) == InterfaceDamage::OfBodies
+    };
+    let of_other_kind = problem.bodies.iter().find(|other| {
+        let other_by_work = match &other.damage {
+            Some(damage) => breaks_by_work(other, damage),
+            None if other.can_break() => false,
+            None => return false,
+        };
+        other_by_work != by_work && meets(other)
+    });
+    if let Some(other) = of_other_kind {
+        return error(format!(
+            "its bonds break by another rule than those of body `{}`, to which it may be bonded (by work, as \
+             `energy` has it for laws that are not bond-based, or by stretch); give both the same rule, or set \
+             `[interface] rule = \"none\"`",
+            other.name
+        ));
+    }
+    damage_fault(problem, body, damage).map_or(Ok(()), error)
+}
+
+/// Why bonds of a body cannot break by this damage in this problem, if they cannot.
+fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
+    if let DamageRule::Energy { calibration, .. } = damage.rule
+        && !calibration.is_for(problem.dimension.count())
+    {
+        return Some(format!(
+            "the calibration {calibration:?} has no formula in this dimension"
+        ));
+    }
+    if damage.rule.is_unmeasured() {
+        let message = "what opening the body costs has not been measured: take the problem that \
+                       `solver::calibration::calibrated` returns";
+        return Some(message.to_owned());
+    }
+    let by_energy = damage.rule != DamageRule::CriticalStretch;
+    if by_energy && matches!(damage.toughness, Toughness::CriticalStretch(_)) {
+        return Some("a critical stretch is no measure of energy".to_owned());
+    }
+    if !breaks_by_work(body, damage) || problem.volume_correction == VolumeCorrection::None {
+        return None;
+    }
+    let block = Block::unrefined(body);
+    let constants = constants(problem, &block, &block);
+    let influence = build(problem, body, Some(damage), constants).influence;
+    influence.is_some().then(|| {
+        "energy damage needs a constant influence, or `[grid] volume_correction = \"none\"`"
+            .to_owned()
+    })
+}
