@@ -78,4 +78,5 @@ mod papers {
     mod emmrich_weckner;
     mod impact_decks;
     mod pmma;
+    mod well_posedness;
 }

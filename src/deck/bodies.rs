@@ -285,11 +285,25 @@ fn point_source(
                 shape: shapes::shape(scope, &format!("{key} shape"), shape)?,
                 spacing,
                 origin,
+                quadrature: match body.quadrature.as_ref().map(Spanned::get_ref) {
+                    None => grid.quadrature,
+                    Some(own) => *own,
+                }
+                .into(),
             })
         }
         (None, points) => {
             let points = points.as_ref().expect("a body without a shape has points");
             from_file(scope, key, body, points)
+        }
+    }
+}
+
+impl From<grammar::Quadrature> for problem::Quadrature {
+    fn from(quadrature: grammar::Quadrature) -> Self {
+        match quadrature {
+            grammar::Quadrature::Midpoint => Self::Midpoint,
+            grammar::Quadrature::Gauss => Self::Gauss,
         }
     }
 }
@@ -309,14 +323,18 @@ fn from_file(
         ("mesh", points.mesh.as_ref().map(Spanned::span)),
     ];
     scope.exactly_one(place, &key_of_points, &given)?;
+    let what = if points.file.is_some() {
+        "file"
+    } else {
+        "mesh"
+    };
     if let Some(spacing) = &body.spacing {
-        let what = if points.file.is_some() {
-            "file"
-        } else {
-            "mesh"
-        };
         let message = format!("{key} spacing: points from a {what} have no spacing");
         return Err(scope.error(spacing.span(), message));
+    }
+    if let Some(quadrature) = &body.quadrature {
+        let message = format!("{key} quadrature: points from a {what} have no cells");
+        return Err(scope.error(quadrature.span(), message));
     }
     let folder = scope.source.path.parent().unwrap_or("".as_ref());
     let block = points.block.as_ref();

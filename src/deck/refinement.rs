@@ -31,7 +31,7 @@ pub fn refinement(
         return Ok(None);
     };
     let refinement = table.get_ref();
-    if deck.grid.get_ref().quadrature == grammar::Quadrature::Gauss {
+    if bodies.iter().any(problem::Body::has_gauss_points) {
         let message = "[refinement]: needs `quadrature = \"midpoint\"`, one point a cell";
         return Err(scope.error(table.span(), message));
     }

@@ -1,8 +1,6 @@
 //! From the grammar to the problem: every value checked, every name resolved.
 
-use super::grammar::{
-    ConstraintName, Deck, DimensionName, Family, Grid, Quadrature, VolumeCorrection,
-};
+use super::grammar::{ConstraintName, Deck, DimensionName, Family, Grid, VolumeCorrection};
 use super::number::{Edges, Number};
 use super::resolve::{Scope, resolve_each};
 use super::{
@@ -35,8 +33,8 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
     })?;
     let bodies = bodies::bodies(scope, deck, spacing, &materials, &damages)?;
     let volume_correction = volume_correction(scope, deck, &bodies)?;
-    let jitter = jitter(scope, deck)?;
-    let family = family(scope, deck)?;
+    let jitter = jitter(scope, deck, &bodies)?;
+    let family = family(scope, deck, &bodies)?;
     let interface = interface::interface(scope, deck, dimension, &bodies, &damages)?;
     let contact = contact::contact(scope, deck, &bodies)?;
     let refinement = refinement::refinement(scope, deck, &bodies)?;
@@ -53,10 +51,6 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
         dimension,
         horizon,
         volume_correction,
-        quadrature: match deck.grid.get_ref().quadrature {
-            Quadrature::Midpoint => problem::Quadrature::Midpoint,
-            Quadrature::Gauss => problem::Quadrature::Gauss,
-        },
         jitter,
         family,
         interface,
@@ -173,12 +167,11 @@ fn volume_correction(
         Some(VolumeCorrection::LinearInside) => problem::VolumeCorrection::LinearInside,
         Some(VolumeCorrection::Exact) | None => problem::VolumeCorrection::Exact,
     };
-    let gauss = grid.quadrature == Quadrature::Gauss;
     let is_jittered = grid.jitter.is_some();
     let without_cells = |body: &problem::Body| match &body.points {
         problem::PointSource::File { .. } => Some("has its points from a file"),
         problem::PointSource::Mesh { .. } => Some("has its points from a mesh"),
-        problem::PointSource::Lattice { .. } if gauss => Some("has Gauss points"),
+        problem::PointSource::Lattice { .. } if body.has_gauss_points() => Some("has Gauss points"),
         problem::PointSource::Lattice { .. } if is_jittered => {
             Some("has points that `jitter` moves")
         }
@@ -205,7 +198,7 @@ fn volume_correction(
 }
 
 /// The random displacement of points.
-fn jitter(scope: &Scope, deck: &Deck) -> Result<Option<problem::Jitter>> {
+fn jitter(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<Option<problem::Jitter>> {
     let grid = deck.grid.get_ref();
     let Some(share) = &grid.jitter else {
         return match &grid.seed {
@@ -214,7 +207,7 @@ fn jitter(scope: &Scope, deck: &Deck) -> Result<Option<problem::Jitter>> {
         };
     };
     let error = |message: &str| Err(scope.error(share.span(), format!("[grid] jitter: {message}")));
-    if grid.quadrature == Quadrature::Gauss {
+    if bodies.iter().any(problem::Body::has_gauss_points) {
         return error("needs `quadrature = \"midpoint\"`, one point a cell");
     }
     if deck.refinement.is_some() {
@@ -231,7 +224,7 @@ fn jitter(scope: &Scope, deck: &Deck) -> Result<Option<problem::Jitter>> {
     }))
 }
 
-fn family(scope: &Scope, deck: &Deck) -> Result<problem::FamilyRule> {
+fn family(scope: &Scope, deck: &Deck, bodies: &[problem::Body]) -> Result<problem::FamilyRule> {
     let grid = deck.grid.get_ref();
     match grid.family.get_ref() {
         Family::Auto => Ok(problem::FamilyRule::Auto),
@@ -240,13 +233,11 @@ fn family(scope: &Scope, deck: &Deck) -> Result<problem::FamilyRule> {
             let message = "[grid] family: points that `jitter` moves do not lie on a lattice; take \"auto\" or \"list\"";
             Err(scope.error(grid.family.span(), message))
         }
-        Family::Lattice if grid.quadrature == Quadrature::Midpoint => {
-            Ok(problem::FamilyRule::Lattice)
-        }
-        Family::Lattice => {
+        Family::Lattice if bodies.iter().any(problem::Body::has_gauss_points) => {
             let message =
                 "[grid] family: Gauss points do not form a lattice; take \"auto\" or \"list\"";
             Err(scope.error(grid.family.span(), message))
         }
+        Family::Lattice => Ok(problem::FamilyRule::Lattice),
     }
 }

@@ -50,10 +50,11 @@ impl<'a> LatticeBody<'a> {
                 shape,
                 spacing,
                 origin,
-            } => Some((shape, *spacing, *origin)),
+                quadrature,
+            } => Some((shape, *spacing, *origin, *quadrature)),
             PointSource::File { .. } | PointSource::Mesh { .. } => None,
         };
-        let Some((shape, spacing, origin)) = lattice(&problem.bodies[body]) else {
+        let Some((shape, spacing, origin, quadrature)) = lattice(&problem.bodies[body]) else {
             return Ok(None);
         };
         let dimension = problem.dimension.count();
@@ -72,7 +73,7 @@ impl<'a> LatticeBody<'a> {
             tolerance: TOLERANCE * edges.fold(f64::INFINITY, f64::min),
             region,
             overlap,
-            quadrature: problem.quadrature,
+            quadrature,
             out_of_plane_measure: problem.dimension.out_of_plane_measure(),
         }))
     }

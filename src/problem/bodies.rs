@@ -43,6 +43,19 @@ impl Body {
     pub fn is_on_lattice(&self, jitter: Option<Jitter>) -> bool {
         jitter.is_none() && matches!(self.points, PointSource::Lattice { .. })
     }
+
+    /// Whether its cells have several points.
+    pub fn has_gauss_points(&self) -> bool {
+        self.quadrature() == Quadrature::Gauss
+    }
+
+    /// Where the points of a cell lie; the centre for points from a file or a mesh.
+    pub fn quadrature(&self) -> Quadrature {
+        match self.points {
+            PointSource::Lattice { quadrature, .. } => quadrature,
+            PointSource::File { .. } | PointSource::Mesh { .. } => Quadrature::Midpoint,
+        }
+    }
 }
 
 /// A material: density, elastic constants and the law that uses them.
@@ -251,7 +264,7 @@ pub enum Toughness {
 /// Where points come from.
 #[derive(Debug, Clone)]
 pub enum PointSource {
-    /// The centres of lattice cells within a shape.
+    /// The points of lattice cells whose centres lie within a shape.
     Lattice {
         /// The shape.
         shape: Shape,
@@ -259,6 +272,8 @@ pub enum PointSource {
         spacing: [f64; 3],
         /// A corner of a cell, m.
         origin: [f64; 3],
+        /// Where the points of a cell lie.
+        quadrature: Quadrature,
     },
     /// The rows of a file.
     File {

@@ -24,7 +24,6 @@ impl Problem {
             dimension,
             horizon,
             volume_correction: VolumeCorrection::Exact,
-            quadrature: Quadrature::Midpoint,
             jitter: None,
             family: FamilyRule::Auto,
             interface: Interface {
@@ -106,6 +105,7 @@ impl Problem {
                 shape,
                 spacing: edges,
                 origin: [0.0; 3],
+                quadrature: Quadrature::Midpoint,
             },
         });
         self.add_set(name, selector)

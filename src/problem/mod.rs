@@ -52,8 +52,6 @@ pub struct Problem {
     pub horizon: f64,
     /// What volumes near the edge of a family count.
     pub volume_correction: VolumeCorrection,
-    /// Where the points of a lattice cell lie.
-    pub quadrature: Quadrature,
     /// Random displacement of the points of shapes, if there is any.
     pub jitter: Option<Jitter>,
     /// How bonds are kept.

@@ -16,7 +16,6 @@ pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])
     body.material.damping = 0.0;
     let mut single = Problem {
         volume_correction: problem.volume_correction,
-        quadrature: problem.quadrature,
         family: problem.family,
         bodies: vec![body],
         ..Problem::new(problem.dimension, problem.horizon, 1.0)
@@ -32,9 +31,11 @@ pub fn fill(
     spacing: [f64; 3],
     origin: [f64; 3],
 ) {
-    problem.bodies[0].points = PointSource::Lattice {
+    let body = &mut problem.bodies[0];
+    body.points = PointSource::Lattice {
         shape: Shape::Box { lower, upper },
         spacing,
         origin,
+        quadrature: body.quadrature(),
     };
 }

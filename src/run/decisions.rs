@@ -1,7 +1,7 @@
 //! Automatic choices of a run, for the log.
 
 use crate::comm;
-use crate::problem::StepRule;
+use crate::problem::{Body, StepRule};
 use crate::solver::Simulation;
 
 /// Names and values of the automatic choices; equal on all ranks. Collective.
@@ -21,7 +21,7 @@ pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'stati
             format!(
                 "volume correction {}, quadrature {}",
                 lower(&problem.volume_correction),
-                lower(&problem.quadrature)
+                quadrature(&problem.bodies)
             ),
         ),
     ];
@@ -62,6 +62,21 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
         range(2),
         100.0 * interior
     )
+}
+
+/// The quadrature of all bodies, or that of each where they differ.
+fn quadrature(bodies: &[Body]) -> String {
+    let name = |body: &Body| format!("{:?}", body.quadrature()).to_lowercase();
+    if bodies
+        .iter()
+        .all(|body| body.quadrature() == bodies[0].quadrature())
+    {
+        return name(&bodies[0]);
+    }
+    let each = bodies
+        .iter()
+        .map(|body| format!("{} of [body.{}]", name(body), body.name));
+    each.collect::<Vec<_>>().join(", ")
 }
 
 fn bonds<const D: usize>(simulation: &Simulation<'_, D>) -> String {

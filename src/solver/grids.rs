@@ -38,13 +38,17 @@ pub fn grids(
     longest: f64,
 ) -> Result<Vec<GridFrame>> {
     let mut grids: Vec<GridFrame> = Vec::new();
-    if problem.family == FamilyRule::List || problem.quadrature == Quadrature::Gauss {
+    if problem.family == FamilyRule::List {
         return Ok(grids);
     }
     let dimension = problem.dimension.count();
     for (index, body) in problem.bodies.iter().enumerate() {
         let found = match body.points {
             PointSource::Lattice { .. } if problem.jitter.is_some() => None,
+            PointSource::Lattice {
+                quadrature: Quadrature::Gauss,
+                ..
+            } => None,
             PointSource::Lattice {
                 spacing, origin, ..
             } => Some(described(origin, spacing, dimension)),

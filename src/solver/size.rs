@@ -43,7 +43,7 @@ fn not_too_many_neighbours(
     }
     let cells =
         std::array::from_fn(|k| ((upper[k] - lower[k]) / spacing[k] - 1e-9).ceil().max(1.0));
-    let points = f64::from(problem.quadrature.points(dimension));
+    let points = f64::from(far.body.quadrature().points(dimension));
     let neighbours = points * most_neighbours(spacing, cutoff, cells, dimension);
     if neighbours <= MOST_NEIGHBOURS {
         return Ok(());

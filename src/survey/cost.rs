@@ -2,7 +2,7 @@
 
 use super::Size;
 use crate::material::{Law, PlasticState};
-use crate::problem::{Action, Block, Body, FamilyRule, Problem, Quadrature};
+use crate::problem::{Action, Block, Body, FamilyRule, Problem};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::motion::Clock;
@@ -112,8 +112,7 @@ impl Cost {
         let (points, directed_bonds) = (size.all_points(), size.directed_bonds());
         let mut bodies = problem.bodies.iter();
         let on_lattice = problem.family != FamilyRule::List
-            && problem.quadrature == Quadrature::Midpoint
-            && bodies.all(|body| body.is_on_lattice(problem.jitter));
+            && bodies.all(|body| body.is_on_lattice(problem.jitter) && !body.has_gauss_points());
         let (bytes, listed) = if on_lattice {
             (ON_LATTICE, 0.0)
         } else {

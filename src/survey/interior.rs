@@ -54,7 +54,7 @@ fn block(problem: &Problem, body: usize) -> Option<Problem> {
     for k in 0..problem.dimension.count() {
         let cells = 2.0 * (cutoff / spacing[k]).ceil() + 1.0;
         upper[k] = cells * spacing[k];
-        bonds *= cells * cells * f64::from(problem.quadrature.points(1)).powi(2);
+        bonds *= cells * cells * f64::from(block.bodies[0].quadrature().points(1)).powi(2);
     }
     fill(&mut block, [[0.0; 3], upper], spacing, [0.0; 3]);
     (bonds < MAX_BONDS).then_some(block)

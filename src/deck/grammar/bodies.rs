@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Text;
+use super::{Quadrature, Text};
 use crate::deck::group_name::GroupName;
 use crate::deck::number::{Edges, Number, Vector};
 use crate::deck::spanned::Spanned;
@@ -26,6 +26,9 @@ pub struct Body {
     /// Lattice spacing of this body in m; that of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
+    /// The points of a cell of this body: `"midpoint"` or `"gauss"`; as in `[grid]` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadrature: Option<Spanned<Quadrature>>,
     /// Horizon of this body in m; that of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub horizon: Option<Number>,

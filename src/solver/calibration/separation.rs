@@ -57,7 +57,7 @@ pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Op
             origin[k] = 0.5 * spacing[k];
         }
         upper[k] = cells * spacing[k];
-        let points = f64::from(problem.quadrature.points(1));
+        let points = f64::from(block.bodies[0].quadrature().points(1));
         bonds *= 2.0 * cells * (2.0 * reach + 1.0) * points.powi(2);
     }
     fill(&mut block, [upper.map(|x| -x), upper], spacing, origin);
