@@ -13,10 +13,10 @@ use crate::error::{Error, Result, Warning};
 const LONGEST: u64 = 1 << 28;
 
 /// Characters of a whole error, where the path is not longer than all the rest.
-const MOST_SHOWN: usize = 390;
+const MOST_SHOWN: usize = 790;
 
 /// Characters of what an error says.
-const MOST_SAID: usize = 230;
+const MOST_SAID: usize = 600;
 
 /// Characters of a line that are shown in any case.
 const NARROWEST: usize = 24;
@@ -121,7 +121,7 @@ impl Source {
         }
     }
 
-    /// File, line, column and message; then the line, with carets below the bytes of `span`. About 400 characters at
+    /// File, line, column and message; then the line, with carets below the bytes of `span`. About 800 characters at
     /// most.
     fn marked(&self, span: Range<usize>, message: &str) -> String {
         let message = shortened(message, MOST_SAID);

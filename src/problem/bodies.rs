@@ -463,6 +463,16 @@ pub enum Crack {
     },
 }
 
+impl Crack {
+    /// Whether it is a slot with two faces instead of a cut.
+    pub fn has_width(&self) -> bool {
+        let (Self::Segment { width, .. }
+        | Self::Rectangle { width, .. }
+        | Self::Disc { width, .. }) = self;
+        *width > 0.0
+    }
+}
+
 impl DamageRule {
     /// Whether it is calibrated by what opening the body costs, and that has not been measured yet.
     pub fn is_unmeasured(self) -> bool {

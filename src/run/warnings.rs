@@ -26,9 +26,14 @@ impl<'a> Job<'a> {
         let [a, b] = contact.bodies.map(|body| &self.problem.bodies[body].name);
         let position = &contact.place[..self.problem.dimension.count()];
         let position: Vec<String> = position.iter().map(|x| format!("{x:.4e}")).collect();
+        let (closer, which) = if contact.were_bonded {
+            ("half their spacing", "bodies whose bonds have broken")
+        } else {
+            ("their spacing", "bodies without bonds between them")
+        };
         let text = format!(
-            "at t = {time:.4e} s points of `{a}` and `{b}` are closer than their spacing, at ({}) m; without \
-             `[contact]`, bodies without bonds between them pass through each other",
+            "at t = {time:.4e} s points of `{a}` and `{b}` are closer than {closer}, at ({}) m; without \
+             `[contact]`, {which} pass through each other",
             position.join(", ")
         );
         self.observer.message(&Message::Warning(text));
@@ -97,6 +102,15 @@ impl<'a> Job<'a> {
         };
         let (overshoot, fracture) = (row.energies.overshoot, row.energies.fracture);
         if self.problem.is_quasi_static() || overshoot <= MAX_OVERSHOOT * fracture.abs() {
+            return;
+        }
+        if fracture < 0.0 {
+            let text = format!(
+                "bonds passed their criterion within one step, before they carried a load, so the fracture energy is \
+                 not resolved ({fracture:.3e} J); check the units of the toughness and of the velocities, and repeat with \
+                 a shorter time step",
+            );
+            self.observer.message(&Message::Warning(text));
             return;
         }
         let text = format!(

@@ -21,7 +21,8 @@ use crate::comm::total;
 use crate::damage::{CriticalStretch, DamageLaw};
 use crate::error::Warning;
 use crate::message::format_number;
-use crate::problem::{Block, PointSource, Problem, Selector, Stage, StepRule};
+use crate::points::crack;
+use crate::problem::{Block, Crack, Interval, PointSource, Problem, Selector, Stage, StepRule};
 use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, pair_damage_laws};
 use crate::solver::conditions::members;
@@ -35,11 +36,20 @@ const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 /// Common horizons, in spacings.
 const USUAL_HORIZONS: std::ops::RangeInclusive<f64> = 1.999..=8.001;
 
-/// Number of steps above which even small runs take weeks.
-const MANY_STEPS: u64 = 1_000_000_000;
+/// Number of steps above which even small runs take days.
+const MANY_STEPS: u64 = 100_000_000;
+
+/// Number of steps below which nothing can happen in an explicit run.
+const FEW_STEPS: u64 = 2;
 
 /// Critical stretch above which a warning is printed.
 const LARGEST_STRETCH: f64 = 1.0;
+
+/// Critical stretch below which a warning is printed. Rock at a horizon of 1 km has 1.5e-6.
+const SMALLEST_STRETCH: f64 = 1e-6;
+
+/// Distance from a pre-crack, in spacings, within which a point lies on it.
+const ON_CRACK: f64 = 1e-6;
 
 /// The figures and warnings of a run; equal on all ranks.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +89,7 @@ impl Survey {
             let message = format!("[crack.{}]: cuts no bond", crack.name);
             warnings.push(Warning::new(message).at(&crack.span));
         }
+        points_on_cracks(simulation, &mut warnings);
         let sets = sets(simulation, &mut warnings);
         let probes = probes(simulation, &mut warnings);
         loads::check_conditions(simulation, &mut warnings);
@@ -154,12 +165,20 @@ fn stretches(problem: &Problem, warnings: &mut Vec<Warning>) {
         let DamageLaw::CriticalStretch(CriticalStretch { critical, .. }) = law else {
             continue;
         };
+        let shown = if critical < 1e-3 {
+            format!("{critical:.1e}")
+        } else {
+            format!("{critical:.3}")
+        };
         let mut warn = |consequence: String| {
-            let message = format!(
-                "{section} damage: its bonds break at a stretch of {critical:.3}{consequence}"
-            );
+            let message =
+                format!("{section} damage: its bonds break at a stretch of {shown}{consequence}");
             warnings.push(Warning::new(message).at(span));
         };
+        if critical < SMALLEST_STRETCH {
+            let units = "; check the units of the toughness and of the moduli";
+            warn(units.to_owned());
+        }
         if critical >= LARGEST_STRETCH {
             warn(format!(", at {:.3} times their length", 1.0 + critical));
         }
@@ -193,6 +212,38 @@ fn safeties(problem: &Problem) -> Vec<f64> {
 /// resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
+}
+
+/// Warn of pre-cracks without width that pass through points, which then count to one side.
+fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
+    let (problem, model) = (simulation.problem, &simulation.model);
+    let is_on = |crack: &Crack, point: &usize| {
+        let position = model.position(*point);
+        let reach = ON_CRACK * problem.dimension.edge(model.volume[*point]);
+        crack::is_in_reach(crack, position, reach)
+            && (0..D).any(|k| {
+                let [mut before, mut after] = [position; 2];
+                before[k] -= reach;
+                after[k] += reach;
+                crack::crosses(crack, before, after)
+            })
+    };
+    for crack in problem
+        .cracks
+        .iter()
+        .filter(|crack| !crack.surface.has_width())
+    {
+        let found = (0..model.owned()).filter(|point| is_on(&crack.surface, point));
+        let points = total(simulation.comm, found.count() as u64);
+        if points > D as u64 {
+            let message = format!(
+                "[crack.{}]: passes through {points} points, which count to one side of it, so the cut lies beside them; \
+                 move the crack or the grid by half a spacing, or choose another spacing",
+                crack.name
+            );
+            warnings.push(Warning::new(message).at(&crack.span));
+        }
+    }
 }
 
 /// Number of points of each set.
@@ -282,8 +333,24 @@ fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warni
     let last = simulation.last_step();
     if last > MANY_STEPS {
         warn(format!(
-            "[time] end: the run takes {:.1e} steps of {step:.4e} s",
+            "[time] end: the run takes {:.1e} steps of {step:.4e} s; check the units of the end, the moduli and the \
+             densities",
             last as f64
+        ));
+    }
+    if last < FEW_STEPS && !simulation.is_quasi_static() {
+        warn(format!(
+            "[time] end: the run has only {last} step(s) of {step:.4e} s; check the units of the end, the lengths and \
+             the moduli"
+        ));
+    }
+    if let Some(Interval::Seconds(every)) = problem.output.every
+        && every > problem.time.end
+    {
+        warn(format!(
+            "[output] every: {} s is longer than the run, {} s; only its first and last states are written",
+            format_number(every),
+            format_number(problem.time.end)
         ));
     }
 }

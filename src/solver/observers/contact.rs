@@ -1,8 +1,9 @@
-//! Runs without `[contact]`: bodies that no bond joins go through one another. This finds whether points of such bodies
-//! have come nearer than their spacing, and tells the user.
+//! In runs without `[contact]`, bodies that no bond joins pass through one another. This module finds points of such
+//! bodies that are nearer than their spacing, and points of bonded bodies that are nearer than half of it after bonds
+//! have broken.
 //!
-//! Where the boxes around two bodies meet, their points are dealt out to the ranks by cells of space, the
-//! points of one body to all cells that they may meet others in; so each rank compares a part.
+//! Where the boxes around two bodies overlap, their points are distributed to the ranks by cells of space, so that each
+//! rank compares a part. Points of the second body go to all cells within reach.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -16,14 +17,16 @@ use crate::solver::model::Model;
 /// Edge of a cell in largest distances: few points are near a border then.
 const CELL: f64 = 8.0;
 
-/// Points that begin nearer to one another than their spacing have come nearer if this share of their
-/// distance is left.
+/// Points that start nearer than their spacing count only below this fraction of their initial distance.
 const NEARER: f64 = 0.9;
+
+/// Points of bodies that bonds joined count below this fraction of their spacing: compression alone rarely reaches it.
+const PASSED: f64 = 0.5;
 
 /// Points handled by one task.
 const CHUNK: usize = 1 << 15;
 
-/// Two points of bodies that no bond joins, nearer to one another than their spacing.
+/// Two points of different bodies that are nearer than bodies that touch can be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Their bodies, the lower index first.
@@ -32,22 +35,33 @@ pub struct Contact {
     pub ids: [u64; 2],
     /// The middle between them, m.
     pub place: [f64; 3],
-    /// How far they are apart, m.
+    /// Their distance, m.
     pub distance: f64,
+    /// Whether bonds joined the bodies at the start of the run.
+    pub were_bonded: bool,
 }
 
 /// The bodies that may come into contact.
 pub struct ContactWatch {
-    /// Pairs of bodies that no bond joins, the lower index first.
-    pairs: Vec<[usize; 2]>,
+    /// Pairs of bodies that no bond joins, or whose bonds can break.
+    pairs: Vec<Pair>,
     /// Largest spacing of each body, m.
     spacing: Vec<f64>,
 }
 
-/// A pair of bodies whose boxes meet.
+/// Two bodies that may pass through each other.
+#[derive(Clone, Copy)]
+struct Pair {
+    /// The lower index first.
+    bodies: [usize; 2],
+    /// Whether bonds joined them at the start.
+    were_bonded: bool,
+}
+
+/// A pair of bodies whose boxes overlap.
 #[derive(Clone, Copy)]
 struct Meeting {
-    pair: [usize; 2],
+    pair: Pair,
     /// The largest distance that counts, m.
     radius: f64,
     /// Where points of both can be, m.
@@ -85,7 +99,13 @@ impl ContactWatch {
         }
         comm.sum(&mut bonds);
         let pairs = (0..bodies).flat_map(|a| (a + 1..bodies).map(move |b| [a, b]));
-        let pairs = pairs.filter(|[a, b]| bonds[a * bodies + b] == 0).collect();
+        let pairs = pairs.map(|[a, b]| Pair {
+            bodies: [a, b],
+            were_bonded: bonds[a * bodies + b] > 0,
+        });
+        let can_break = simulation.fields.broken_bonds.is_some();
+        let pairs = pairs.filter(|pair| can_break || !pair.were_bonded);
+        let pairs = pairs.collect();
         let mut spacing = vec![0.0_f64; bodies];
         for (point, block) in model.block.iter().enumerate() {
             let largest = &mut spacing[simulation.problem.body_of(usize::from(*block))];
@@ -100,8 +120,8 @@ impl ContactWatch {
         Self { pairs, spacing }
     }
 
-    /// The nearest two points of bodies that no bond joins, if they have come nearer than the mean of
-    /// their spacings; the same on all ranks. Collective.
+    /// The nearest two points of different bodies, if they are nearer than bodies that touch can be; the same on all
+    /// ranks. Collective.
     pub fn look<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Option<Contact> {
         let meetings = self.meetings(simulation);
         if meetings.is_empty() {
@@ -151,8 +171,8 @@ impl ContactWatch {
         let mut corners = found.reduce(none, join);
         comm::min(simulation.comm, &mut corners);
         let corner = |body: usize, k: usize| corners[6 * body + k];
-        let meeting = |pair: &[usize; 2]| {
-            let [a, b] = *pair;
+        let meeting = |pair: &Pair| {
+            let [a, b] = pair.bodies;
             let radius = 0.5 * (self.spacing[a] + self.spacing[b]);
             let lower = |k: usize| corner(a, k).max(corner(b, k)) - radius;
             let upper = |k: usize| (-corner(a, 3 + k)).min(-corner(b, 3 + k)) + radius;
@@ -192,15 +212,20 @@ fn candidates<const D: usize>(
     let mut outgoing = vec![Vec::new(); ranks];
     let mut of_body = vec![Vec::new(); simulation.problem.bodies.len()];
     for (number, meeting) in meetings.iter().enumerate() {
-        for (second, body) in meeting.pair.into_iter().enumerate() {
+        for (second, body) in meeting.pair.bodies.into_iter().enumerate() {
             of_body[body].push((number, second));
         }
     }
     let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
+    let broken = simulation.fields.broken_bonds.as_deref();
     for (point, block) in model.block.iter().enumerate() {
+        let is_whole = broken.is_none_or(|broken| broken[point] == 0.0);
         let place = place_of(model, displacement, point);
         for (number, second) in &of_body[simulation.problem.body_of(usize::from(*block))] {
             let meeting = &meetings[*number];
+            if meeting.pair.were_bonded && is_whole {
+                continue;
+            }
             if (0..3).any(|k| place[k] < meeting.lower[k] || place[k] > meeting.upper[k]) {
                 continue;
             }
@@ -255,18 +280,22 @@ fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<C
             let spacing = 0.5 * (a.spacing + b.spacing);
             let reference = distance_squared(a.reference, b.reference).sqrt();
             let found = Contact {
-                bodies: meeting.pair,
+                bodies: meeting.pair.bodies,
                 ids: [a.id, b.id],
                 place: std::array::from_fn(|k| 0.5 * (a.place[k] + b.place[k])),
                 distance: squared.sqrt(),
+                were_bonded: meeting.pair.were_bonded,
             };
             let is_nearer = |than: &Contact| {
                 let order = found.distance.total_cmp(&than.distance);
                 order.then(found.ids.cmp(&than.ids)).is_lt()
             };
-            if found.distance < spacing.min(NEARER * reference)
-                && nearest.as_ref().is_none_or(is_nearer)
-            {
+            let limit = if meeting.pair.were_bonded {
+                PASSED * spacing
+            } else {
+                spacing.min(NEARER * reference)
+            };
+            if found.distance < limit && nearest.as_ref().is_none_or(is_nearer) {
                 nearest = Some(found);
             }
         });
@@ -281,18 +310,26 @@ fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Con
         Found {
             key: contact.distance,
             ids: contact.ids,
-            payload: [a as f64, b as f64, x, y, z],
+            payload: [
+                a as f64,
+                b as f64,
+                f64::from(u8::from(contact.were_bonded)),
+                x,
+                y,
+                z,
+            ],
         }
     });
     let Found {
         key: distance,
         ids,
-        payload: [a, b, x, y, z],
+        payload: [a, b, were_bonded, x, y, z],
     } = least(comm, found)?;
     Some(Contact {
         bodies: [a as usize, b as usize],
         ids,
         place: [x, y, z],
         distance,
+        were_bonded: were_bonded != 0.0,
     })
 }
