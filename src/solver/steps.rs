@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::message::format_number;
-use crate::problem::{Adaptive, Problem, Stage, StepRule, Time};
+use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time};
 
 use super::motion::Clock;
 use super::motion::clock::steps_to;
@@ -37,6 +37,9 @@ pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
 /// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks.
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
+        if stable.is_infinite() {
+            return Err(without_neighbours(problem, "equilibrium"));
+        }
         let steps = steps as f64;
         return countable(problem, length, (length / steps, steps));
     }
@@ -46,9 +49,7 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
             (step, steps_to(length, step))
         }
         StepRule::Automatic(_) if stable.is_infinite() => {
-            let message = "[grid] horizon: no point has a neighbour, so there is no stable step; check that the \
-                           horizon is in metres and exceeds the spacing";
-            return Err(Error::input(message).at(&problem.places.horizon));
+            return Err(without_neighbours(problem, "stable step"));
         }
         StepRule::Automatic(safety) => {
             let steps = (length / automatic_step(problem, time, safety, stable)).ceil();
@@ -63,6 +64,21 @@ fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Resu
         None => (step, steps),
     };
     countable(problem, length, (step, steps))
+}
+
+/// The error of points without bonds, for which there is no `missing`.
+fn without_neighbours(problem: &Problem, missing: &str) -> Error {
+    let from_mesh = |body: &Body| matches!(body.points, PointSource::Mesh { .. });
+    let scale = if problem.bodies.iter().any(from_mesh) {
+        "; a mesh in millimetres needs `scale = 1e-3`"
+    } else {
+        ""
+    };
+    let message = format!(
+        "[grid] horizon: no point has a neighbour, so there is no {missing}; check that the horizon is in metres and \
+         exceeds the spacing{scale}"
+    );
+    Error::input(message).at(&problem.places.horizon)
 }
 
 /// A step (s) and the number of steps, or an error if there are more of these in a stage of some length (s) than can be
