@@ -28,7 +28,7 @@ examples:
   scripts/pmma --dx 1e-3                     a coarse grid
   scripts/pmma --laws correspondence --dx 0.31e-3
                                              the paper's grid; eight minutes of two cores
-  scripts/pmma --set fracture_energy=100 --set family_correction=0
+  scripts/pmma --set fracture_energy=100 --set family_correction=0 --set damage.brittle.energy.calibration=energy
                                              as in the paper, see docs/src/verification/pmma.md
   scripts/pmma --relaxation 60               from equilibrium to equilibrium, in 60 load steps
   scripts/pmma --set speed=0.01              another parameter of the deck; may be repeated
@@ -102,8 +102,11 @@ no_failure = ["left", "right"]
 OF_WORK = "family_correction"
 COLOURS = ("#1b6ca8", "#d1495b", "#66a182", "#8d6a9f")
 
-FORCES_AT = (0.1e-3, 0.2e-3, 0.3e-3, 0.4e-3)  # m
-LENGTHS_AT = (0.5e-3, 0.59e-3)  # m
+FORCES_AT = (0.1e-3, 0.2e-3, 0.3e-3, 0.4e-3, 0.59e-3)  # m
+LENGTHS_AT = (0.5e-3, 0.55e-3, 0.59e-3, 0.65e-3)  # m
+# Réthoré (2018): forces (N) and crack lengths (m) of the experiment at these displacements.
+MEASURED_FORCES = (930, 1990, 3040, 4090, 5460)
+MEASURED_LENGTHS = (8.9e-3, 13.6e-3, 17.2e-3, 23.6e-3)
 
 
 def arguments():
@@ -140,7 +143,6 @@ def arguments():
     add("--dx", type=spacing, default=0.5e-3, metavar="M", help="spacing [0.5e-3]")
     add("--small", action="store_true", help="2 mm and a fast press")
     add("--relaxation", type=load_steps, metavar="STEPS", help="relaxation with this number of load steps [explicit]")
-    add("--opening", action="store_true", help="bonds of correspondence break so that opening the plate costs G")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the deck")
     add("--reuse", action="store_true", help="reuse existing runs")
     add("--threads", type=int, metavar="N", help="threads of each run [all cores]")
@@ -153,7 +155,7 @@ def arguments():
     return options
 
 
-def deck(law, load_steps, opening):
+def deck(law, load_steps):
     """The deck's text with another law, and with relaxation if there are load steps."""
     text = DECK.read_text()
 
@@ -166,8 +168,6 @@ def deck(law, load_steps, opening):
     if LAWS[law] is not None:
         replace(r"(?s)\[material\.pmma\..*?(?=\[body\.plate\])", LAWS[law])
         replace(rf"(?m)^{OF_WORK} = .*\n", "")
-    elif opening:
-        replace(r"(?m)^\[damage\.brittle\.energy\]$", '[damage.brittle.energy]\ncalibration = "opening"')
     if load_steps:
         for pattern, new in RELAXED.items():
             replace(pattern, new.format(steps=load_steps))
@@ -177,13 +177,12 @@ def deck(law, load_steps, opening):
 def run(options, law):
     """Run the deck with a law; return its folder."""
     way = "-relaxed" if options.relaxation else ""
-    way += "-opening" if options.opening and LAWS[law] is None else ""
     folder = options.output / f"{law}-{options.dx * 1e3:g}{way}"
     folder.mkdir(parents=True, exist_ok=True)
     if options.reuse and (folder / "crack_main.csv").exists():
         return folder
     written = folder / "deck.toml"
-    written.write_text(deck(law, options.relaxation, options.opening))
+    written.write_text(deck(law, options.relaxation))
     command = [options.binary, "run", written, "--quiet", "--overwrite", "--output", folder]
     for assignment in [f"dx={options.dx!r}", *options.set]:
         if LAWS[law] is None or not assignment.startswith(f"{OF_WORK}="):
@@ -278,7 +277,10 @@ def table(results):
         row += [number(length, 1e3, 1) for length in result["lengths"]]
         row += [f"{result['branches']:g}", f"{result['kinetic_share']:.1e}"]
         rows.append(row)
-    rows.append(["measured", "", "", number(INITIATION), "0 (±4 wanted)"] + [""] * (len(heads) - 5))
+    measured = ["measured", "", "", number(INITIATION), "0 (±4 wanted)", "", "none"]
+    measured += [number(force, 1e-3) for force in MEASURED_FORCES] + ["", ""]
+    measured += [number(length, 1e3, 1) for length in MEASURED_LENGTHS] + ["1", ""]
+    rows.append(measured)
     return "".join("| " + " | ".join(row) + " |\n" for row in rows)
 
 
@@ -317,6 +319,9 @@ def draw_curves(runs, path):
         axis.axvline(1e3 * INITIATION, color="#009e73", linestyle="--", linewidth=1, label="initiation, measured")
         axis.set_xlabel("displacement of the right side, mm")
         axis.set_xlim(left=0)
+    measured = {"color": "#009e73", "marker": "o", "linestyle": "none", "label": "measured"}
+    forces.plot(1e3 * numpy.array(FORCES_AT), 1e-3 * numpy.array(MEASURED_FORCES), **measured)
+    lengths.plot(1e3 * numpy.array(LENGTHS_AT), 1e3 * numpy.array(MEASURED_LENGTHS), **measured)
     forces.set(ylabel="force, kN", ylim=(0, None))
     lengths.set_ylabel("length of the crack, mm")
     forces.legend(fontsize=8)

@@ -146,6 +146,8 @@ class Results(unittest.TestCase):
             result.field("dammage")
         with self.assertRaisesRegex(IndexError, "no output 5; there are 5"):
             result.field("damage", 5)
+        with self.assertRaisesRegex(IndexError, "no output at 25 s; they are between 0 and 4"):
+            result.field("damage", time=25)
         with self.assertRaisesRegex(TypeError, "one of output and time"):
             result.field("damage", 1, time=1e-6)
         with self.assertRaisesRegex(FileNotFoundError, "there is no result"):

@@ -22,7 +22,7 @@ class Result:
     """A result of a run, open for reading.
 
     `times` (s) and `steps` have one entry an output. An output is chosen by its index `output`, which may be negative and
-    is the last one if not given, or by the nearest `time` (s). Rows of fields and points are in the order of `ids`.
+    is the last one if not given, or by the nearest `time` (s), which must lie within the run. Rows of fields and points are in the order of `ids`.
     """
 
     def __init__(self, path):
@@ -144,7 +144,13 @@ class Result:
         if time is not None:
             if output is not None:
                 raise TypeError("give one of output and time")
-            return int(numpy.abs(self.times - time).argmin())
+            nearest = int(numpy.abs(self.times - time).argmin())
+            neighbour = min(max(nearest, 1), count - 1)
+            reach = 0.5 * (self.times[neighbour] - self.times[neighbour - 1]) if count > 1 else 0.0
+            if not self.times[0] - reach <= time <= self.times[-1] + reach:
+                first, last = self.times[0], self.times[-1]
+                raise IndexError(f"{self.path}: no output at {time} s; they are between {first:g} and {last:g} s")
+            return nearest
         output = -1 if output is None else output
         if not -count <= output < count:
             raise IndexError(f"{self.path}: no output {output}; there are {count}")
