@@ -535,15 +535,26 @@ fn a_bond_of_lammps_has_its_force() {
 #[test]
 fn state_based_laws_of_lammps_have_their_influence_function() {
     let folder = Folder::new("influence");
-    for (style, more, inverse) in [("lps", "", true), ("ves", " 0.5 1.0", true), ("eps", " 1e6", false)] {
+    for (style, more, inverse) in [
+        ("lps", "", true),
+        ("ves", " 0.5 1.0", true),
+        ("eps", " 1e6", false),
+    ] {
         let script = format!(
             "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 1 0 1\ncreate_box 1 r\n\
              create_atoms 1 region r\npair_style peri/{style}\n\
              pair_coeff * * 3.0e4 2.0e4 5.0 0.1 0.0{more}\nset type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n"
         );
         let imported = folder.import("in.influence", &script).unwrap();
-        assert_eq!(imported.text.contains("influence = \"inverse\""), inverse, "{style}");
-        let said = imported.entries.iter().any(|entry| entry.note.contains("influence function is 1"));
+        assert_eq!(
+            imported.text.contains("influence = \"inverse\""),
+            inverse,
+            "{style}"
+        );
+        let said = imported
+            .entries
+            .iter()
+            .any(|entry| entry.note.contains("influence function is 1"));
         assert_eq!(said, !inverse, "{style}");
     }
 }
