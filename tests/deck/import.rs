@@ -395,6 +395,25 @@ PeriLab:
         Temperature: True
 "#;
 
+/// PeriLab has a Poisson's ratio of 1/3 in plane strain too, so a bulk modulus is Young's modulus.
+#[test]
+fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
+    let folder = Folder::new("bulk");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let constants = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
+    let deck = STRIP
+        .replacen(constants, "        Bulk Modulus: 7.0e+4\n", 1)
+        .replacen("plane stress", "plane strain", 1);
+    let imported = folder.import("bulk.yaml", &deck).unwrap();
+    for line in ["dimension = \"plane-strain\"", "youngs_modulus = 70000.0"] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+}
+
 #[test]
 fn a_bond_of_perilab_has_its_micromodulus() {
     let folder = Folder::new("strip");
