@@ -395,6 +395,25 @@ PeriLab:
         Temperature: True
 "#;
 
+/// PeriLab has a Poisson's ratio of 1/3 in plane strain too, so a bulk modulus is Young's modulus.
+#[test]
+fn a_bulk_modulus_of_bonds_of_perilab_is_that_of_the_plane() {
+    let folder = Folder::new("bulk");
+    folder.write(
+        "strip.txt",
+        "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n",
+    );
+    folder.write("ends.txt", "header: global_id\n1\n2\n");
+    let constants = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
+    let deck = STRIP
+        .replacen(constants, "        Bulk Modulus: 7.0e+4\n", 1)
+        .replacen("plane stress", "plane strain", 1);
+    let imported = folder.import("bulk.yaml", &deck).unwrap();
+    for line in ["dimension = \"plane-strain\"", "youngs_modulus = 70000.0"] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+}
+
 #[test]
 fn a_bond_of_perilab_has_its_micromodulus() {
     let folder = Folder::new("strip");
@@ -528,6 +547,34 @@ fn a_bond_of_lammps_has_its_force() {
             let expected = share * 3.0e4 * stretch * 8.0;
             assert!((f / expected - 1.0).abs() < 1e-6, "{f} {expected}");
         });
+    }
+}
+
+/// `lps` and `ves` have the influence function 1/|ξ|; the plastic law here has no other one than 1, and the log says so.
+#[test]
+fn state_based_laws_of_lammps_have_their_influence_function() {
+    let folder = Folder::new("influence");
+    for (style, more, inverse) in [
+        ("lps", "", true),
+        ("ves", " 0.5 1.0", true),
+        ("eps", " 1e6", false),
+    ] {
+        let script = format!(
+            "atom_style peri\nlattice sc 2.0\nregion r block 0 1 0 1 0 1\ncreate_box 1 r\n\
+             create_atoms 1 region r\npair_style peri/{style}\n\
+             pair_coeff * * 3.0e4 2.0e4 5.0 0.1 0.0{more}\nset type 1 density 5 volume 8\ntimestep 1e-6\nrun 1\n"
+        );
+        let imported = folder.import("in.influence", &script).unwrap();
+        assert_eq!(
+            imported.text.contains("influence = \"inverse\""),
+            inverse,
+            "{style}"
+        );
+        let said = imported
+            .entries
+            .iter()
+            .any(|entry| entry.note.contains("influence function is 1"));
+        assert_eq!(said, !inverse, "{style}");
     }
 }
 

@@ -158,6 +158,10 @@ fn write_material(
         _ => {
             section.set("bulk_modulus", Value::number(values[0]));
             section.set("shear_modulus", Value::number(values[1]));
+            if law != "ordinary_plastic" {
+                section.comment("Bonds of LAMMPS have the influence function 1/|ξ|.");
+                section.set("influence", Value::text("inverse"));
+            }
             Constants::of(&[("bulk_modulus", values[0]), ("shear_modulus", values[1])])
         }
     };
@@ -178,7 +182,8 @@ fn write_material(
     let note = format!("[material.{written}.{law}] and the horizon");
     match law {
         "ordinary_plastic" => {
-            let note = note + "; the yield stress has another formula";
+            let note = note
+                + "; the yield stress has another formula, and the influence function is 1 in place of 1/|ξ|";
             translation.log.approximated(node, note);
         }
         _ => translation.log.taken(node, note),

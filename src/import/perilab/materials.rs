@@ -135,7 +135,9 @@ pub(super) fn write_material(
                     .log
                     .approximated(node, "the law has the Poisson's ratio of bonds");
             }
-            model.constants.write_one(&mut section, None)
+            // PeriLab has a Poisson's ratio of 1/3 in plane strain too, so that E = K.
+            let factor = (translation.dimension == 2).then_some(1.0);
+            model.constants.write_one(&mut section, factor)
         }
         _ if anisotropic => true,
         _ => {
