@@ -155,8 +155,7 @@ struct Part {
 
 /// Divide the points into parts. Each part comes after its parent.
 fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part> {
-    let section =
-        |point: usize| (ways.length[point] / reach.section_length) as usize;
+    let section = |point: usize| (ways.length[point] / reach.section_length) as usize;
     let mut part_of: Vec<Option<usize>> = vec![None; points.len()];
     let mut parts: Vec<Part> = Vec::new();
     for first in &ways.order {
