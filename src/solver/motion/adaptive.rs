@@ -4,6 +4,13 @@
 //! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. These must carry
 //! it before they break themselves:
 //!
+//! ```text
+//! N_b > most broken, Δt > smallest        undo the step, Δt ← Δt · reduce
+//! N_b ≤ stable broken, so many steps      Δt ← Δt · raise, up to the largest
+//! ```
+//!
+//! N_b is the largest number of bonds of a point that break in a step, over all ranks. So all ranks make the
+//! same decision.
 
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
