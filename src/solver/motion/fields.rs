@@ -21,26 +21,28 @@ pub struct Description {
     pub state: bool,
     /// Whether a rollback of a step restores the field.
     pub undone: bool,
-    /// What a point that is born during a run gets, and what those get that it lies between when it leaves.
+    /// Values of the field at a point that is created during a run, and at its parents when it is removed.
     pub birth: Birth,
-    /// The name under which decks ask for it.
+    /// Name of the field in decks, if they can request it.
     pub output: Option<Field>,
 }
 
-/// What a new point gets from those that it lies between, and what a point that leaves gives them, in equal
-/// parts.
+/// Values that a new point gets from its parents, and values that a removed point returns to its parents,
+/// in equal parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
-    /// The mean value; and nothing.
+    /// A new point gets the mean; a removed point returns nothing.
     Interpolated,
-    /// The mean value; and its volume times what it has beyond that, so that momentum stays, and so do values that
-    /// are linear in place.
+    /// A new point gets the mean. A removed point returns its volume times its difference from the mean.
+    /// Momentum and linear fields are conserved.
     Conserved,
-    /// The mean value; and its own by volume, so that no value leaves the range that there was.
+    /// A new point gets the mean. A removed point is mixed into its parents by volume, so that no value
+    /// leaves the previous range.
     Mixed,
-    /// A share by volume, so that the sum over all points stays; and all of it.
+    /// A new point gets a part by volume, so that the sum over all points is conserved. A removed point
+    /// returns all of its value.
     Shared,
-    /// What is found anew; and nothing.
+    /// The field is recomputed for a new point; a removed point returns nothing.
     FoundAnew,
 }
 
@@ -70,7 +72,7 @@ impl<const D: usize> Columns for [Vec<f64>; D] {
     }
 }
 
-/// A field that not every run has.
+/// A field that only some runs have.
 impl<T: Columns> Columns for Option<T> {
     fn columns(&self) -> &[Vec<f64>] {
         self.as_ref().map_or(&[], T::columns)
@@ -83,7 +85,7 @@ impl<T: Columns> Columns for Option<T> {
 
 macro_rules! fields {
     ($($(#[$doc:meta])* $name:ident: $type:ty = $description:expr;)+) => {
-        /// The fields over the points. Those that a run does not need are not there, on all ranks alike.
+        /// The fields over the points. Fields that a run does not need are absent on all ranks.
         pub struct Fields<const D: usize> {
             $($(#[$doc])* pub $name: $type,)+
         }
@@ -102,7 +104,7 @@ macro_rules! fields {
     };
 }
 
-/// A field of the state that is changed back with a step.
+/// A field of the state that a rollback restores.
 const STATE: Description = Description {
     name: "",
     unit: "",

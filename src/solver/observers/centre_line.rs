@@ -162,8 +162,8 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
         if part_of[*first].is_some() {
             continue;
         }
-        // The point of a part with the shortest path has its predecessor in an earlier section, or has
-        // none.
+        // The point of a part with the shortest path has its predecessor in an earlier section, or has no
+        // predecessor.
         let parent = ways.before[*first].and_then(|before| part_of[before]);
         let number = parts.len();
         part_of[*first] = Some(number);
@@ -198,8 +198,8 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
     parts
 }
 
-/// Where a crack forks, parts with nothing behind them are no branches: of several such ones one is made,
-/// beside longer ones they are dropped.
+/// Handle parts without children (stubs) at forks. If all parts at a fork are stubs, merge them into one;
+/// otherwise, drop the stubs.
 fn drop_stubs(parts: &mut [Part]) {
     for number in 0..parts.len() {
         let children = std::mem::take(&mut parts[number].children);
@@ -215,7 +215,7 @@ fn drop_stubs(parts: &mut [Part]) {
             parts[*last].members.sort_unstable();
             kept.push(*last);
         }
-        // The longest first; of equally long ones the first that was reached.
+        // Sort by path length, longest first; among equal ones, the part reached first comes first.
         kept.sort_by(|a, b| {
             let order = parts[*b].farthest.total_cmp(&parts[*a].farthest);
             order.then(a.cmp(b))
@@ -224,9 +224,10 @@ fn drop_stubs(parts: &mut [Part]) {
     }
 }
 
-/// Joins the middles of the parts.
+/// Join the centroids of successive parts to branches.
 fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
-    // Join the centroids of the parts to branches.
+    // Vertex of a part: its centroid. For a part without children, the vertex is moved along the line as
+    // far as the points of the part extend.
     let place = |part: &Part, before: Vector| {
         let members = || part.members.iter().map(|member| &points[*member]);
         let (mut sum, mut weight) = (Vector::zeros(), 0.0);
@@ -247,7 +248,8 @@ fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Ve
         place: from,
         along: 0.0,
     };
-    // The start has the parts without parents behind it, of which the one that reaches farthest counts.
+    // The parts without parents are the candidates for the first part. Only the one that extends farthest
+    // is used.
     let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
     let farther = |a: &usize, b: &usize| {
         let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);
@@ -334,7 +336,7 @@ mod tests {
         let [upper, lower] = [&found[0], &found[1]];
         assert_eq!(upper[0].along, 0.0);
         assert!(lower[0].place[1].abs() < 1e-9);
-        // The lower one leaves the crack near the fork.
+        // The lower branch starts near the fork.
         assert!((18.0..24.0).contains(&lower[0].along), "{lower:?}");
         let tip = |branch: &Branch| branch[branch.len() - 1].place;
         assert!((tip(upper)[0] - 40.0).abs() < 0.5 && (tip(upper)[1] - 20.0).abs() < 0.5);

@@ -62,13 +62,13 @@ impl CrackPath {
         })
     }
 
-    /// Its name.
+    /// Name of the crack.
     pub fn name(&self) -> &str {
         &self.rule.name
     }
 
-    /// Its branches at a damage of the owned points; the same on all ranks, and to the bit on any number
-    /// of them. Collective.
+    /// Find the branches for the given damage of the owned points. The result is bitwise the same on all
+    /// ranks and for any number of ranks. Collective.
     pub fn branches<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
