@@ -1,11 +1,12 @@
-//! Points that intact bonds connect, on any ranks.
+//! Connected components of points over intact bonds, across ranks.
 
 use crate::comm::total;
 
 use super::Simulation;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Sets each column over the local points to its minimum over the points that intact bonds connect. Collective.
+    /// Set each column over the local points to its minimum over the points that intact bonds connect.
+    /// Collective.
     pub(super) fn spread_least(&mut self, columns: &mut [&mut [f64]]) {
         let local = self.model.volume.len();
         let mut roots: Vec<usize> = (0..local).collect();
@@ -14,7 +15,8 @@ impl<const D: usize> Simulation<'_, D> {
             roots[i.max(j)] = i.min(j);
         });
         loop {
-            // The minimum over the points of a piece on this rank, then those of the other ranks.
+            // First find the minimum over the points of a piece on this rank, then include those of the
+            // other ranks.
             self.forces.bring_all(self.comm, columns);
             let mut changed = 0;
             for column in columns.iter_mut() {
@@ -34,7 +36,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// The smallest id of the points that intact bonds connect to each owned point, itself included. Collective.
+    /// For each owned point, the smallest id of the points that intact bonds connect to it, including its
+    /// own. Collective.
     pub fn fragment_ids(&mut self) -> Vec<f64> {
         let mut ids: Vec<f64> = self.model.ids.iter().map(|id| *id as f64).collect();
         self.spread_least(&mut [&mut ids]);
@@ -43,7 +46,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// The root of a point's tree; shortens the path to it.
+/// Find the root of a point's tree, and shorten the path to it.
 fn root(parents: &mut [usize], mut point: usize) -> usize {
     while parents[point] != point {
         parents[point] = parents[parents[point]];

@@ -1,5 +1,5 @@
-//! The regular grids on which the points of bodies lie: those that decks describe, and those that
-//! point files turn out to hold.
+//! The regular grids of the bodies' points: grids that decks define, and grids that are detected in point
+//! files.
 
 use rayon::prelude::*;
 
@@ -11,13 +11,14 @@ use crate::points::Point;
 use crate::points::bins::Bins;
 use crate::problem::{FamilyRule, Kind, PointSource, Problem, Quadrature};
 
-/// The share of a cell's edge by which a point may be off its place, and two grids apart.
+/// Largest offset of a point from its cell's centre, and of two grids from each other, as a fraction of the
+/// cell's edge.
 const ON_GRID: f64 = 1e-6;
 
-/// Cells are numbered with integers that a float holds exactly.
+/// Largest cell index. Cells are numbered with integers that a float represents exactly.
 const FARTHEST: f64 = 1e15;
 
-/// The share by which the volume of a file's points may differ from that of a cell.
+/// Largest relative difference between the volume of a file's point and that of a cell.
 const VOLUME: f64 = 1e-2;
 
 /// A cell's centre and the edges of the cells, m.
@@ -27,10 +28,11 @@ struct Cells {
     edges: [f64; 3],
 }
 
-/// The grids of a deck; `longest` is the length of the longest bond, m. Collective.
+/// Find the grids of a deck; `longest` is the length of the longest bond, m. Collective.
 ///
 /// # Errors
-/// When the deck wants lattices and the points of a file do not lie on a grid; the same on all ranks.
+/// If the deck requests lattices and the points of a file do not lie on a grid; the error is the same on
+/// all ranks.
 pub fn grids(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -67,7 +69,7 @@ pub fn grids(
             agree(comm, if wanted { Err(error()) } else { Ok(()) })?;
             continue;
         };
-        // Those of the levels lie with one point on a centre.
+        // The grids of the refinement levels have a point at a cell centre.
         let is_shape = matches!(body.points, PointSource::Lattice { .. });
         let refinement = problem.refinement.as_ref().filter(|_| is_shape);
         for level in 0..=refinement.map_or(0, |refinement| refinement.levels) {
@@ -79,7 +81,7 @@ pub fn grids(
     Ok(grids)
 }
 
-/// Notes that the points of a block lie on a grid.
+/// Record that the points of a block lie on a grid.
 fn add(
     grids: &mut Vec<GridFrame>,
     Cells { centre, edges }: Cells,
@@ -114,8 +116,8 @@ fn described(origin: [f64; 3], edges: [f64; 3], dimension: usize) -> Cells {
     Cells { centre, edges }
 }
 
-/// The grid that the points of a body lie on, if they all do, and if each has the volume of a cell;
-/// collective.
+/// Detect the grid of a body's points, if all of them lie on it and each has the volume of a cell.
+/// Collective.
 fn detected(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -128,7 +130,7 @@ fn detected(
         let owned = &domain.points[..domain.owned];
         owned.iter().filter(|point| point.block as usize == body)
     };
-    // Coordinates, coordinates with the sign turned, gaps, volume, volume with the sign turned.
+    // Minima of: coordinates, negative coordinates, gaps, volume, negative volume.
     let mut smallest = [f64::MAX; 11];
     let [gap_x, gap_y, gap_z] = smallest_gaps(domain, body, longest);
     (smallest[6], smallest[7], smallest[8]) = (gap_x, gap_y, gap_z);
@@ -145,7 +147,7 @@ fn detected(
     for k in 0..dimension {
         let (low, high, gap) = (smallest[k], -smallest[3 + k], smallest[6 + k]);
         centre[k] = low;
-        // One layer of points fits any edge.
+        // A single layer of points fits any edge.
         edges[k] = if gap < f64::MAX {
             (high - low) / ((high - low) / gap).round()
         } else {
@@ -168,8 +170,8 @@ fn detected(
     (good[0] == 1.0).then_some(Cells { centre, edges })
 }
 
-/// By direction, how little the points of a body differ that are no farther apart than the longest
-/// bond (m), where they differ at all. Over all ranks the smallest do not depend on their number.
+/// Smallest nonzero coordinate difference in each direction between points of a body that are at most as
+/// far apart as the longest bond (m). The minimum over all ranks does not depend on their number.
 fn smallest_gaps(domain: &Domain, body: usize, longest: f64) -> [f64; 3] {
     let of_body = |point: &&Point| point.block as usize == body;
     let places: Vec<[f64; 3]> = domain

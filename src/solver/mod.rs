@@ -1,4 +1,4 @@
-//! The solver: bonds and their forces, motion, conditions, and what is observed.
+//! The solver: bonds and their forces, motion, conditions, and observed quantities.
 
 pub mod assign;
 pub mod bonds;

@@ -1,4 +1,4 @@
-//! What does not change during a run: the points and their constants.
+//! Constant data of a run: the points and their properties.
 
 use crate::dimension::Dimension;
 use crate::partition::Domain;
@@ -6,7 +6,7 @@ use crate::problem::{Material, Problem};
 
 use super::palette_column::PaletteColumn;
 
-/// The local points by component, and the constants of the blocks.
+/// The local points by component, and the properties of the blocks.
 pub struct Model<const D: usize> {
     /// Reference positions by component, m; owned points, then ghosts.
     pub reference: [Vec<f64>; D],
@@ -26,16 +26,16 @@ pub struct Model<const D: usize> {
     pub interior: usize,
     /// Number of points over all ranks.
     pub total: u64,
-    /// Those of them of level 0; they have the lowest ids.
+    /// Number of points of level 0 over all ranks; they have the lowest ids.
     pub coarsest: u64,
 }
 
 /// Thermal expansion in the directions of the setting.
 #[derive(Debug, Clone, Copy)]
 pub struct Expansion {
-    /// Free stretch by one kelvin, 1/K.
+    /// Free stretch per kelvin, 1/K.
     pub stretch_per_kelvin: f64,
-    /// Temperature without thermal stretch.
+    /// Temperature with zero thermal stretch.
     pub reference_temperature: f64,
 }
 
@@ -55,7 +55,7 @@ impl Expansion {
 }
 
 impl<const D: usize> Model<D> {
-    /// From a distributed cloud, with so many points of level 0 over all ranks.
+    /// Create the model from a distributed point cloud with `coarsest` points of level 0 over all ranks.
     pub fn new(problem: &Problem, domain: &Domain, coarsest: u64) -> Self {
         let owned = &domain.points[..domain.owned];
         Self {
@@ -87,7 +87,7 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// Without points.
+    /// Create a model without points.
     pub fn empty() -> Self {
         Self {
             reference: std::array::from_fn(|_| Vec::new()),
@@ -127,8 +127,8 @@ impl<const D: usize> Model<D> {
         self.damping[usize::from(self.block[point])]
     }
 
-    /// A component of a force density (N/m³) on an owned point less what viscous damping takes of it at a
-    /// velocity (m/s).
+    /// A component of the force density (N/m³) on an owned point, minus the viscous damping at a velocity
+    /// (m/s).
     #[inline]
     pub fn less_damping(&self, point: usize, force: f64, velocity: f64) -> f64 {
         let damping = self.damping_of(point);

@@ -1,20 +1,20 @@
-//! Numbers of points of which few are different, as volumes on a grid.
+//! A column of numbers with few different values, such as volumes on a grid.
 
 use std::ops::Index;
 
 use rustc_hash::FxHashMap;
 
-/// A number for each point; a byte a point where at most 256 are different.
+/// One number per point. With at most 256 different values, a point needs one byte.
 #[derive(Debug, Clone)]
 pub enum PaletteColumn {
-    /// The different numbers, and which one each point has.
+    /// The different values, and the index of each point's value.
     Few(Vec<f64>, Vec<u8>),
-    /// One for each point.
+    /// One value per point.
     Many(Vec<f64>),
 }
 
 impl PaletteColumn {
-    /// From the numbers of all points.
+    /// Create the column from the values of all points.
     pub fn new(numbers: Vec<f64>) -> Self {
         let mut table: Vec<f64> = Vec::new();
         let mut known: FxHashMap<u64, u8> = FxHashMap::default();
@@ -43,12 +43,12 @@ impl PaletteColumn {
         }
     }
 
-    /// Whether there is no point.
+    /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The numbers, point by point.
+    /// The values in the order of the points.
     pub fn iter(&self) -> impl Iterator<Item = f64> {
         (0..self.len()).map(|point| self[point])
     }

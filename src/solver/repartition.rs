@@ -1,7 +1,7 @@
-//! Dealing the points out anew during a run, when ranks have become unequal.
+//! Rebalance during a run, when rank loads have drifted apart.
 //!
-//! Points go to their new ranks as a restart on other ranks would bring them there: the state by id, bonds
-//! found anew, and what is kept of them put back. So nothing of the result depends on it.
+//! Points migrate in the same way as in a restart on other ranks: the state is redistributed by id, bonds
+//! are found again, and their stored data are restored. So the result does not depend on it.
 
 use std::time::{Duration, Instant};
 
@@ -17,24 +17,24 @@ use super::{Simulation, Stepper};
 /// A repartition; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repartition {
-    /// Time for bonds of the slowest rank, as a multiple of the mean, before it.
+    /// Bond time of the slowest rank before the rebalance, relative to the mean.
     pub imbalance: f64,
-    /// Number of points that changed their rank.
+    /// Number of points that changed their owner.
     pub moved: u64,
-    /// Wall-clock time of the slowest rank, s.
+    /// Wall-clock time on the slowest rank, s.
     pub seconds: f64,
 }
 
-/// When ranks are looked at, and what they were when they were.
+/// Schedule of the checks of rank loads, and the loads at the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,
 }
 
 impl BalanceWatch {
-    /// For a run that begins or goes on.
+    /// Create the watch for a run that starts or continues.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
-        // One rank is always balanced.
+        // A single rank is always balanced.
         let rule = simulation
             .problem
             .balance
@@ -45,10 +45,10 @@ impl BalanceWatch {
         }
     }
 
-    /// Deals the points out anew, if it is time to look and the ranks have become too unequal. Collective.
+    /// Rebalance, if a check is due and the rank loads have drifted too far apart. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks.
+    /// If METIS fails; the error is the same on all ranks.
     pub fn look<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'_, D>,
@@ -57,7 +57,7 @@ impl BalanceWatch {
             return Ok(None);
         };
         let is_due = stepper.clock().number().is_multiple_of(rule.every_steps);
-        // Iterations of a load step have its number.
+        // All iterations of a load step have the same step number.
         if !is_due || !stepper.load_step().is_settled {
             return Ok(None);
         }
@@ -86,7 +86,7 @@ impl BalanceWatch {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// The owned points, as they travel between ranks.
+    /// The owned points in the form in which they migrate.
     pub(super) fn pieces(&self) -> Vec<Point> {
         let model = &self.model;
         let point = |k: usize| {
@@ -96,7 +96,7 @@ impl<const D: usize> Simulation<'_, D> {
         (0..model.owned()).map(point).collect()
     }
 
-    /// Frees the memory of points and bonds, before they are dealt out anew.
+    /// Free the memory of points and bonds before a new distribution.
     pub(super) fn release(&mut self) {
         self.model = Model::empty();
         self.forces.release();
@@ -105,17 +105,17 @@ impl<const D: usize> Simulation<'_, D> {
         columns.for_each(|column| *column = Vec::new());
     }
 
-    /// The way from the owned points to the order of ids. Collective.
+    /// The exchange plan between owned points and the order of ids. Collective.
     pub fn id_order(&self) -> IdOrder {
         let model = &self.model;
         IdOrder::new(self.comm, &model.ids[..model.owned()], model.coarsest)
     }
 
-    /// Deals the points out anew, this rank's having taken so much time (ns) lately. Returns how many have
-    /// changed their rank over all ranks. Collective.
+    /// Partition the points again. `time` (ns) is this rank's recent time. Returns the number of points
+    /// that changed their owner over all ranks. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks. The points are gone then.
+    /// If METIS fails; the error is the same on all ranks. The points are lost then.
     pub fn repartition(&mut self, time: u64) -> Result<u64> {
         let saved = self.save(&self.id_order());
         let pieces = self.pieces();

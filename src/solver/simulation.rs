@@ -1,4 +1,4 @@
-//! A run: from the problem to points in motion, step by step.
+//! A run on one rank: set-up from the problem, and time steps.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -30,62 +30,63 @@ use super::refinement::{self, Refined};
 use super::size;
 use super::steps::choose_steps;
 
-/// The share of the longest bond by which ghosts may lie farther away: points may be a millionth of a
-/// cell off their grid.
+/// Extra distance of ghosts, relative to the longest bond, because points may be off their grid by a
+/// millionth of a cell.
 const SLACK: f64 = 1e-5;
 
 /// A run on one rank.
 pub struct Simulation<'a, const D: usize> {
     /// The validated deck.
     pub problem: &'a Problem,
-    /// The other ranks.
+    /// Communication with the other ranks.
     pub comm: &'a dyn Communicator,
     /// The points.
     pub model: Model<D>,
-    /// What is known of the points.
+    /// The fields of the points.
     pub fields: Fields<D>,
-    /// Their bonds.
+    /// The bonds and their forces.
     pub forces: Forces<D>,
     /// Contact between points that no bond joins, if there is any.
     pub contact: Option<Contact<D>>,
-    /// Loads and supports that act in the present stage.
+    /// Loads and supports of the present stage.
     pub conditions: Conditions<D>,
-    /// Those of the other stages, by stage.
+    /// Loads and supports of the other stages, by stage.
     pub(super) waiting: Vec<Option<Conditions<D>>>,
     /// The stages of the run.
     pub stages: Vec<Stage>,
     /// Index of the present stage.
     pub stage: usize,
-    /// First step (s) of each stage, and the number of its steps if no bond breaks.
+    /// First step (s) of each stage, and number of its steps if no bond breaks.
     pub(super) steps: Vec<(f64, f64)>,
-    /// Volume of each owned point's whole family, broken bonds included, m³.
+    /// Volume of each owned point's whole family, including broken bonds, m³.
     pub family_volume: PaletteColumn,
-    /// Bonds of the owned points that each pre-crack cuts, counted from their ends here.
+    /// Number of bonds of the owned points that each pre-crack cuts. A bond counts once per end on this
+    /// rank.
     pub cut: Vec<u64>,
-    /// Bonds of the owned points that were intact before any could break, counted from their ends here;
-    /// `None` where none breaks at the start.
+    /// Number of bonds of the owned points that were intact before any could break. A bond counts once per
+    /// end on this rank. `None` if no bond breaks at the start.
     pub intact_at_start: Option<u64>,
-    /// The stable step with the density of the materials, s.
+    /// Stable step for the density of the materials, s.
     pub stable_step: f64,
     /// Time and step of the present stage.
     pub clock: Clock,
-    /// The method of the present stage; taken out while it advances.
+    /// Integrator of the present stage; taken out while it advances.
     pub(super) integrator: Option<Box<dyn Integrator<D>>>,
-    /// How far the load step has come; settled where there are none.
+    /// Progress of the load step; settled if there are no load steps.
     pub load_step: LoadStep,
-    /// What Newton's method remembers.
+    /// State of Newton's method.
     pub newton: NewtonState,
-    /// What an adaptive step follows.
+    /// State of the adaptive step.
     pub step_control: StepControl,
-    /// What the run was before the present step; empty where steps are not undone.
+    /// Copy of the state before the present step; empty if steps are not rolled back.
     pub(super) kept: Kept,
     /// The refined grids of the bodies.
     pub grids: Grids<'a>,
-    /// What refinements during the run have done.
+    /// Totals of the refinements during the run.
     pub refined: Refined,
-    /// Kinetic energy that changes of the density scale from stage to stage have added, J.
+    /// Kinetic energy that changes of the density scale between stages have added, J.
     pub density_scale_energy: f64,
-    /// Where the time went.
+    /// Wall-clock time by phase.
     pub times: Times,
     bad: Option<BadPoint>,
 }
@@ -93,21 +94,21 @@ pub struct Simulation<'a, const D: usize> {
 /// Wall-clock time by phase on this rank.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Times {
-    /// Points, partition, families.
+    /// Creation of points, partition and families.
     pub set_up: Duration,
-    /// Bonds and halo in the time loop.
+    /// Bond forces and halo exchanges in the time loop.
     pub forces: ForceTimes,
-    /// Search and forces of contact.
+    /// Contact search and contact forces.
     pub contact: Duration,
-    /// Integration and conditions, and showing the bonds where points are.
+    /// Integration, conditions, and writing of bond inputs.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
-    /// Refinements of the grid, and points that were dealt out anew.
+    /// Refinement of grids, and rebalancing.
     pub regridding: Duration,
 }
 
-/// The first point of a rank whose motion, force or reaction was not finite.
+/// The first point of a rank with a motion, force or reaction that is not finite.
 #[derive(Debug, Clone, Copy)]
 struct BadPoint {
     step: u64,
@@ -117,20 +118,20 @@ struct BadPoint {
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Makes, distributes and bonds the points, and evaluates the forces at time 0.
+    /// Create and distribute the points and bonds, and evaluate the forces at time 0.
     ///
     /// # Errors
-    /// When the points cannot be made, a set that is acted on is empty, or no stable step exists; the
-    /// same on all ranks.
+    /// If the points cannot be created, if a set of a condition is empty, or if there is no stable step.
+    /// The error is the same on all ranks.
     pub fn new(problem: &'a Problem, comm: &'a dyn Communicator) -> Result<Self> {
         Self::set_up(problem, comm, &mut || Ok(()))
     }
 
-    /// As [`Self::new`], with a look at `between` after each stage: an error of its ends the set-up. It
-    /// must be the same on all ranks.
+    /// Same as [`Self::new`], with a call of `between` after each stage of the set-up. An error of
+    /// `between` ends the set-up; it must be the same on all ranks.
     ///
     /// # Errors
-    /// As [`Self::new`], and those of `between`.
+    /// Those of [`Self::new`] and of `between`.
     pub fn set_up(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -153,8 +154,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Distributes and bonds the points of grids; forces are not evaluated yet. `cost` is what this rank's
-    /// points cost, if that is known; see [`Self::set_up`].
+    /// Distribute the points of grids and create their bonds; forces are not evaluated yet. `cost` is the
+    /// cost of this rank's points, if it is known; see [`Self::set_up`].
     pub(super) fn of_points(
         problem: &'a Problem,
         comm: &'a dyn Communicator,
@@ -165,7 +166,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let cutoffs = cutoffs(problem);
         let total = comm::total(comm, pieces.len() as u64);
         let longest = cutoffs.iter().copied().fold(0.0, f64::max);
-        // Bonds at the limit must find their ghosts however their length is rounded.
+        // With this slack, bonds at the limit find their ghosts however their length is rounded.
         let mut domain = distribute_by_cost(comm, pieces, total, longest * (1.0 + SLACK), cost)?;
         between()?;
         let frames = grids(problem, comm, &domain, longest)?;
@@ -180,7 +181,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let blocks: Vec<_> = blocks.map(|block| block_laws(problem, &block)).collect();
         let is_thermal = problem.has_temperature();
         let halo = std::mem::take(&mut domain.halo);
-        // The points are known to the model from here on.
+        // From here on, the points are stored in the model.
         drop(domain);
         let interactions = assign(problem, &model, &blocks, bonds)
             .and_then(|all| history_fits::<D>(&all).map(|()| all))
@@ -261,12 +262,12 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(simulation)
     }
 
-    /// Places what is supported, and evaluates the forces at time 0. Collective.
+    /// Set the displacements of supported points, and evaluate the forces at time 0. Collective.
     fn begin(&mut self) {
         self.apply_displacements(0.0, 0.0);
         self.apply_loads(0.0, true);
         self.evaluate(if self.is_quasi_static() {
-            // This is no equilibrium.
+            // The initial state is not an equilibrium, so no bond breaks.
             BondUpdate::None
         } else {
             BondUpdate::Step(0.0)
@@ -277,22 +278,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times = Times::default();
     }
 
-    /// How the present stage gets to its end.
+    /// Method and time settings of the present stage.
     pub fn time_rule(&self) -> Time {
         self.stages[self.stage].time
     }
 
-    /// Makes one step, or one iteration of a load step. A [`Stepper`](super::Stepper) makes several faster.
-    /// Collective.
+    /// Make one step, or one iteration of a load step. A [`Stepper`](super::Stepper) makes many steps
+    /// faster. Collective.
     pub fn advance(&mut self) {
         if self.leap(false) {
             self.kick();
         }
     }
 
-    /// Makes one step without its second half kick, or one iteration of a load step. `half_kick_pending`: the half kick of
-    /// the step before is not applied yet; false where a stage begins. Returns whether this step has one pending.
-    /// Collective.
+    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending`:
+    /// the second half kick of the previous step is still to be applied; false at the beginning of a stage.
+    /// Returns whether that of this step is pending. Collective.
     pub(super) fn leap(&mut self, half_kick_pending: bool) -> bool {
         if let Some(stage) = self.next_stage() {
             self.begin_stage(stage);
@@ -301,7 +302,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             self.newton.evaluations = 0;
         }
         let evaluations = self.times.evaluations;
-        // Taken out while it advances the simulation.
+        // The integrator is taken out while it advances the simulation.
         let mut integrator = (self.integrator.take()).expect("each stage has an integrator");
         let is_pending = integrator.advance(self, half_kick_pending);
         self.integrator = Some(integrator);
@@ -309,7 +310,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         is_pending
     }
 
-    /// Makes the second half kick of the present step.
+    /// Apply the second half kick of the present step.
     pub(super) fn kick(&mut self) {
         let start = Instant::now();
         let clock = self.clock;
@@ -321,7 +322,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.times.motion += start.elapsed();
     }
 
-    /// Makes one step by the equation of motion without its second half kick. A pending half kick of the step before is
+    /// Make one explicit step without its second half kick. A pending half kick of the previous step is
     /// applied first. Collective.
     pub(super) fn make_step(&mut self, half_kick_pending: bool) {
         let start = Instant::now();
@@ -357,15 +358,15 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(BondUpdate::Step(step));
     }
 
-    /// Gets ready for the second half kick of the step that a clock has come to.
+    /// Prepare the conditions for the second half kick at the present time of a clock.
     fn set_second_half(&mut self, clock: &Clock) {
         let (time, step) = (clock.time(), clock.step());
         self.conditions.set_loads(time, false);
         self.conditions.set_guidance(time, step);
     }
 
-    /// Calls `work` with each part of the owned points and the loads and supports on it, from several threads.
-    /// Returns whether all calls did.
+    /// Call `work` with each part of the owned points and the loads and supports on it, from several
+    /// threads. Returns whether all calls returned true.
     pub(super) fn walk(
         &mut self,
         work: impl Fn(&mut Part<'_, D>, Here<'_, D>) -> bool + Sync,
@@ -398,7 +399,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.evaluate_at_bond_inputs(bond_update);
     }
 
-    /// As [`Self::evaluate`], after [`Part::write_bond_inputs`] of all parts of the points.
+    /// Same as [`Self::evaluate`]; [`Part::write_bond_inputs`] must have been called for all parts of the
+    /// points.
     fn evaluate_at_bond_inputs(&mut self, bond_update: BondUpdate) {
         let is_quasi_static = self.is_quasi_static();
         let fields = &mut self.fields;
@@ -439,7 +441,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// Puts supported points in their place at `time` (s). `step` is the step just made (s), or 0.
+    /// Set the displacements of supported points at `time` (s). `step` is the last step (s), or 0.
     pub(super) fn apply_displacements(&mut self, time: f64, step: f64) {
         self.conditions.set_places(time, step);
         self.walk(|part, here| {
@@ -448,7 +450,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Finds the external forces at `time` (s); those that do not change only where `all` are wanted.
+    /// Update the external forces at `time` (s). Constant forces are updated only if `all`.
     pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
         self.conditions.set_loads(time, all);
         self.walk(|part, mut here| {
@@ -457,7 +459,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Gives supported points their velocity, and finds the reactions. Returns whether all is finite.
+    /// Set the velocities of supported points, and compute the reactions. Returns whether all values are
+    /// finite.
     pub(super) fn apply_velocities(&mut self) -> bool {
         if self.is_quasi_static() {
             return self.walk(|part, here| here.project_residual(part));
@@ -467,7 +470,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.walk(|part, here| here.apply_velocities(part))
     }
 
-    /// Finds the power of damping at the present velocities.
+    /// Compute the power of damping at the present velocities.
     pub(super) fn update_damping_power(&mut self) {
         self.walk(|part, _| {
             part.add_damped_energy(0.0);
@@ -475,22 +478,22 @@ impl<'a, const D: usize> Simulation<'a, D> {
         });
     }
 
-    /// Finds from the state, after it has been put back, what is not part of it. Collective.
+    /// Recompute the fields that are not part of the state, after the state was restored. Collective.
     pub(super) fn recompute_derived(&mut self) {
         self.apply_loads(self.clock.time(), true);
         self.update_damping_power();
         self.evaluate(self.bond_update_at_rest());
     }
 
-    /// Takes note of a motion that is not finite, at the time of a clock.
+    /// Record a motion that is not finite at the time of a clock.
     pub(super) fn note_bad(&mut self, clock: &Clock) {
         if self.bad.is_none() {
             self.bad = self.first_bad(clock);
         }
     }
 
-    /// The point with the smallest id among those with a motion, force or reaction that is not finite at the time
-    /// of a clock.
+    /// Find the point with the smallest id that has a motion, force or reaction that is not finite at the
+    /// time of a clock.
     fn first_bad(&self, clock: &Clock) -> Option<BadPoint> {
         (0..self.model.owned())
             .filter(|k| {
@@ -514,11 +517,11 @@ impl<'a, const D: usize> Simulation<'a, D> {
             })
     }
 
-    /// Looks on all ranks whether every value is still finite.
+    /// Check on all ranks that all values are finite and that the load step has not failed.
     ///
     /// # Errors
-    /// Names the first point (earliest step, then smallest id) that was not; or no equilibrium has been
-    /// found, then names a piece that nothing holds if there is one.
+    /// The message names the first point (earliest step, then smallest id) with a value that is not finite.
+    /// If no equilibrium has been found, it names a piece that no support holds, if there is one.
     pub fn check(&mut self) -> Result<()> {
         let mut earliest = self
             .bad
@@ -572,7 +575,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     }
 }
 
-/// The second half of a step (s), after forces are known at the new place. Returns whether all is finite.
+/// Second half of a step (s), after the forces at the new positions are known. Returns whether all values
+/// are finite.
 fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, step: f64) -> bool {
     here.apply_loads(part);
     let finite = verlet::second_half_kick(part, step);
@@ -582,7 +586,7 @@ fn second_half<const D: usize>(part: &mut Part<'_, D>, here: &mut Here<'_, D>, s
     finite
 }
 
-/// Whether bonds may break in the place where the points begin.
+/// Whether bonds may break at the initial positions.
 fn starts_deformed(problem: &Problem) -> bool {
     let displaced = |initial: &Initial| initial.displacement.is_some();
     let placed = |condition: &Condition| {
@@ -593,8 +597,8 @@ fn starts_deformed(problem: &Problem) -> bool {
         && (problem.initials.iter().any(displaced) || problem.conditions.iter().any(placed))
 }
 
-/// Breaks the bonds that cross a pre-crack, and counts them by crack. Both ends ask with the lower id
-/// first.
+/// Break the bonds that cross a pre-crack, and count them by crack. Both ends test the bond with the lower
+/// id first.
 fn pre_crack<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -631,7 +635,8 @@ fn pre_crack<const D: usize>(
     counts.into_iter().map(Cell::into_inner).collect()
 }
 
-/// Makes the bonds of no-failure zones unbreakable: those of bodies, and those of pairs of bodies with damage of their own.
+/// Make the bonds of no-failure sets unbreakable, both for bodies and for pairs of bodies with their own
+/// damage.
 fn protect<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -667,7 +672,7 @@ fn protect<const D: usize>(
     }
 }
 
-/// Sets the entries of the no-failure points of a damage law to 1, in blocks for which `is_own` holds.
+/// Set the entries of the no-failure points of a damage law to 1 in blocks for which `is_own` is true.
 fn mark_no_failure<const D: usize>(
     problem: &Problem,
     model: &Model<D>,

@@ -1,19 +1,20 @@
-//! Whether a run is small enough to be made, found from the problem before its points are.
+//! Check that a run is small enough, from the problem before its points are created.
 
 use crate::error::Result;
 use crate::families::{Fault, MOST_NEIGHBOURS, most_neighbours};
 use crate::points::{lattice, shape};
 use crate::problem::{PointSource, Problem};
 
-/// An error if a point would have too many neighbours or a rank too many points, as far as the shapes
-/// of the problem show it; `cutoffs` has the longest bond (m) of each pair of blocks, row by row.
+/// Return an error if a point would have too many neighbours or a rank too many points, as estimated from
+/// the shapes of the problem. `cutoffs` is the longest bond (m) of each pair of blocks, row-major.
 ///
 /// # Errors
+/// The message names the horizon or the body; the error is the same on all ranks.
 /// Names the horizon or the body; the same on all ranks.
 pub fn is_feasible(problem: &Problem, cutoffs: &[f64], ranks: usize) -> Result<()> {
     let blocks = problem.block_count();
     (0..problem.bodies.len()).try_for_each(|body| lattice::is_feasible(problem, body, ranks))?;
-    // First each block alone: its body is the one to name.
+    // Check each block alone first, so that the message names its body.
     let alone = (0..blocks).map(|block| [block, block]);
     let pairs = (0..blocks * blocks).map(|pair| [pair / blocks, pair % blocks]);
     for [here, there] in alone.chain(pairs) {

@@ -1,4 +1,4 @@
-//! Stages of a run: each with its method, its end, and the loads and supports that act.
+//! Stages of a run, each with its method, its end, and its loads and supports.
 
 use crate::comm::sum::{ExactSum, reduce};
 
@@ -9,29 +9,29 @@ use super::motion::integrator::integrator;
 use super::steps::even_clock;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Whether the present stage has come to its end.
+    /// Whether the present stage has reached its end.
     pub fn is_stage_over(&self) -> bool {
         self.clock.is_over() && self.load_step.is_settled
     }
 
-    /// Whether the run has come to its end.
+    /// Whether the run has reached its end.
     pub fn is_over(&self) -> bool {
         self.is_stage_over() && self.stage + 1 == self.stages.len()
     }
 
-    /// Index of the stage that begins with the next step, if one does.
+    /// Index of the stage that begins with the next step, if there is one.
     pub(super) fn next_stage(&self) -> Option<usize> {
         let next = self.stage + 1;
         (self.is_stage_over() && next < self.stages.len()).then_some(next)
     }
 
-    /// Number of the last step of the run, if steps keep their size.
+    /// Number of the last step of the run, if the step does not change.
     pub fn last_step(&self) -> u64 {
         let later = self.steps[self.stage + 1..].iter();
         self.clock.last() + later.map(|(_, steps)| *steps as u64).sum::<u64>()
     }
 
-    /// A clock that makes as many steps as the run if no bond breaks.
+    /// A clock with the number of steps of the run if no bond breaks.
     pub fn expected_clock(&self) -> Clock {
         match &self.stages[..] {
             [stage] if stage.time.adaptive.is_none() => self.clock,
@@ -39,13 +39,13 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// The stable step with the density of the present stage, s.
+    /// Stable step with the density of the present stage, s.
     pub fn scaled_stable_step(&self) -> f64 {
         self.stable_step * self.time_rule().density_scale.sqrt()
     }
 
-    /// Goes on with another stage from where the points are. Nothing moves in a sequence of equilibria, nor after
-    /// one.
+    /// Continue with another stage at the present positions. Points are at rest during load steps and at
+    /// the beginning of the stage after them.
     pub(super) fn begin_stage(&mut self, stage: usize) {
         let (was_static, scale) = (self.is_quasi_static(), self.time_rule().density_scale);
         self.enter(stage);
@@ -77,11 +77,12 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Keeps the momentum of all points after their densities have been multiplied by a factor, but for components of
-    /// motion that are prescribed, and books the change of kinetic energy. Returns whether all is finite. Collective.
+    /// Conserve the momentum of all points after their densities were multiplied by a factor, except
+    /// components with prescribed motion. Book the change of kinetic energy. Returns whether all values are
+    /// finite. Collective.
     ///
-    /// With momentum kept no force acts at the change: keeping velocities would need an impulse, and keeping kinetic
-    /// energy an impulse that depends on the frame of reference.
+    /// With conserved momentum, no force acts at the change. Conserving velocities would need an impulse.
+    /// Conserving kinetic energy would need an impulse that depends on the frame of reference.
     fn keep_momentum(&mut self, factor: f64) -> bool {
         let before = self.kinetic_energy() / factor;
         let components = self.fields.velocity.iter_mut();
@@ -107,7 +108,7 @@ impl<const D: usize> Simulation<'_, D> {
         reduce(self.comm, &mut sum)[0]
     }
 
-    /// Makes conditions and density those of a stage.
+    /// Activate the conditions and the density of a stage.
     pub(super) fn enter(&mut self, stage: usize) {
         if stage != self.stage
             && let Some(conditions) = self.waiting[stage].take()
@@ -121,14 +122,14 @@ impl<const D: usize> Simulation<'_, D> {
         self.scale_density();
     }
 
-    /// Lets the step begin with the size that was chosen for the stage, where it is adaptive.
+    /// Start an adaptive stage with the step that was chosen for it.
     pub(super) fn begin_adapting(&mut self) {
         if let Some(rule) = self.time_rule().adaptive {
             self.step_control.begin(&rule, self.clock.step());
         }
     }
 
-    /// Gives the blocks the density that they have in the present stage.
+    /// Set the density of the blocks for the present stage.
     pub(super) fn scale_density(&mut self) {
         let scale = self.time_rule().density_scale;
         for (density, block) in self.model.density.iter_mut().zip(self.problem.blocks()) {
@@ -136,7 +137,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Whether the present stage is a sequence of equilibria.
+    /// Whether the present stage consists of load steps.
     pub fn is_quasi_static(&self) -> bool {
         self.time_rule().is_quasi_static()
     }

@@ -1,4 +1,4 @@
-//! The leapfrog driver: it defers the second half kick of a step until someone asks for the state.
+//! The leapfrog driver: it defers the second half kick of a step until a caller requests the state.
 
 use crate::comm::Communicator;
 use crate::error::Result;
@@ -12,19 +12,19 @@ use super::simulation::Times;
 
 /// Makes the steps of a simulation.
 ///
-/// Velocities live at half steps, as in the leapfrog form of Verlet. A step ends with the forces at the new positions. The
-/// next step fuses the second half kick with its own first half kick, in one pass over the points. Meanwhile velocities,
-/// reactions, external forces, damping and their energies are not those of the full step. So the simulation can be
-/// reached through [`Self::at_full_step`] only, which applies the pending half kick first. Results do not depend on how
-/// often it is called, to the bit.
+/// Velocities are defined at half steps, as in the leapfrog form of Verlet. A step ends with the forces at
+/// the new positions. The next step fuses the second half kick with its own first half kick, in one pass
+/// over the points. Meanwhile, velocities, reactions, external forces, damping and their energies are not
+/// those of the full step. Therefore the simulation is accessible only through [`Self::at_full_step`],
+/// which applies the pending half kick first. Results are bitwise independent of how often it is called.
 pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
-    /// The second half kick of the last step is not applied yet.
+    /// Whether the second half kick of the last step is still to be applied.
     half_kick_pending: bool,
 }
 
 impl<'a, const D: usize> Stepper<'a, D> {
-    /// For the steps after the present one.
+    /// Create a stepper that starts at the present step.
     pub fn new(simulation: Simulation<'a, D>) -> Self {
         Self {
             simulation,
@@ -32,7 +32,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         }
     }
 
-    /// Makes one step, or one iteration of a load step. Collective.
+    /// Make one step, or one iteration of a load step. Collective.
     pub fn advance(&mut self) {
         let simulation = &self.simulation;
         if simulation.next_stage().is_some() || simulation.step_for_contact().is_some() {
@@ -41,7 +41,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         self.half_kick_pending = self.simulation.leap(self.half_kick_pending);
     }
 
-    /// The simulation with everything at the full step. Applies the second half kick if it is pending; not collective.
+    /// The simulation at the full step. Applies the second half kick if it is pending. Not collective.
     pub fn at_full_step(&mut self) -> &mut Simulation<'a, D> {
         if std::mem::take(&mut self.half_kick_pending) {
             self.simulation.kick();
@@ -49,7 +49,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &mut self.simulation
     }
 
-    /// The other ranks.
+    /// Communication with the other ranks.
     pub fn comm(&self) -> &'a dyn Communicator {
         self.simulation.comm
     }
@@ -59,37 +59,37 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &self.simulation.clock
     }
 
-    /// As [`Simulation::last_step`].
+    /// Same as [`Simulation::last_step`].
     pub fn last_step(&self) -> u64 {
         self.simulation.last_step()
     }
 
-    /// As [`Simulation::is_over`].
+    /// Same as [`Simulation::is_over`].
     pub fn is_over(&self) -> bool {
         self.simulation.is_over()
     }
 
-    /// As [`Simulation::is_refinement_due`].
+    /// Same as [`Simulation::is_refinement_due`].
     pub fn is_refinement_due(&self) -> bool {
         self.simulation.is_refinement_due()
     }
 
-    /// As [`Simulation::time_rule`].
+    /// Same as [`Simulation::time_rule`].
     pub fn time_rule(&self) -> Time {
         self.simulation.time_rule()
     }
 
-    /// As [`Simulation::step_for_contact`].
+    /// Same as [`Simulation::step_for_contact`].
     pub fn step_for_contact(&self) -> Option<f64> {
         self.simulation.step_for_contact()
     }
 
-    /// How far the load step has come.
+    /// Progress of the load step.
     pub fn load_step(&self) -> &LoadStep {
         &self.simulation.load_step
     }
 
-    /// Where the time went.
+    /// Wall-clock time by phase.
     pub fn times(&self) -> &Times {
         &self.simulation.times
     }
@@ -104,10 +104,10 @@ impl<'a, const D: usize> Stepper<'a, D> {
         &self.simulation.fields.displacement
     }
 
-    /// As [`Simulation::check`], without the values that a pending half kick changes. Collective.
+    /// Same as [`Simulation::check`], without the values that a pending half kick changes. Collective.
     ///
     /// # Errors
-    /// As those of [`Simulation::check`].
+    /// Same as for [`Simulation::check`].
     pub fn check(&mut self) -> Result<()> {
         self.simulation.check()
     }

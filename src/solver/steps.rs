@@ -1,4 +1,4 @@
-//! How long the steps of a run are.
+//! Choice of the time steps of a run.
 
 use std::ops::Range;
 
@@ -9,14 +9,14 @@ use crate::problem::{Adaptive, Body, PointSource, Problem, Stage, StepRule, Time
 use super::motion::Clock;
 use super::motion::clock::steps_to;
 
-/// Most steps of a stage; as many can be counted, and time still advances with each.
+/// Maximum number of steps of a stage. Up to it, steps can be counted, and each step advances the time.
 const MOST_STEPS: f64 = 1e15;
 
-/// The first step (s) of each stage of a run, and the number of steps of the stage if no bond breaks, for a stable
-/// step (s). An automatic step divides the stage evenly, unless `[time.adaptive] largest` limits it.
+/// First step (s) of each stage of a run, and number of its steps if no bond breaks, for a stable step (s).
+/// An automatic step divides the stage evenly, unless `[time.adaptive] largest` limits it.
 ///
 /// # Errors
-/// When there is no stable step, or there are more steps than can be counted.
+/// If there is no stable step, or if there are more steps than can be counted.
 pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     let mut start = 0.0;
     let choose = |stage: Stage| {
@@ -27,14 +27,14 @@ pub fn choose_steps(problem: &Problem, stable: f64) -> Result<Vec<(f64, f64)>> {
     problem.all_stages().into_iter().map(choose).collect()
 }
 
-/// A clock with equal steps that makes as many steps as all stages together, of which `steps` has the first step (s)
-/// and the number of steps.
+/// A clock with equal steps and as many steps as all stages together. `steps` contains the first step (s)
+/// and the number of steps of each stage.
 pub fn even_clock(problem: &Problem, steps: &[(f64, f64)]) -> Clock {
     let all: f64 = steps.iter().map(|(_, steps)| steps).sum();
     Clock::new(problem.time.end / all, problem.time.end)
 }
 
-/// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks.
+/// First step (s) of a stage with a length (s), and number of its steps if no bond breaks.
 fn choose_step(problem: &Problem, time: &Time, length: f64, stable: f64) -> Result<(f64, f64)> {
     if let Some(steps) = time.method.load_steps() {
         if stable.is_infinite() {
@@ -94,11 +94,11 @@ fn countable(problem: &Problem, length: f64, (step, steps): (f64, f64)) -> Resul
     Ok((step, steps))
 }
 
-/// The most times that a step is undone and made again; each time costs as much as a step.
+/// Maximum number of repeats of a step by rollback; each repeat costs as much as a step.
 const MOST_REPEATS: f64 = 100.0;
 
-/// An error if a step of a stage of some length (s), for which `step` (s) was chosen, may be repeated without end, or
-/// become so small that the stage has no end.
+/// Check the adaptive rule for a stage with a length (s) and the chosen `step` (s). An error says that a
+/// step may be repeated without end, or that steps may become too small for the stage to end.
 fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) -> Result<()> {
     let [smallest, largest] = rule.limits(step);
     let error = |message: String| Err(Error::input(message).at(&problem.places.adaptive));
@@ -109,7 +109,7 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
             length / smallest,
         ));
     }
-    // The size that is left when the last repeat has been made may be cut to the smallest.
+    // The last repeat may be cut to the smallest step.
     let repeats = (libm::log(smallest / largest) / libm::log(rule.reduce)).ceil();
     if repeats > MOST_REPEATS {
         return error(format!(
@@ -126,11 +126,11 @@ fn adapts_in_time(problem: &Problem, rule: &Adaptive, length: f64, step: f64) ->
     )
 }
 
-/// The largest r Δt of an automatic step, with viscous damping at a rate r: the error of the energy balance is up to
-/// (r Δt)²/4 of the kinetic energy that is damped.
+/// Largest r Δt of an automatic step with viscous damping at a rate r. The error of the energy balance is
+/// at most (r Δt)²/4 of the damped kinetic energy.
 const DAMPED: f64 = 0.5;
 
-/// The largest r Δt: beyond it a damped velocity changes its sign in each step.
+/// Largest allowed r Δt; beyond it, a damped velocity changes its sign in each step.
 const SIGN_CHANGES: f64 = 2.0;
 
 /// The largest rate of viscous damping of a body, 1/s.
@@ -139,13 +139,13 @@ fn damping(problem: &Problem) -> f64 {
     rates.fold(0.0, f64::max)
 }
 
-/// The longest step (s) that `safety` allows, with a stable step (s) for the density of the materials.
+/// Largest step (s) that `safety` allows, for a stable step (s) with the density of the materials.
 pub fn automatic_step(problem: &Problem, time: &Time, safety: f64, stable: f64) -> f64 {
     let damped = DAMPED / damping(problem);
     safety * (stable * time.density_scale.sqrt()).min(damped)
 }
 
-/// An error if steps of a key of [time] (s) are too long for viscous damping.
+/// Return an error if steps of a key of [time] (s) are too long for viscous damping.
 fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64) -> Result<()> {
     let rate = damping(problem);
     if rate * step <= SIGN_CHANGES {
@@ -161,8 +161,8 @@ fn follows_damping(problem: &Problem, key: &str, place: &Range<usize>, step: f64
     Err(Error::input(message).at(place))
 }
 
-/// The first step (s) of a stage of some length (s), and the number of its steps if no bond breaks, under an adaptive
-/// rule: at most the largest step, and raised to that.
+/// First step (s) of a stage with a length (s) under an adaptive rule, and number of its steps if no bond
+/// breaks. The first step is at most the largest step, and steps grow up to the largest step.
 fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64) {
     match rule.largest {
         Some(largest) if largest < step => (largest, steps_to(length, largest)),
@@ -171,13 +171,14 @@ fn adapted(rule: &Adaptive, (step, steps): (f64, f64), length: f64) -> (f64, f64
     }
 }
 
-/// The number of steps that take a time (s), where the first step (s) is raised to the largest (s) in rounds of
-/// `rule.steps` steps.
+/// Number of steps in a time (s), if the first step (s) grows to the largest (s) in rounds of `rule.steps`
+/// steps.
 fn raised(rule: &Adaptive, [first, largest]: [f64; 2], length: f64) -> f64 {
     let round = rule.steps as f64;
     let growth = rule.raise - 1.0;
     let rounds_to = |ratio: f64| libm::log(ratio) / libm::log1p(growth);
-    // Rounds before the largest step, at most those that fit: the time of k rounds is a geometric series.
+    // Rounds before the largest step, limited to those that fit: the time of k rounds is a geometric
+    // series.
     let before_largest = rounds_to(largest / first).ceil();
     let fitting = rounds_to(1.0 + length * growth / (round * first)).floor();
     let rounds = before_largest.min(fitting);
@@ -203,7 +204,7 @@ mod tests {
         }
     }
 
-    /// Steps counted one by one.
+    /// Count the steps one by one.
     fn counted(rule: &Adaptive, mut step: f64, length: f64) -> u64 {
         let (mut time, mut calm, mut steps) = (0.0, 0, 0);
         while time < length * (1.0 - 1e-9) {
@@ -245,7 +246,7 @@ mod tests {
                 );
             }
         }
-        // A step that is hardly raised at all is not counted one by one.
+        // A step that hardly grows is not counted one by one.
         let slow = rule(1.0 + f64::EPSILON, 1, 2.0);
         let steps = adapted(&slow, (1e-12, 1e12), 1.0).1;
         assert!((steps / 1e12 - 1.0).abs() < 1e-3, "{steps}");

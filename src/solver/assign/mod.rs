@@ -1,4 +1,4 @@
-//! From the problem to the law, the failure rule and the weights of every family.
+//! Laws, failure criteria and weights of every family, from the problem.
 
 mod possible;
 
@@ -20,14 +20,14 @@ use super::bonds::{BlockLaws, Interaction, PairReads};
 use super::model::Model;
 pub use possible::laws_are_possible;
 
-/// The elastic constants and the horizon (m) that an end of bonds has.
+/// Elastic constants and horizon (m) at one end of bonds.
 #[derive(Clone, Copy, PartialEq)]
 struct Constants {
     elastic: Isotropic,
     horizon: f64,
 }
 
-/// Those of the own end of the bonds from one block to another.
+/// Constants at point i of the bonds from one block to another.
 fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
     let [own, other] = [here, there].map(|block| (block.body.material.elastic, block.horizon));
     let combine = |of: fn(f64, f64) -> f64| Constants {
@@ -46,34 +46,35 @@ fn constants(problem: &Problem, here: &Block, there: &Block) -> Constants {
         None => problem.interface.between(here.body, there.body),
     };
     match rule {
-        // Where there are no bonds, these are asked for none.
+        // Without bonds, the constants are not used.
         InterfaceRule::Own | InterfaceRule::None => combine(|own, _| own),
         InterfaceRule::Average => combine(|own, other| 0.5 * (own + other)),
         InterfaceRule::Minimum => combine(f64::min),
     }
 }
 
-/// Stiffness of a bond per stretch and volume at an end with these constants, in any unit: micromoduli go with E/δ^(d+1).
+/// Stiffness of a bond per stretch and volume at an end with these constants, in arbitrary units:
+/// micromoduli are proportional to E/δ^(d+1).
 fn bond_stiffness(constants: &Constants, dimension: Dimension) -> f64 {
     let Constants { elastic, horizon } = constants;
     elastic.youngs_modulus / horizon.powi(dimension.count() as i32 + 1)
 }
 
-/// Whether bonds of a body with this damage break by their work. That of bond-based laws follows from the stretch,
-/// so that theirs break at the one that costs as much.
+/// Whether bonds of a body with this damage break by their work. In bond-based laws, the work follows from
+/// the stretch, so their bonds break at the equivalent critical stretch.
 fn breaks_by_work(body: &Body, damage: &problem::Damage) -> bool {
     let bond_based = !body.material.law.declaration.any_poisson_ratio;
     damage.rule != DamageRule::CriticalStretch && !bond_based
 }
 
-/// What the law of a body is made from, for bonds that break by this damage.
+/// Input of the law of a body, for bonds that break by this damage.
 fn given<'a>(
     problem: &Problem,
     body: &'a Body,
     damage: Option<&problem::Damage>,
     constants: Constants,
 ) -> Given<'a> {
-    // A critical stretch that the problem gives itself holds for all bonds.
+    // A critical stretch of the deck applies to all bonds.
     let itself =
         |damage: &problem::Damage| matches!(damage.toughness, Toughness::CriticalStretch(_));
     Given {
@@ -85,13 +86,13 @@ fn given<'a>(
     }
 }
 
-/// The stretch at which bonds of a body with these constants break by their own law, if they do.
+/// Stretch at which the law itself breaks bonds of a body with these constants, if it does.
 fn own_critical_stretch(problem: &Problem, body: &Body, constants: Constants) -> Option<f64> {
     let own = body.material.law.declaration.own_critical_stretch?;
     Some(own(&given(problem, body, None, constants)))
 }
 
-/// The law of a body with these constants, for bonds that break by this damage.
+/// Create the law of a body with these constants, for bonds that break by this damage.
 fn build(
     problem: &Problem,
     body: &Body,
@@ -101,9 +102,9 @@ fn build(
     (body.material.law.declaration.build)(&given(problem, body, damage, constants))
 }
 
-/// The share of a block's cells in the families of a horizon.
+/// Volume fractions of a block's cells in families with this horizon.
 fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare {
-    // Only cells with equal edges are corrected.
+    // The volume correction applies only to cells with equal edges.
     let edge = neighbours.spacing().map_or(0.0, |edges| edges[0]);
     CellShare::new(
         problem.volume_correction,
@@ -113,7 +114,7 @@ fn cell_share(problem: &Problem, neighbours: &Block, horizon: f64) -> CellShare 
     )
 }
 
-/// The longest bond (m) of each pair of blocks, row by row.
+/// The longest bond (m) of each pair of blocks, row-major.
 pub fn cutoffs(problem: &Problem) -> Vec<f64> {
     let reach = |here: &Block, there: &Block| {
         if problem.interface.between(here.body, there.body) == InterfaceRule::None {
@@ -131,7 +132,7 @@ pub fn cutoffs(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-/// What the points of a block follow.
+/// The laws of the points of a block.
 pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     let constants = constants(problem, block, block);
     let body = block.body;
@@ -146,7 +147,7 @@ pub fn block_laws(problem: &Problem, block: &Block) -> BlockLaws {
     }
 }
 
-/// The damage law of bonds that break at the end of their softening.
+/// Damage law of bonds that break at the end of their softening.
 fn softened(critical: f64) -> DamageLaw {
     DamageLaw::CriticalStretch(CriticalStretch {
         critical,
@@ -154,7 +155,7 @@ fn softened(critical: f64) -> DamageLaw {
     })
 }
 
-/// What the criteria of the pairs of a body with damage of their own read.
+/// Data that the criteria of a body's pairs with their own damage law read.
 fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     let block = Block::unrefined(body);
     let mut reads = PairReads::default();
@@ -167,8 +168,8 @@ fn pair_reads(problem: &Problem, body: &Body) -> PairReads {
     reads
 }
 
-/// The damage laws that a pair of bodies has of its own, those of both bodies in their order in the problem; `None` if the
-/// damage of the bodies counts.
+/// The damage laws of a pair of bodies, for both bodies in their order in the problem. `None` if the damage
+/// of the bodies applies.
 pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[DamageLaw; 2]> {
     let damage = pair.own_damage()?;
     let mut bodies = problem.bodies.iter().filter(|body| pair.has(body));
@@ -178,7 +179,7 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
-/// The damage law of bonds at an end with these constants.
+/// Damage law of bonds at an end with these constants.
 fn damage_law(
     problem: &Problem,
     body: &Body,
@@ -220,8 +221,8 @@ fn damage_law(
     }
 }
 
-/// When the bonds of a pair with damage of its own break. Each end has the damage law of its own constants, and the ends
-/// of the bonds have these stiffnesses.
+/// Failure criterion of the bonds of a pair with its own damage. Each end has the damage law for its own
+/// constants; `stiffness` is that of both ends.
 fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     use DamageLaw::{BondEnergy, CriticalStretch};
     match laws {
@@ -229,7 +230,7 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
             Criterion::Stretch(i.critical)
         }
         [CriticalStretch(i), CriticalStretch(j)] => {
-            // Each end takes what its own stretch takes, and never that of the other point.
+            // Each end uses only its own threshold, never that of the other point.
             let ratios = [[1.0, f64::INFINITY], [f64::INFINITY, 1.0]];
             let conversion = StretchConversion { ratios, stiffness };
             Criterion::StretchBetween([i.critical, j.critical], conversion)
@@ -241,8 +242,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     }
 }
 
-/// When the bonds between two blocks break: at the smaller of the two thresholds, of which a block
-/// without damage has none.
+/// Failure criterion of the bonds between two blocks: the smaller of both thresholds. A block without
+/// damage has no threshold.
 fn criterion(
     problem: &Problem,
     blocks: &[BlockLaws],
@@ -250,7 +251,7 @@ fn criterion(
     of_ends: &[End; 2],
     per_point: bool,
 ) -> Criterion {
-    // Where both ends soften, a bond breaks once neither bears anything.
+    // If both ends soften, a bond breaks when neither end carries load.
     if let [Some(i), Some(j)] = of_ends.each_ref().map(|end| end.own_critical_stretch) {
         return Criterion::Stretch(i.max(j));
     }
@@ -269,7 +270,7 @@ fn criterion(
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
-    // A critical stretch that is given holds for bonds of any horizon.
+    // A critical stretch of the deck applies to bonds of any horizon.
     let is_given = ends.map(|block| match &problem.block(block).body.damage {
         Some(damage) => matches!(damage.toughness, Toughness::CriticalStretch(_)),
         None => problem.block(block).body.can_break(),
@@ -309,10 +310,10 @@ fn criterion(
     }
 }
 
-/// Gives the bonds between two blocks their laws, criterion and weights.
+/// Set laws, criterion and weights of the bonds between two blocks.
 ///
 /// # Errors
-/// When there is not enough memory for the weights.
+/// If there is not enough memory for the weights.
 pub fn assign<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -357,23 +358,23 @@ pub fn assign<const D: usize>(
     all.into_iter().map(give).collect()
 }
 
-/// An end of the bonds between two blocks.
+/// One end of the bonds between two blocks.
 struct End {
     built: Built,
     /// See [`own_critical_stretch`].
     own_critical_stretch: Option<f64>,
-    /// As [`bond_stiffness`].
+    /// See [`bond_stiffness`].
     stiffness: f64,
-    /// The damage law of a pair with damage of its own.
+    /// Damage law of a pair with its own damage.
     pair_damage: Option<DamageLaw>,
-    /// m.
+    /// Horizon, m.
     horizon: f64,
-    /// The share of the other body's cells in its families.
+    /// Volume fractions of the other body's cells in its families.
     share: CellShare,
 }
 
 impl End {
-    /// What the volume of the far end counts, ξ away (m).
+    /// Weight of the volume of the neighbour at ξ (m).
     fn weight(&self, offset: [f64; 3]) -> f64 {
         let share = self.share.at(offset);
         match &self.built.influence {
@@ -383,7 +384,7 @@ impl End {
     }
 }
 
-/// Sets the weights of the bonds between two blocks, unless they are all 1.
+/// Set the weights of the bonds between two blocks, unless all are 1.
 fn weigh<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -396,7 +397,7 @@ fn weigh<const D: usize>(
     if plain {
         return Ok(());
     }
-    // The far end of bonds within a block has the same weights.
+    // Within a block, both ends have the same weights.
     let [here, there] = bonds.blocks();
     let count = if here == there { 1 } else { 2 };
     match bonds {

@@ -1,4 +1,4 @@
-//! Which laws and which damage the bodies of a problem can have.
+//! Checks which laws and which damage the bodies of a problem can have.
 
 use super::{breaks_by_work, build, constants, given};
 use crate::error::{Error, Result};
@@ -7,11 +7,11 @@ use crate::problem::{
     Toughness, VolumeCorrection,
 };
 
-/// An error if a body has a law that cannot be made, or damage that its law cannot have or that does not go with
-/// that of another body.
+/// Check the laws and the damage of all bodies. An error says that a law cannot be created, that its damage
+/// is not possible, or that the damage of two bodies is incompatible.
 ///
 /// # Errors
-/// For problems made in Rust; most of what a deck says is checked where it is read.
+/// For problems created in Rust; most faults of decks are found when they are read.
 pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     for body in &problem.bodies {
         let law = &body.material.law;
@@ -39,7 +39,7 @@ pub fn laws_are_possible(problem: &Problem) -> Result<()> {
     horizons_are_possible(problem)
 }
 
-/// An error if bonds that never break would soften.
+/// Return an error if bonds that never break would soften.
 fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
     let softens = |body: &&Body| pair.has(body) && body.material.law.declaration.breaks_by_itself();
     let Some(body) = problem.bodies.iter().find(softens) else {
@@ -52,7 +52,7 @@ fn softening_can_break(problem: &Problem, pair: &InterfacePair) -> Result<()> {
     Err(Error::input(message).at(&pair.span))
 }
 
-/// An error if the bonds between two bodies cannot break by damage of their own.
+/// Return an error if the bonds between two bodies cannot have their own damage.
 fn pair_damage_is_possible(
     problem: &Problem,
     pair: &InterfacePair,
@@ -97,7 +97,7 @@ fn pair_damage_is_possible(
     Ok(())
 }
 
-/// An error if a law cannot have the horizon of some of its bonds.
+/// Return an error if a law does not support the horizon of some of its bonds.
 fn horizons_are_possible(problem: &Problem) -> Result<()> {
     for here in problem.blocks() {
         let law = &here.body.material.law;
@@ -121,8 +121,9 @@ fn horizons_are_possible(problem: &Problem) -> Result<()> {
     Ok(())
 }
 
-/// An error if a material expands whose law has no potential, such as one that flows or softens, where the strain across the
-/// setting is 0: its inelastic strain depends on the stress there, which the law does not know.
+/// Return an error if a material with thermal expansion has a law without a potential, such as one with
+/// plasticity or softening, and the strain perpendicular to the setting is 0. Its inelastic strain depends
+/// on the stress in that direction, which the law does not know.
 fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let (material, dimension) = (&body.material, problem.dimension);
     let law = &material.law;
@@ -140,7 +141,8 @@ fn expansion_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     Err(Error::input(message).at(&body.span))
 }
 
-/// An error if the bonds of a body break by their energy and something else is in the way of it.
+/// Return an error if the bonds of a body break by their energy and another setting is incompatible with
+/// this.
 fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     let Some(damage) = &body.damage else {
         return Ok(());
@@ -174,7 +176,7 @@ fn damage_is_possible(problem: &Problem, body: &Body) -> Result<()> {
     damage_fault(problem, body, damage).map_or(Ok(()), error)
 }
 
-/// Why bonds of a body cannot break by this damage in this problem, if they cannot.
+/// Reason why bonds of a body cannot break by this damage in this problem, if there is one.
 fn damage_fault(problem: &Problem, body: &Body, damage: &problem::Damage) -> Option<String> {
     if let DamageRule::Energy { calibration, .. } = damage.rule
         && !calibration.is_for(problem.dimension.count())

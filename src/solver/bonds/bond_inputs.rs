@@ -1,4 +1,5 @@
-//! What bonds read of the displacements of the owned points, brought up to date part by part.
+//! Displacements and thermal stretches of the owned points in the layout that bonds read, written range by
+//! range.
 
 use std::ops::Range;
 
@@ -6,17 +7,17 @@ use super::Forces;
 use super::grid_points::{GridValues, OwnedPlaces};
 use super::list_points::{self, Node};
 
-/// What bonds read of some of the owned points; no two threads have that of the same point.
+/// Bond inputs of a range of owned points. The ranges of different threads are disjoint.
 pub struct BondInputs<'a, const D: usize> {
     points: Range<usize>,
-    /// Of these points; empty if there is no list.
+    /// List nodes of these points; empty if there is no list.
     nodes: &'a mut [Node],
-    /// By grid.
+    /// Slots of these points, one entry per grid.
     places: &'a [OwnedPlaces<'a, D>],
 }
 
 impl<const D: usize> BondInputs<'_, D> {
-    /// Takes out what is of so many of the points, the first ones.
+    /// Split off the bond inputs of the first `count` points.
     pub fn split_off_first(&mut self, count: usize) -> Self {
         let middle = self.points.start + count;
         assert!(middle <= self.points.end, "more points than there are");
@@ -34,7 +35,7 @@ impl<const D: usize> BondInputs<'_, D> {
     /// Write the displacements (m) of all these points, and their thermal stretches if there are any.
     ///
     /// # Panics
-    /// When they are those of more or less points.
+    /// If the number of values differs from the number of points.
     pub fn write_bond_inputs(
         &mut self,
         displacement: [&[f64]; D],
@@ -45,14 +46,14 @@ impl<const D: usize> BondInputs<'_, D> {
         assert!(columns.all(|column| column.len() == count));
         list_points::update(self.nodes, displacement, thermal_stretch);
         for places in self.places {
-            // SAFETY: only this has these points.
+            // SAFETY: no other value has access to these points.
             unsafe { places.take(self.points.start, displacement, thermal_stretch) };
         }
     }
 }
 
 impl<const D: usize> Forces<D> {
-    /// Calls `work` with what bonds read of the owned points, of which there are so many.
+    /// Call `work` with the bond inputs of all owned points.
     pub fn with_bond_inputs<R>(
         &mut self,
         owned: usize,

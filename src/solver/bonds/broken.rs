@@ -1,8 +1,8 @@
-//! What comes of bonds that break.
+//! Consequences of broken bonds.
 //!
-//! A bond breaks where the forces are summed, by what the force states of both ends say, and is not in
-//! these sums any more. Numbers of points that follow from sums over bonds, and the forces that follow
-//! from them, are then found anew: only at the points that a broken bond changes.
+//! A bond breaks in the pass that sums the forces, by the force states of both ends. These sums exclude it.
+//! Afterwards, point numbers that follow from sums over bonds, and the forces that depend on them, are
+//! recomputed. This is done only at the points that a broken bond affects.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -17,26 +17,27 @@ use super::point_numbers::PlasticColumns;
 use super::sweep::BrokenSums;
 use super::{Forces, Pass};
 
-/// Ranges of points between which no more lie than these are worked on as one.
+/// Ranges of points with gaps up to this number of points are merged.
 const GAP: usize = 64;
 
-/// What broken bonds change at a point in a force evaluation.
+/// Changes at a point that broken bonds cause in a force evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Broken<const D: usize> {
-    /// Local index of the point, an owned one.
+    /// Local index of the owned point.
     pub point: usize,
-    /// Number of its bonds that have broken.
+    /// Number of its bonds that broke.
     pub count: u64,
-    /// Energy that its share of them held, J, and what it loses otherwise because they are gone.
+    /// Energy that the point loses, J: its part of the energy of these bonds, and the change of its other
+    /// energy without them.
     pub energy: f64,
-    /// How much of that bonds held above their criterion when they were seen to break, J.
+    /// Its part of the energy of these bonds above their criterion when they broke, J.
     pub overshoot: f64,
-    /// The force density on the point that is gone with them, N/m³.
+    /// Force density that these bonds no longer exert on the point, N/m³.
     pub force: [f64; D],
 }
 
 impl<const D: usize> Broken<D> {
-    /// From the sums over the bonds of a point that break.
+    /// Convert the sums over the breaking bonds of a point.
     pub(super) fn new(broken_sums: &BrokenSums) -> Self {
         let [count, energy, overshoot, force @ ..] = broken_sums.sums;
         Self {
@@ -48,7 +49,7 @@ impl<const D: usize> Broken<D> {
         }
     }
 
-    /// Where no bond has broken.
+    /// An entry for a point without broken bonds.
     fn none(point: usize) -> Self {
         Self {
             point,
@@ -61,13 +62,13 @@ impl<const D: usize> Broken<D> {
 }
 
 impl<const D: usize> Forces<D> {
-    /// What bonds that broke in the last [evaluation](Self::evaluate) have changed, by ascending point.
+    /// Changes by the bonds that broke in the last [evaluation](Self::evaluate), by ascending point.
     pub fn broken(&self) -> &[Broken<D>] {
         &self.broken
     }
 
-    /// After forces were summed: brings what came of broken bonds together by point, and finds anew
-    /// what they change. Collective.
+    /// After the force sums: merge the changes by broken bonds per point, and recompute what depends on
+    /// these bonds. Collective.
     pub(super) fn settle(
         &mut self,
         comm: &dyn Communicator,
@@ -110,8 +111,8 @@ impl<const D: usize> Forces<D> {
         times.bonds += start.elapsed() - (times.halo - halo_before);
     }
 
-    /// Finds the numbers of some points anew, and books the energy that they lose by it, but for what
-    /// plastic flow takes.
+    /// Recompute the numbers of some points. Book the energy that the points lose by it, except the part
+    /// that plastic flow dissipates.
     fn find_numbers(
         &mut self,
         points: Range<usize>,
@@ -129,7 +130,7 @@ impl<const D: usize> Forces<D> {
             self.run(pass, points.clone(), force, BondUpdate::None);
             self.finish(pass, points.clone(), model, bond_update, plastic);
         }
-        // Bonds read what lattices show of the points.
+        // Lattice bonds read the point numbers that are copied to the grids.
         self.update(HaloContent::OwnedOnly, Which::Owned);
         let after = self.held(model, points.clone(), plastic);
         for broken in &mut self.broken {
@@ -140,7 +141,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// What some points hold and have lost by plastic flow, J/m³.
+    /// Energy density that some points store, plus the density that plastic flow has dissipated, J/m³.
     fn held(
         &mut self,
         model: &Model<D>,
@@ -157,8 +158,8 @@ impl<const D: usize> Forces<D> {
         energy
     }
 
-    /// Sends the new numbers of points to those who read them. Returns the owned points whose forces
-    /// they change; perhaps more.
+    /// Send the new numbers of points to the ranks that read them. Return the owned points whose forces may
+    /// change.
     fn send_numbers(
         &mut self,
         comm: &dyn Communicator,
@@ -194,7 +195,7 @@ impl<const D: usize> Forces<D> {
         changed
     }
 
-    /// Finds the forces on some points anew, and notes what they have lost.
+    /// Recompute the forces on some points, and record the change.
     fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
         let before = force
             .each_ref()
@@ -224,7 +225,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// The points in ascending ranges, each with all points whose bonds are worked on together.
+    /// Merge the points to ascending ranges. Each range contains whole lane groups.
     fn ranges(&self, points: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
         let mut ranges: Vec<Range<usize>> = points.map(|point| self.lane_group(point)).collect();
         ranges.sort_unstable_by_key(|range| range.start);

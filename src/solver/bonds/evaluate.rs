@@ -1,4 +1,4 @@
-//! A force evaluation: its passes, with messages between them.
+//! Force evaluation: passes over the bonds, and the halo exchanges between them.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -24,14 +24,14 @@ use super::{Forces, Pass};
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// Interior points for each thread that are worked on before messages are driven on again: some tenths
-/// of a millisecond in space.
+/// Interior points per thread between two calls that advance the messages; a few tenths of a millisecond of
+/// work in 3D.
 const PIECE: usize = 4096;
 
-/// Columns of [`Forces::changing_columns`] at most.
+/// Maximum number of columns of [`Forces::changing_columns`].
 const MOST_CHANGING: usize = MOST.point + 4;
 
-/// Columns of [`Forces::halo_columns`], of which some may be empty.
+/// Columns of [`Forces::halo_columns`] and their number. Some columns may be empty.
 type HaloColumns<'a> = ([&'a mut [f64]; MOST_CHANGING], usize);
 
 /// Point data that a pass receives from other ranks.
@@ -46,7 +46,7 @@ pub(super) enum HaloContent {
     None,
 }
 
-/// Where the time of a force evaluation went.
+/// Wall time of the parts of a force evaluation.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ForceTimes {
     /// Sums over bonds.
@@ -56,28 +56,29 @@ pub struct ForceTimes {
 }
 
 impl ForceTimes {
-    /// All of it.
+    /// Total time.
     pub fn whole(&self) -> Duration {
         self.bonds + self.halo
     }
 }
 
-/// What a force evaluation changes.
+/// Fields that a force evaluation reads and writes.
 pub struct Acting<'a, const D: usize> {
-    /// Displacements of the local points, m; those of ghosts are brought up to date.
+    /// Displacements of the local points, m; the evaluation updates those of ghosts.
     pub displacement: &'a mut [Vec<f64>; D],
-    /// Thermal stretches of the local points, if there are any; those of ghosts are brought up to date.
+    /// Thermal stretches of the local points, if there are any; the evaluation updates those of ghosts.
     pub thermal_stretch: Option<&'a mut [f64]>,
-    /// Internal force density of the owned points, N/m³; 0 before, for that of bonds is added to it.
+    /// Internal force density of the owned points, N/m³. It must be 0 on entry, because bond forces are
+    /// added to it.
     pub force: &'a mut [Vec<f64>; D],
-    /// What plastic flow has left at the owned points; changed in a step.
+    /// Plastic state of the owned points; changed only in a step.
     pub plastic: PlasticColumns<'a>,
 }
 
 impl<const D: usize> Forces<D> {
-    /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has written the owned
-    /// points. `bond_update` says what changes besides the forces; what
-    /// comes of bonds that break is in [`Self::broken`]. Collective.
+    /// Exchange ghost data and sum the internal force density. Call after [`Self::with_bond_inputs`] has
+    /// written the owned points. `bond_update` selects what else changes. [`Self::broken`] gives the
+    /// changes by bonds that break. Collective.
     pub fn evaluate(
         &mut self,
         comm: &dyn Communicator,
@@ -115,7 +116,7 @@ impl<const D: usize> Forces<D> {
             let mut interior = |progress: &mut dyn FnMut() -> bool| {
                 timed(&mut || self.update(content, Which::Owned));
                 let mut rest = 0..model.interior;
-                // Once all messages have arrived the rest is done in one piece.
+                // Once all messages have arrived, the remaining points are processed in one piece.
                 while rest.len() > piece && progress() {
                     let next = self.border(rest.start + piece);
                     let points = rest.start..next;
@@ -156,16 +157,16 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// The first point from one on that is not worked on together with the one before it. A vector of a
-    /// lattice that were cut would add to its last points before their earlier interactions do: their sums
-    /// would be rounded otherwise, as messages arrive.
+    /// Return the first point, from `from` on, that starts a new lane group. If a lattice vector were cut,
+    /// its last points would get their bond contributions in another order. The round-off of their sums
+    /// would then depend on when messages arrive.
     pub(super) fn border(&self, from: usize) -> usize {
         let end = self.lane_group(from - 1).end;
         if end == from { from } else { self.border(end) }
     }
 
-    /// The columns of point numbers and rotations that change before each sum of forces and that both ends read, and how
-    /// many there are.
+    /// Return the columns of point numbers and rotations that change before each force sum and that both
+    /// ends read, and the number of these columns.
     pub(super) fn changing_columns(&mut self) -> HaloColumns<'_> {
         let first = self.numbers.first_changing;
         let changing = first..self.numbers.read.max(first);
@@ -180,8 +181,8 @@ impl<const D: usize> Forces<D> {
         (all, count)
     }
 
-    /// The columns over the local points that a content consists of, and how many there are: what is sent and what is
-    /// received.
+    /// Return the columns over the local points that a halo content consists of, and their number. These
+    /// columns are sent and received.
     fn halo_columns<'a>(
         &'a mut self,
         content: HaloContent,
@@ -220,7 +221,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Copy found or received numbers of points to where lattices read them.
+    /// Copy computed or received point numbers to the grids, where lattice bonds read them.
     pub(super) fn update(&mut self, content: HaloContent, which: Which) {
         for grid in &mut self.grids {
             match content {
@@ -236,8 +237,8 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Copy received displacements and thermal stretches of ghosts to where bonds read them. Those of owned points are there
-    /// already.
+    /// Copy received displacements and thermal stretches of ghosts to the arrays that bonds read. Those of
+    /// owned points are already there.
     fn update_moved_ghosts(
         &mut self,
         model: &Model<D>,
@@ -274,7 +275,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Sums over the bonds of a range of the owned points.
+    /// Sum a pass over the bonds of a range of owned points.
     pub(super) fn run(
         &mut self,
         pass: Pass,
@@ -284,7 +285,7 @@ impl<const D: usize> Forces<D> {
     ) {
         match pass {
             Pass::SmallestStretch => {
-                // Taken out while it is written.
+                // The column is taken out of `limits` while it is written.
                 let mut thresholds = [std::mem::take(&mut self.limits.thresholds)];
                 self.for_each_interaction(|interaction, source| {
                     let results = <[Lanes; 1]>::columns_mut(&mut thresholds);
@@ -325,7 +326,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Finds what some of the points make of the sums of a pass.
+    /// Compute point values of some points from the sums of a pass.
     pub(super) fn finish(
         &mut self,
         pass: Pass,
@@ -343,7 +344,7 @@ impl<const D: usize> Forces<D> {
                     .with_min_len(CHUNK)
                     .zip(points)
                     .for_each(|(value, point)| {
-                        // A point without intact bonds has no smallest stretch.
+                        // The smallest stretch of a point without intact bonds is infinite.
                         let smallest = if value.is_infinite() {
                             0.0
                         } else {
@@ -369,7 +370,7 @@ impl<const D: usize> Forces<D> {
     }
 }
 
-/// Runs the kernel of a pass, if the law has so many.
+/// Run the kernel of a pass, if the law has that many passes.
 fn sum_pass<L: Law<D>, const D: usize>(
     number: usize,
     bonds: &mut BlockBonds,
@@ -383,7 +384,7 @@ fn sum_pass<L: Law<D>, const D: usize>(
         return;
     }
     let results = L::Sum::columns_mut(sums);
-    // No law has more passes, and no loop is compiled for those that a law does not have.
+    // No law has more passes. Loops are compiled only for the passes that a law has.
     match number {
         0 if const { L::PASSES > 0 } => {
             let kernel = PassSum::<L, 0> { law, bond_update };

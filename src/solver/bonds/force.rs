@@ -1,4 +1,4 @@
-//! The sum of the bond forces, and the breaking of bonds by what both ends' force states say.
+//! The kernel that sums bond forces and breaks bonds by the force states of both ends.
 
 use crate::damage::{Criterion, Ends};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
@@ -7,20 +7,20 @@ use crate::material::{ForceState, Law};
 
 use super::kernel::{Group, Kernel};
 
-/// What happens to bonds while forces are evaluated.
+/// Changes of bond state in a force evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BondUpdate {
-    /// Bonds break and their history advances, as at the end of a step of this length (s).
+    /// Bonds break, and their history advances to the end of a step of this length (s).
     Step(f64),
-    /// Forces follow from the history that bonds would have at the end of a step of this length (s). It is not stored,
-    /// and no bond breaks.
+    /// Forces follow from the bond history at the end of a step of this length (s). The history is not
+    /// stored, and no bond breaks.
     Trial(f64),
     /// Neither history nor bonds change.
     None,
 }
 
 impl BondUpdate {
-    /// The time by which the history of bonds advances, s.
+    /// Time increment of the bond history, s.
     #[inline(always)]
     pub fn history_step(self) -> Option<f64> {
         match self {
@@ -29,30 +29,30 @@ impl BondUpdate {
         }
     }
 
-    /// Whether what changes is stored.
+    /// Whether changes of the bond state are stored.
     #[inline(always)]
     pub fn is_stored(self) -> bool {
         matches!(self, Self::Step(_))
     }
 }
 
-/// Sums the forces of the intact bonds: force density by component (N/m³), less those of bonds that
-/// break by what their force states say. Of these it sums the number, the energy (J) that the points'
-/// shares of them set free, how much of it they held above their criterion (J), and their forces (N/m³).
+/// Sum the forces of the intact bonds: force density by component, N/m³. Bonds that break in this sweep are
+/// excluded. For the breaking bonds, it sums their number, the energy that they release at the point (J),
+/// the part of this energy above the criterion (J), and their forces (N/m³).
 #[derive(Clone, Copy)]
 pub struct Force<L> {
-    /// Laws of the own and of the far end.
+    /// Laws of points i and j.
     pub laws: [L; 2],
-    /// When bonds break here.
+    /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether the weights of bonds are their influence, and not shares of volume.
+    /// Bond weights are values of the influence function, not volume fractions.
     pub influence: bool,
-    /// What happens to the bonds.
+    /// Changes of the bond state.
     pub bond_update: BondUpdate,
 }
 
 impl<L> Force<L> {
-    /// The weighted sum of the force states of both ends.
+    /// Return the weighted sum of the force states of both ends.
     #[inline(always)]
     fn weighted<S: Simd, const D: usize>(
         &self,
@@ -67,8 +67,9 @@ impl<L> Force<L> {
         L::bond_force(simd, laws, &group.bond, points, &group.history, weights)
     }
 
-    /// The work of the acting force states of each bond between whole cells, J/m⁶, from the weighted force density; 0 if
-    /// the criterion does not read it. A force state does not act beyond the horizon of its point.
+    /// Return the work of the force states of each bond between two whole cells, J/m⁶, from the weighted
+    /// force density. It is 0 if the criterion does not read it. The force state of a point does not act
+    /// beyond its horizon.
     #[inline(always)]
     fn work<S: Simd, const D: usize>(
         &self,
@@ -105,7 +106,7 @@ impl<L> Force<L> {
         weights.sum(i, j)
     }
 
-    /// A bit for each bond that breaks.
+    /// Return a bit for each bond that breaks.
     #[inline(always)]
     fn breaks<S: Simd, const D: usize>(
         &self,
@@ -209,7 +210,7 @@ impl<L: Law<D>, const D: usize> Kernel<D> for Force<L> {
         let ends = self.ends(group);
         let late = self.criterion.overshoot::<S, L, D>(simd, &bond, ends, work);
         let overshoot = if self.criterion.reads_work() {
-            // The work of a bond belongs to its acting ends in equal parts.
+            // The work of a bond is divided equally between the ends whose force states act.
             let [own, far] = ends.weights.acting();
             let half = simd.keep(Lanes::splat(0.5), own & far);
             let part = simd.select(half, own & far, simd.keep(Lanes::splat(1.0), own));

@@ -1,5 +1,5 @@
-//! What kernels read of the local points of a grid, in the order of their places: eight adjacent
-//! points at once.
+//! Data that kernels read of the local points of a grid, ordered by slot: eight adjacent points are loaded
+//! at once.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -14,21 +14,21 @@ use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, LimitsRead, ReadLimits, ReadRotations};
 use super::list_points::load_history;
 
-/// Values of the points of a grid by place. Empty arrays are not read; entries of holes mean nothing,
-/// but are finite.
+/// Values of the points of a grid by slot. Arrays that no kernel reads are empty. Entries of holes are
+/// finite but have no meaning.
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
     displacement: [Column; D],
     /// Empty in runs without temperatures.
     thermal_stretch: Column,
-    /// Those numbers that bonds read.
+    /// The point numbers that bonds read.
     numbers: Vec<Column>,
     limits: LimitColumns,
 }
 
 impl<const D: usize> GridValues<D> {
-    /// For a grid at rest, whose bonds read so many numbers of each point, these limits, and thermal stretches if
-    /// `is_thermal`.
+    /// Create the values of a grid at rest. Bonds read `numbers` numbers per point, the limits in `limits`,
+    /// and thermal stretches if `is_thermal`.
     pub fn new(grid: Arc<Grid>, numbers: usize, limits: LimitsRead, is_thermal: bool) -> Self {
         let count = grid.slots();
         let of_temperature = if is_thermal { count } else { 0 };
@@ -43,12 +43,12 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Whether this is the grid of the values.
+    /// Whether these are the values of `grid`.
     pub fn is_of(&self, grid: &Arc<Grid>) -> bool {
         Arc::ptr_eq(&self.grid, grid)
     }
 
-    /// Takes the displacements of the ghosts, and their thermal stretches if there are any.
+    /// Copy the displacements of the ghosts, and their thermal stretches if there are any.
     pub fn update_ghosts(&mut self, displacement: &[Vec<f64>; D], thermal_stretch: Option<&[f64]>) {
         for (places, values) in self.displacement.iter_mut().zip(displacement) {
             self.grid.update(Which::Ghosts, values, places);
@@ -59,7 +59,7 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Where the displacements of the owned points go.
+    /// Return write access to the displacements of the owned points.
     pub fn owned_places(&mut self) -> OwnedPlaces<'_, D> {
         OwnedPlaces {
             grid: &self.grid,
@@ -70,19 +70,19 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Takes the numbers of some of the local points, from the first wanted one on.
+    /// Copy numbers of some of the local points, starting with column `first`.
     pub fn update_numbers(&mut self, which: Which, first: usize, numbers: &[Column]) {
         for (places, values) in self.numbers.iter_mut().zip(numbers).skip(first) {
             self.grid.update(which, values, places);
         }
     }
 
-    /// Takes the thresholds of some of the local points.
+    /// Copy the thresholds of some of the local points.
     pub fn update_thresholds(&mut self, which: Which, values: &[f64]) {
         self.grid.update(which, values, &mut self.limits.thresholds);
     }
 
-    /// Takes the rotations of some of the local points.
+    /// Copy the rotations of some of the local points.
     pub fn update_rotations(&mut self, which: Which, rotations: &[Column; 4]) {
         for (places, values) in self.limits.rotations.iter_mut().zip(rotations) {
             if !values.is_empty() {
@@ -91,13 +91,13 @@ impl<const D: usize> GridValues<D> {
         }
     }
 
-    /// Takes the truncation factors of the local points.
+    /// Copy the truncation factors of the local points.
     pub fn update_truncation_factors(&mut self, values: &[f64]) {
         let places = &mut self.limits.truncation_factors;
         self.grid.update(Which::All, values, places);
     }
 
-    /// Memory, that of the grid included, bytes.
+    /// Memory, including the grid, bytes.
     pub fn bytes(&self) -> usize {
         let columns = self.displacement.iter().chain(&self.numbers);
         let columns = columns.chain([&self.thermal_stretch]);
@@ -106,7 +106,7 @@ impl<const D: usize> GridValues<D> {
     }
 }
 
-/// Where the displacements of a grid's owned points go, from several threads.
+/// Write access of several threads to the displacements of a grid's owned points.
 pub struct OwnedPlaces<'a, const D: usize> {
     grid: &'a Grid,
     columns: [*mut f64; D],
@@ -114,16 +114,17 @@ pub struct OwnedPlaces<'a, const D: usize> {
     values: PhantomData<&'a mut f64>,
 }
 
-// SAFETY: threads write to its columns only what `take` says.
+// SAFETY: threads write to its columns only under the conditions of `take`.
 unsafe impl<const D: usize> Sync for OwnedPlaces<'_, D> {}
 // SAFETY: as above.
 unsafe impl<const D: usize> Send for OwnedPlaces<'_, D> {}
 
 impl<const D: usize> OwnedPlaces<'_, D> {
-    /// Takes the displacements of owned points from a local index on, and their thermal stretches if there are any.
+    /// Copy the displacements of owned points from a local index on, and their thermal stretches if there
+    /// are any.
     ///
     /// # Safety
-    /// No other thread does so for any of these points at the same time.
+    /// No other thread may write any of these points at the same time.
     pub unsafe fn take(
         &self,
         first: usize,
@@ -135,8 +136,8 @@ impl<const D: usize> OwnedPlaces<'_, D> {
         for (place, points) in self.grid.slots_of(first..first + count) {
             let copy = |entries: *mut f64, values: &[f64]| {
                 let values = &values[points.start - first..points.end - first];
-                // SAFETY: these are places of the grid, for each of which a column has an entry, and no other
-                // points have them.
+                // SAFETY: these are slots of the grid, and every column has an entry for each slot. No two
+                // points have the same slot.
                 unsafe {
                     let entries = entries.add(place);
                     entries.copy_from_nonoverlapping(values.as_ptr(), values.len());
@@ -152,17 +153,17 @@ impl<const D: usize> OwnedPlaces<'_, D> {
     }
 }
 
-/// The points of a grid as a kernel reads them.
+/// The points of a grid in the form that a kernel reads.
 pub struct GridPoints<'a, K: Kernel<D>, const D: usize> {
     displacement: [&'a [f64]; D],
-    /// Of points with bonds whose thermal stretch the kernel must not see.
+    /// Thermal stretches of the points, if they must be removed from the bonds.
     thermal_stretch: Option<&'a [f64]>,
     numbers: <K::Point as LaneTuple>::Columns<'a>,
     limits: ReadLimits<'a>,
     rotations: ReadRotations<'a, K::Rotation>,
     limit: f64,
     is_linear: bool,
-    /// Of the own and the far ends, m³.
+    /// Volumes of points i and of points j, m³.
     volumes: [Lanes; 2],
 }
 
@@ -185,10 +186,10 @@ pub struct PointI<P, R, const D: usize> {
 }
 
 impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
-    /// For a kernel on a grid with points of these volumes (m³) at the own and the far ends.
+    /// Prepare a grid for a kernel. `volumes` are the volumes (m³) of points i and j.
     ///
     /// # Panics
-    /// When an array that the kernel reads does not cover the grid.
+    /// If an array that the kernel reads does not cover the grid.
     pub fn new(kernel: &K, values: &'a GridValues<D>, volumes: [f64; 2]) -> Self {
         let numbers = K::Point::columns(&values.numbers);
         let slots = values.grid.slots();
@@ -212,14 +213,14 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// The place must be one of the grid, with seven more after it.
+    /// `place` and the seven following slots must be in the grid.
     #[inline(always)]
     unsafe fn numbers(&self, place: usize) -> K::Point {
         // SAFETY: `new` has checked the length.
         K::Point::load(&self.numbers, |column| unsafe { eight(column, place) })
     }
 
-    /// Whether bonds have a thermal stretch that the kernel must not see.
+    /// Whether thermal stretches must be removed from the bonds.
     #[inline(always)]
     pub fn is_thermal(&self) -> bool {
         self.thermal_stretch.is_some()
@@ -270,10 +271,10 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         (self.rotations).eight::<D>(|column| unsafe { eight(column, place) })
     }
 
-    /// Load eight adjacent points i from a place on.
+    /// Load eight adjacent points i, starting at a slot.
     ///
     /// # Safety
-    /// The place must be that of a vector of the grid.
+    /// `place` must be the slot of a vector of the grid.
     #[inline(always)]
     pub unsafe fn load_point_i(&self, place: usize) -> PointI<K::Point, K::Rotation, D> {
         // SAFETY: `new` has checked the lengths.
@@ -288,11 +289,11 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         }
     }
 
-    /// Load the bonds of a vector at one offset. `FAST_PATH` leaves out the data of the criterion and, for bonds beyond the
-    /// series, the extensions.
+    /// Load the bonds of a vector at one offset. `FAST_PATH` omits the data of the criterion and, for bonds
+    /// beyond the series limit, the extensions.
     ///
     /// # Safety
-    /// The vector must be one of the grid, the offset one of its.
+    /// The vector must belong to the grid, and the offset to the vector.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd, const FAST_PATH: bool>(
         &self,
@@ -302,7 +303,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
         o: usize,
     ) -> Group<'h, K, D> {
         let offset: &Offset = &vector.offsets[o];
-        // SAFETY: the offset is one of the vector's, so `far` is a place of the grid with seven more after it.
+        // SAFETY: the offset belongs to the vector, so `far` and the seven following slots are in the grid.
         let (displacement, numbers, limits, rotation) = unsafe {
             let far = vector.far(offset);
             let component = |d| eight(self.displacement[d], far);

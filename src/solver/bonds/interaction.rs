@@ -1,23 +1,23 @@
-//! The bonds between two blocks with the laws that they follow.
+//! The bonds between two blocks, and their laws.
 
 use crate::damage::{Criterion, DamageLaw};
 use crate::families::BlockBonds;
 use crate::material::{AnyLaw, PairLaw};
 use crate::scatter::Weibull;
 
-/// The bonds between two blocks, their laws, and when they break.
+/// The bonds between two blocks, their laws, and their failure criterion.
 pub struct Interaction {
     /// The bonds.
     pub bonds: BlockBonds,
     /// The laws of both ends.
     pub laws: PairLaw,
-    /// When bonds break.
+    /// Failure criterion of the bonds.
     pub criterion: Criterion,
-    /// Whether the weights of the bonds are their influence, and not shares of volume.
+    /// Bond weights are values of the influence function, not volume fractions.
     pub influence: bool,
 }
 
-/// What the points of a block follow.
+/// Laws of the points of a block.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockLaws {
     /// The material law.
@@ -26,23 +26,23 @@ pub struct BlockLaws {
     pub damage: Option<DamageLaw>,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// What bonds to other bodies read that have damage of their own.
+    /// Data that bonds to other bodies read, if such a pair of bodies has its own damage law.
     pub pairs: PairReads,
 }
 
-/// What the criteria of bonds read that have the damage of a pair of bodies.
+/// Data that the failure criteria of bonds between two bodies with their own damage law read.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PairReads {
-    /// Some of the bonds can break.
+    /// Whether some of these bonds can break.
     pub breaks: bool,
-    /// Truncation factors are read.
+    /// Whether these criteria read truncation factors.
     pub truncation_factors: bool,
-    /// Rotations are read.
+    /// Whether these criteria read rotations.
     pub rotations: bool,
 }
 
 impl PairReads {
-    /// Add what a damage law reads.
+    /// Add the data that a damage law reads.
     pub fn add(&mut self, law: &DamageLaw) {
         self.breaks = true;
         self.truncation_factors |= law.family_correction() > 0.0;
@@ -51,12 +51,12 @@ impl PairReads {
 }
 
 impl BlockLaws {
-    /// Whether any bonds of the points can break.
+    /// Whether any bond of the points can break.
     pub fn has_breakable_bonds(&self) -> bool {
         self.damage.is_some() || self.pairs.breaks
     }
 
-    /// Whether the points have thresholds of their own.
+    /// Whether each point has its own threshold.
     pub fn has_thresholds(&self) -> bool {
         self.weibull.is_some() || self.follows_smallest_stretch()
     }

@@ -1,7 +1,7 @@
 //! Sums over the bonds of points: forces, numbers of points, energies.
 //!
-//! A kernel adds eight bonds at a time to eight lanes of each sum. It is written once for all dimensions, laws and
-//! storages: the eight bonds are those of one point (lists) or of eight points (lattices).
+//! A kernel adds eight bonds at a time to eight lanes of each sum. The same kernel serves all dimensions,
+//! laws and storages: the eight bonds belong to one point (lists) or to eight points (lattices).
 
 use crate::damage::{Criterion, Limits};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
@@ -10,16 +10,16 @@ use crate::material::bond::{Wanted, Weights};
 
 /// Eight bonds ij with the data of both points and their history.
 pub struct Group<'a, K: Kernel<D>, const D: usize> {
-    /// Geometry, as laws read it.
+    /// Geometry of the bonds in the form that laws read.
     pub bond: Bond<D>,
     /// Volumes of points i, m³.
     pub own_volume: Lanes,
     /// Volumes of points j, m³.
     pub volume: Lanes,
-    /// By what force states are multiplied in the force density: the volume of points j, m³, over 1 + a of a bond with the
-    /// thermal stretch a.
+    /// Factor from force states to the force density: V_j/(1 + a), m³, where a is the thermal stretch of
+    /// the bond.
     pub force_volume: Lanes,
-    /// Influence or volume share of the bonds at each end.
+    /// Influence function or volume fraction of the bonds at each end.
     pub weights: Weights,
     /// Numbers of points i.
     pub own: &'a K::Point,
@@ -100,10 +100,10 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Implemented in `D` dimensions; otherwise no loops are compiled.
     const EXISTS: bool = true;
 
-    /// Reduction of its sums.
+    /// Reduction of the lanes of its sums.
     const COMBINE: Combine = Combine::Add;
 
-    /// Instruction sets for which its loops are compiled. For outputs one is enough.
+    /// Instruction sets for which its loops are compiled. One is enough for output kernels.
     const ISA_SET: IsaSet = IsaSet::One;
 
     /// Compile a second loop for vectors whose bonds all stay within the series limit.
@@ -118,16 +118,17 @@ pub trait Kernel<const D: usize>: Copy + Sync {
     /// Quantities of the deformed bonds to compute.
     const WANTED: Wanted;
 
-    /// The law, and so whether bonds are linear, is known at run time only.
+    /// The law is known only at run time, so the kernel does not know at compile time whether bonds are
+    /// linear.
     const ANY_LAW: bool = false;
 
-    /// Whether bonds are those of a linear law, see [`Bond`].
+    /// Whether the bonds have a linear law, see [`Bond`].
     #[inline(always)]
     fn is_linear(&self) -> bool {
         Self::WANTED.linear
     }
 
-    /// [`Self::WANTED`] for bonds that are linear or not.
+    /// [`Self::WANTED`] for linear or nonlinear bonds.
     #[inline(always)]
     fn wanted(is_linear: bool) -> Wanted {
         let mut wanted = Self::WANTED;
@@ -137,32 +138,32 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         wanted
     }
 
-    /// Sums depend on reference positions and intact bits alone. A lattice then caches them per bit pattern. Such a kernel
-    /// must not break or change bonds.
+    /// Whether sums depend only on reference positions and intact bits. A lattice then caches them per bit
+    /// pattern. Such a kernel must not break or change bonds.
     #[inline(always)]
     fn is_undeformed(&self) -> bool {
         false
     }
 
-    /// Bonds are given to the law without their thermal stretch.
+    /// Whether the law receives bonds without their thermal stretch.
     #[inline(always)]
     fn is_elastic(&self) -> bool {
         true
     }
 
-    /// The bits of broken bonds are needed; asked only with [`Self::READS_BROKEN`].
+    /// Whether the bits of broken bonds are needed. Called only with [`Self::READS_BROKEN`].
     #[inline(always)]
     fn needs_broken(&self) -> bool {
         Self::READS_BROKEN
     }
 
-    /// Failure criterion. The sweep loads only the columns it reads.
+    /// Failure criterion. The sweep loads only the columns that the criterion reads.
     #[inline(always)]
     fn criterion(&self) -> Criterion {
         Criterion::Never
     }
 
-    /// The bond history is written back.
+    /// Whether the bond history is written back.
     #[inline(always)]
     fn stores_history(&self) -> bool {
         false
@@ -174,25 +175,26 @@ pub trait Kernel<const D: usize>: Copy + Sync {
         Self::Sums::splat(0.0)
     }
 
-    /// Add eight bonds, except those that break: their intact bits are cleared. May change the bond history.
+    /// Add eight bonds, except those that break, and clear the intact bits of the breaking bonds. May
+    /// change the bond history.
     fn add<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums);
 
-    /// Bonds within the series limit can neither break nor change their history, so [`Self::add_fast`] may skip the
-    /// criterion.
+    /// Whether bonds within the series limit can neither break nor change their history. [`Self::add_fast`]
+    /// may then skip the criterion.
     #[inline(always)]
     fn may_skip_criterion(&self) -> bool {
         true
     }
 
-    /// Add eight bonds that are all within the series limit, if [`Self::may_skip_criterion`].
+    /// Add eight bonds that are all within the series limit. Called only if [`Self::may_skip_criterion`].
     #[inline(always)]
     fn add_fast<S: Simd>(&self, simd: S, group: &mut Group<'_, Self, D>, sums: &mut Self::Sums) {
         self.add(simd, group, sums);
     }
 
-    /// Clear the intact bits of breaking bonds and add these bonds to `broken`. A second loop over the bonds of a point or
-    /// vector calls it if [`Self::add`] broke one; out of line to save registers. The bits that [`Self::add`] cleared
-    /// are a copy.
+    /// Clear the intact bits of breaking bonds and add these bonds to `broken`. A second loop over the
+    /// bonds of a point or vector calls it if [`Self::add`] broke a bond. It is out of line to save
+    /// registers. [`Self::add`] works on a copy of the intact bits.
     fn add_broken<S: Simd>(
         &self,
         _simd: S,

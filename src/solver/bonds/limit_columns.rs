@@ -1,4 +1,4 @@
-//! What criteria alone read of the points, by column.
+//! Point data that only failure criteria read, by column.
 
 use crate::damage::{Criterion, DamageLaw, Limits};
 use crate::lanes::{Column, LaneTuple, Lanes};
@@ -9,16 +9,16 @@ use super::interaction::BlockLaws;
 /// Which of the [`Limits`] the criteria of a run read; the same on all ranks.
 #[derive(Debug, Clone, Copy)]
 pub struct LimitsRead {
-    /// Thresholds.
+    /// Whether thresholds are read.
     pub thresholds: bool,
-    /// Truncation factors.
+    /// Whether truncation factors are read.
     pub truncation_factors: bool,
-    /// Rotations.
+    /// Whether rotations are read.
     pub rotations: bool,
 }
 
 impl LimitsRead {
-    /// By the damage laws of the blocks, in `D` dimensions.
+    /// Collect the limits that the damage laws of the blocks read in `D` dimensions.
     pub fn by<const D: usize>(blocks: &[BlockLaws]) -> Self {
         let any = |reads: fn(&DamageLaw) -> bool| {
             let mut laws = blocks.iter().filter_map(|block| block.damage.as_ref());
@@ -35,19 +35,19 @@ impl LimitsRead {
     }
 }
 
-/// [`Limits`] by column; one that no criterion reads is empty.
+/// [`Limits`] by column. A column that no criterion reads is empty.
 pub struct LimitColumns {
     /// Failure thresholds, indexed by local point (lists) or grid slot (lattices).
     pub thresholds: Column,
-    /// Truncation factors, likewise.
+    /// Truncation factors, with the same index.
     pub truncation_factors: Column,
-    /// By component; in the plane q_z and q₀ alone are stored.
+    /// Rotations by component; in 2D only q_z and q₀ are stored.
     pub rotations: [Column; 4],
 }
 
 impl LimitColumns {
-    /// Allocate the columns in `read` for `count` points. `number` is the index of the first column among those that loops
-    /// read together, see [`Column`].
+    /// Allocate the columns in `read` for `count` points. `number` is the index of the first of them among
+    /// all columns that a loop reads, see [`Column`].
     pub fn new<const D: usize>(read: LimitsRead, number: usize, count: usize) -> Self {
         let of = |number, read, value| Column::new(number, if read { count } else { 0 }, value);
         Self {
@@ -60,7 +60,7 @@ impl LimitColumns {
         }
     }
 
-    /// Those rotations that are kept.
+    /// The columns of rotations that are stored.
     pub fn kept_rotations(&mut self) -> impl Iterator<Item = &mut Column> {
         let columns = self.rotations.iter_mut();
         columns.filter(|column| !column.is_empty())
@@ -74,20 +74,20 @@ impl LimitColumns {
     }
 }
 
-/// Thresholds and truncation factors as a kernel with a criterion reads them.
+/// Thresholds and truncation factors in the form that a kernel with a criterion reads.
 #[derive(Clone, Copy)]
 pub struct ReadLimits<'a> {
     thresholds: Option<&'a [f64]>,
     truncation_factors: Option<&'a [f64]>,
-    /// Whether any is read: one branch in the loops of criteria that read none.
+    /// Whether any of them is read. Loops of criteria that read none then have a single branch.
     any: bool,
 }
 
 impl<'a> ReadLimits<'a> {
-    /// For a criterion.
+    /// Prepare the columns for a criterion.
     ///
     /// # Panics
-    /// When a column that it reads has fewer entries than `reach`.
+    /// If a column that the criterion reads has fewer entries than `reach`.
     pub fn new(criterion: Criterion, columns: &'a LimitColumns, reach: usize) -> Self {
         let read = |reads: bool, column: &'a Column| {
             assert!(
@@ -108,7 +108,7 @@ impl<'a> ReadLimits<'a> {
         }
     }
 
-    /// Limits of eight points; `take` only gets columns of the length that was checked.
+    /// Limits of eight points. `take` is called only for columns whose length was checked.
     #[inline(always)]
     pub fn eight(&self, take: impl Fn(&[f64]) -> Lanes) -> Limits {
         let mut limits = Limits::unread();
@@ -124,8 +124,8 @@ impl<'a> ReadLimits<'a> {
     }
 }
 
-/// Rotations as a kernel with a criterion reads them; `R` has four components, or none for laws whose forces act along
-/// the bonds.
+/// Rotations in the form that a kernel with a criterion reads. `R` has four components, or none for laws
+/// whose forces act along the bonds.
 #[derive(Clone, Copy)]
 pub struct ReadRotations<'a, R: LaneTuple> {
     columns: R::Columns<'a>,
@@ -133,16 +133,17 @@ pub struct ReadRotations<'a, R: LaneTuple> {
 }
 
 impl<'a, R: LaneTuple> ReadRotations<'a, R> {
-    /// For a criterion, in `D` dimensions.
+    /// Prepare the rotations for a criterion, in `D` dimensions.
     ///
     /// # Panics
-    /// When a column that it reads has fewer entries than `reach`.
+    /// If a column that the criterion reads has fewer entries than `reach`.
     pub fn new<const D: usize>(
         criterion: Criterion,
         columns: &'a LimitColumns,
         reach: usize,
     ) -> Self {
-        // A run whose laws all act along the bonds has no rotations; bonds between different ones still ask.
+        // Without rotations (all laws act along the bonds), bonds between two different such laws still
+        // request them.
         let is_stored = !columns.rotations[3].is_empty();
         let is_read = R::COUNT > 0 && criterion.reads_rotations() && is_stored;
         let columns = R::columns(&columns.rotations);
@@ -157,7 +158,7 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
         Self { columns, is_read }
     }
 
-    /// Rotations of eight points; `take` only gets columns of the length that was checked.
+    /// Rotations of eight points. `take` is called only for columns whose length was checked.
     #[inline(always)]
     pub fn eight<const D: usize>(&self, take: impl Fn(&[f64]) -> Lanes) -> R {
         if !self.is_read {
@@ -173,7 +174,7 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
     }
 }
 
-/// The first component of rotations that is stored: in the plane q_x and q_y are 0.
+/// Index of the first stored component of rotations: in 2D, q_x and q_y are 0 and not stored.
 const fn first_component<const D: usize>() -> usize {
     if D < 3 { 2 } else { 0 }
 }

@@ -1,4 +1,4 @@
-//! What kernels read of the local points where bonds are listed: all geometry of a point in one cache
+//! Data that kernels read of the local points of list families: all geometry of a point is in one cache
 //! line.
 
 use crate::damage::Limits;
@@ -11,21 +11,22 @@ use crate::solver::model::Model;
 use super::kernel::{Group, Kernel};
 use super::limit_columns::{LimitColumns, ReadLimits, ReadRotations};
 
-/// Reference position (m) and displacement (m) of a point, three components each, its volume (m³) and its thermal stretch.
+/// Reference position (m), displacement (m), volume (m³) and thermal stretch of a point. Both vectors have
+/// three components.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Node([f64; 8]);
 
-/// First entry of a node's displacement.
+/// Index of the first component of the displacement in a node.
 const DISPLACEMENT: usize = 3;
 
-/// Entry of a node's volume.
+/// Index of the volume in a node.
 const VOLUME: usize = 6;
 
-/// Entry of a node's thermal stretch.
+/// Index of the thermal stretch in a node.
 const THERMAL_STRETCH: usize = 7;
 
-/// The nodes of the local points, at rest.
+/// Create the nodes of the local points, with zero displacements.
 pub fn nodes<const D: usize>(model: &Model<D>) -> Vec<Node> {
     let node = |point: usize| {
         let [x, y, z] = model.position(point);
@@ -52,7 +53,7 @@ pub fn update<const D: usize>(
     }
 }
 
-/// The local points, ghosts included, as a kernel reads them.
+/// The local points, including ghosts, in the form that a kernel reads.
 pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     nodes: &'a [Node],
     numbers: <K::Point as LaneTuple>::Columns<'a>,
@@ -60,7 +61,7 @@ pub struct ListPoints<'a, K: Kernel<D>, const D: usize> {
     rotations: ReadRotations<'a, K::Rotation>,
     limit: f64,
     is_linear: bool,
-    /// Some bonds have a thermal stretch that the kernel must not see.
+    /// Whether bonds have thermal stretches that must be removed.
     is_thermal: bool,
 }
 
@@ -85,10 +86,10 @@ pub struct PointI<P, R, const D: usize> {
 }
 
 impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
-    /// For a kernel that reads the points with local index below `reach`.
+    /// Prepare the points with local index below `reach` for a kernel.
     ///
     /// # Panics
-    /// When an array that the kernel reads does not reach so far.
+    /// If an array that the kernel reads is shorter than `reach`.
     pub fn new(
         kernel: &K,
         reach: usize,
@@ -177,10 +178,10 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         }
     }
 
-    /// The bonds of a group.
+    /// Load the bonds of a group.
     ///
     /// # Safety
-    /// The row must be one of a list with this reach.
+    /// The row must belong to a list with this reach.
     #[inline(always)]
     pub unsafe fn load<'h, S: Simd>(
         &self,
@@ -203,7 +204,7 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
         for component in &xi[1..] {
             square = simd.multiply_add(*component, *component, square);
         }
-        // 1/|ξ|² first: x needs the quotient only, so the root is off its dependency chain.
+        // Compute 1/|ξ|² first: x needs only the quotient, so the root is not on its dependency chain.
         let inverse_square = Lanes::splat(1.0) / square;
         let inverse = inverse_square.sqrt();
         let reference = Reference {
@@ -256,8 +257,8 @@ impl<'a, K: Kernel<D>, const D: usize> ListPoints<'a, K, D> {
     }
 }
 
-/// The history that bonds of a group keep for point i and for point j. A kernel that reads that of point i alone may have
-/// fewer numbers than are kept.
+/// Load the history of the bonds of a group for point i and for point j. A kernel that reads only the
+/// history of point i may read fewer numbers than are stored.
 #[inline(always)]
 pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 2] {
     if H::COUNT == 0 {
@@ -280,7 +281,7 @@ pub fn load_history<H: LaneTuple>(groups: &mut Groups<'_>, group: usize) -> [H; 
     [H::each(|k| all[k]), H::each(|k| all[H::COUNT + k])]
 }
 
-/// Stores the history of the intact bonds of a group.
+/// Store the history of the intact bonds of a group.
 #[inline(always)]
 pub fn store_history<H: LaneTuple>(all: &mut [Lanes], history: &[H; 2], intact: u8) {
     let of_each = if H::PADDED { all.len() / 2 } else { H::COUNT };

@@ -1,4 +1,4 @@
-//! What is seen of the bonds at set-up and for output, by column over the owned points.
+//! Quantities of the bonds for set-up and output, by column over the owned points.
 
 use std::ops::Range;
 
@@ -15,25 +15,25 @@ use super::kernel::Kernel;
 use super::measures;
 use super::sweep::{PointData, sweep, sweep_from};
 
-/// What the bonds of the owned points hold, by column over the points.
+/// Sums over the bonds of the owned points, by column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stored {
-    /// Strain energy density W, J/m³; empty where energies were not asked for.
+    /// Strain energy density W, J/m³; empty if energies were not requested.
     pub energy: Vec<f64>,
     /// Volume of the intact neighbours in the point's own family, m³.
     pub volume: Vec<f64>,
-    /// That volume times the share of its stiffness that each bond has lost, m³; empty where no law softens or where it
-    /// was not asked for.
+    /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³; empty if no law softens or
+    /// if it was not requested.
     pub softened: Vec<f64>,
-    /// Number of intact neighbours, those included that have the point in their family only.
+    /// Number of intact bonds, including those beyond the point's own horizon.
     pub neighbours: Vec<f64>,
-    /// Energy density that bonds have dissipated without breaking, J/m³; empty where no law can or energies
-    /// were not asked for.
+    /// Energy density that bonds have dissipated without breaking, J/m³; empty if no law dissipates or if
+    /// energies were not requested.
     pub dissipated: Vec<f64>,
 }
 
 impl<const D: usize> Forces<D> {
-    /// Columns of sums of a kernel over all bonds of the owned points.
+    /// Sum a kernel over all bonds of the owned points, by column.
     fn measure(
         &mut self,
         owned: usize,
@@ -45,13 +45,13 @@ impl<const D: usize> Forces<D> {
         sums
     }
 
-    /// What the bonds of each owned point hold, at the displacements of the last
+    /// Sum the quantities of [`Stored`] for each owned point, at the displacements of the last
     /// [evaluation](Self::evaluate).
     pub fn stored(&mut self, model: &Model<D>) -> Stored {
         self.stored_at(model, 0..model.owned())
     }
 
-    /// As [`Self::stored`], of some of the points: no part of those whose bonds are worked on together.
+    /// Same as [`Self::stored`], for a range of points that consists of whole lane groups.
     pub(super) fn stored_at(&mut self, model: &Model<D>, points: Range<usize>) -> Stored {
         let mut columns: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; points.len()]);
         self.for_each_interaction(|interaction, source| {
@@ -82,7 +82,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// As [`Self::stored`] without the energies, which are most of the work.
+    /// Same as [`Self::stored`] without the energies, which need most of the time.
     pub fn intact_families(&mut self, model: &Model<D>) -> Stored {
         let columns = self.measure(model.owned(), 2, |interaction, sums, source| {
             sweep_all(
@@ -102,7 +102,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// [`Stored::softened`].
+    /// Compute [`Stored::softened`].
     pub fn softened(&mut self, model: &Model<D>) -> Vec<f64> {
         if !self.blocks.iter().any(|block| block.law.softens::<D>()) {
             return Vec::new();
@@ -117,7 +117,7 @@ impl<const D: usize> Forces<D> {
         columns.swap_remove(0)
     }
 
-    /// D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.
+    /// Sum D = Σ V C n⊗n of each owned point (N/m⁴): columns xx, yy, zz, xy, yz, xz.
     pub fn stiffness(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let laws = interaction.laws.laws();
@@ -127,8 +127,8 @@ impl<const D: usize> Forces<D> {
         columns.try_into().expect("six columns")
     }
 
-    /// Stress of each owned point (Pa): columns xx, yy, zz, xy, yz, xz; at the displacements of the
-    /// last [evaluation](Self::evaluate).
+    /// Stress of each owned point (Pa), columns xx, yy, zz, xy, yz, xz, at the displacements of the last
+    /// [evaluation](Self::evaluate).
     pub fn stress(&mut self, model: &Model<D>) -> [Vec<f64>; 6] {
         let columns = self.measure(model.owned(), 6, |interaction, sums, source| {
             let [law, _] = interaction.laws.laws();
@@ -138,8 +138,8 @@ impl<const D: usize> Forces<D> {
         columns.try_into().expect("six columns")
     }
 
-    /// Kirchhoff stress across the plane of each owned point (Pa) in plane strain, at the displacements of the last
-    /// [evaluation](Self::evaluate) and the plastic state of each point; see [`Law::stress_across`].
+    /// Out-of-plane Kirchhoff stress of each owned point (Pa) in plane strain, at the displacements of the
+    /// last [evaluation](Self::evaluate) and the plastic state of each point; see [`Law::stress_across`].
     pub fn stress_across(
         &mut self,
         model: &Model<D>,
@@ -166,8 +166,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(across).collect()
     }
 
-    /// Stretch F_zz across the plane of an owned point in plane stress, at its deformation gradient and plastic state;
-    /// see [`Law::stretch_across`].
+    /// Out-of-plane stretch F_zz of an owned point in plane stress, at its deformation gradient and plastic
+    /// state; see [`Law::stretch_across`].
     pub fn stretch_across(
         &self,
         model: &Model<D>,
@@ -180,13 +180,13 @@ impl<const D: usize> Forces<D> {
         Law::<D>::stretch_across(law, &gradient, plastic)
     }
 
-    /// The deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
-    /// displacements of the last [evaluation](Self::evaluate); I where too few are left.
+    /// Deformation gradient F = I + (Σ ω η⊗ξ Ṽ) K⁻¹ of each owned point over its intact bonds, at the
+    /// displacements of the last [evaluation](Self::evaluate). F is I if too few bonds are intact.
     pub fn deformation_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
         self.gradient(model, false)
     }
 
-    /// As [`Self::deformation_gradient`], of bonds without their thermal stretch.
+    /// Same as [`Self::deformation_gradient`], from bonds without their thermal stretch.
     pub fn elastic_gradient(&mut self, model: &Model<D>) -> Vec<SMatrix<f64, D, D>> {
         self.gradient(model, true)
     }
@@ -211,7 +211,8 @@ impl<const D: usize> Forces<D> {
         (0..model.owned()).map(gradient).collect()
     }
 
-    /// 1 for each owned point whose bonds left are too few for its law, or too stiff, else 0.
+    /// Flag singular owned points with 1, others with 0. A point is singular if its intact bonds are too
+    /// few for its law, or too stiff.
     pub fn singular(&self, model: &Model<D>) -> Vec<f64> {
         let flag = |point| f64::from(u8::from(self.is_singular(model, point)));
         (0..model.owned()).map(flag).collect()
@@ -222,7 +223,7 @@ impl<const D: usize> Forces<D> {
         Law::<D>::is_singular(law, &self.numbers.of(point))
     }
 
-    /// Whether points of any law can be [singular](Self::singular); the same on all ranks.
+    /// Whether any law can have [singular](Self::singular) points; the same on all ranks.
     pub fn can_be_singular(&self) -> bool {
         self.blocks
             .iter()
@@ -256,7 +257,7 @@ impl<const D: usize> Forces<D> {
     }
 }
 
-/// Runs a kernel over all bonds between two blocks.
+/// Run a kernel over all bonds between two blocks.
 fn sweep_all<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     sums: &mut [Vec<f64>],

@@ -1,4 +1,4 @@
-//! What is summed over bonds at set-up and for output: volume, energy, stiffness, stress, dilatation.
+//! Kernels for set-up and output: volume, energy, stiffness, stress and dilatation.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
@@ -6,7 +6,7 @@ use crate::material::{AnyHistory, AnyLaw, AnyPoint, FamilyShare, Law, family_sha
 
 use super::kernel::{Group, Kernel};
 
-/// Compute every bond quantity; these kernels are not in the step loop.
+/// Request every bond quantity; these kernels are not in the step loop.
 const fn wanted(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -18,13 +18,13 @@ const fn wanted(linear: bool) -> Wanted {
 /// Sums of a point, by index:
 /// 0. strain energy density of its intact bonds, J/m³;
 /// 1. volume of the intact neighbours within its horizon, m³;
-/// 2. number of intact bonds, those beyond its own horizon included;
+/// 2. number of intact bonds, including those beyond its own horizon;
 /// 3. energy density that all bonds have dissipated without breaking, J/m³.
 #[derive(Clone, Copy)]
 pub struct Stored {
     /// The law of point i.
     pub law: AnyLaw,
-    /// Whether its bonds keep a history.
+    /// Whether bonds have a history.
     pub keeps_history: bool,
 }
 
@@ -65,8 +65,8 @@ impl<const D: usize> Kernel<D> for Stored {
     }
 }
 
-/// Sums the volume of the intact neighbours in each point's own family (m³), and their number as
-/// [`Stored`] does.
+/// Sum the volume of the intact neighbours within the horizon of point i (m³), and count the intact bonds
+/// as in [`Stored`].
 #[derive(Clone, Copy)]
 pub struct IntactFamilies;
 
@@ -76,7 +76,7 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     type Point = [Lanes; 0];
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // At every set-up, after every refinement, and for outputs.
+    // This kernel runs at every set-up, after every refinement, and for outputs.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const WANTED: Wanted = wanted(true);
 
@@ -91,8 +91,8 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
-/// Sums the volume of the intact neighbours in each point's own family (m³) times the share of its stiffness that the
-/// bond to them has lost.
+/// Sum over the intact neighbours within the horizon of point i: V_j times the fraction of its stiffness
+/// that bond ij has lost, m³.
 #[derive(Clone, Copy)]
 pub struct Softened {
     /// The law of point i.
@@ -118,7 +118,7 @@ impl<const D: usize> Kernel<D> for Softened {
 /// Entries of a symmetric tensor in the order xx, yy, zz, xy, yz, xz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// Adds the entries of a symmetric tensor of the intact bonds.
+/// Add the tensor entries of the intact bonds to a symmetric tensor.
 #[inline(always)]
 fn add_tensor<S: Simd, const D: usize>(
     simd: S,
@@ -133,11 +133,11 @@ fn add_tensor<S: Simd, const D: usize>(
     }
 }
 
-/// Sums D = Σ V C n⊗n over the intact bonds, undeformed (N/m⁴), as xx, yy, zz, xy, yz, xz; C adds up
-/// [`Law::stiffness`] of both ends.
+/// Sum D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy, zz, xy, yz,
+/// xz. C is the sum of [`Law::stiffness`] of both ends.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
-    /// Laws of the own and of the far end.
+    /// Laws of points i and j.
     pub laws: [AnyLaw; 2],
 }
 
@@ -147,7 +147,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
     type Point = AnyPoint;
     type BondHistory = [Lanes; 0];
     type Rotation = [Lanes; 0];
-    // At every set-up and after every refinement.
+    // This kernel runs at every set-up and after every refinement.
     const ISA_SET: IsaSet = IsaSet::Avx2;
     const ANY_LAW: bool = true;
     const WANTED: Wanted = wanted(false);
@@ -166,7 +166,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
         let xi = &group.bond.reference;
         let own = Law::<D>::stiffness(&self.laws[0], length, group.own) * group.weights.own();
         let far = Law::<D>::stiffness(&self.laws[1], length, &group.far) * group.weights.far();
-        // A law with `resists_across` has springs k I, another one k n⊗n.
+        // A law with `resists_across` has bond stiffness k I; any other law has k n⊗n.
         let [own_across, far_across] = self.laws.map(|law| Law::<D>::resists_across(&law));
         let none = Lanes::splat(0.0);
         let sum = |across: bool| {
@@ -183,14 +183,14 @@ impl<const D: usize> Kernel<D> for Stiffness {
     }
 }
 
-/// Sums the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
+/// Sum the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
 ///
-/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as
-/// Σ T⊗ξ Ṽ; times Fᵀ it is this, the Kirchhoff stress, symmetric and turning with the body. Linear
-/// laws have ξ in place of Y.
+/// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ.
+/// Multiplied by Fᵀ, it is this sum: the Kirchhoff stress, which is symmetric and rotates with the body.
+/// Linear laws use ξ in place of Y.
 #[derive(Clone, Copy)]
 pub struct Stress {
-    /// Law of the own end.
+    /// Law of point i.
     pub law: AnyLaw,
 }
 
@@ -219,7 +219,7 @@ impl<const D: usize> Kernel<D> for Stress {
 /// Sum of [`Law::bond_stress_across`] over the intact bonds, Pa.
 #[derive(Clone, Copy)]
 pub struct StressAcross {
-    /// Law of the own end.
+    /// Law of point i.
     pub law: AnyLaw,
 }
 
@@ -244,11 +244,11 @@ impl<const D: usize> Kernel<D> for StressAcross {
     }
 }
 
-/// Sums the tensors of the intact bonds of a point: the shape tensor Σ ω ξ⊗ξ Ṽ by diagonal and mixed
-/// entries, and Σ ω η⊗ξ Ṽ row by row, m⁵.
+/// Sum the tensors of the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ, diagonal entries first,
+/// and Σ ω η⊗ξ Ṽ row by row.
 #[derive(Clone, Copy)]
 pub struct FamilyTensors {
-    /// Leave thermal stretches out.
+    /// Exclude thermal stretches.
     pub is_elastic: bool,
 }
 
@@ -275,8 +275,8 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     }
 }
 
-/// Sums what gives the dilatation θ = (d/m) Σ ω|ξ|εṼ: the weighted volume m = Σ ω|ξ|²Ṽ of the whole
-/// family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵), with ε linear in η if so wanted.
+/// Sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of the whole family
+/// (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether ε is linear in η.

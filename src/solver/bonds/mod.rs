@@ -1,12 +1,12 @@
-//! Internal forces: sums over bonds in passes, with messages between them.
+//! Internal forces: sums over bonds in passes, with halo exchanges between them.
 //!
-//! A force evaluation is a list of passes, made once from the laws in use. Each is a sum over the
-//! bonds of every point; what it finds, the next one reads at the own end of bonds or at both. A
-//! pass begins with a message where it reads anew what other ranks find: first the displacements,
-//! then thresholds or numbers of points. Interior points are worked on while messages are in flight.
+//! A force evaluation is a list of passes, created once from the laws in use. Each pass is a sum over the
+//! bonds of every point. Later passes read its results at point i, or at both i and j. A pass begins with a
+//! halo exchange if it reads values that other ranks have changed: first the displacements, then thresholds
+//! or point numbers. Interior points are processed while messages are in flight.
 //!
-//! Bonds break where the forces are summed, by what the force states of both ends say. What follows for
-//! the numbers of points is then found anew where it changes: see `broken.rs`.
+//! Bonds break in the pass that sums the forces, by the force states of both ends. The point numbers that
+//! depend on broken bonds are then recomputed, see `broken.rs`.
 
 mod bond_inputs;
 mod broken;
@@ -54,21 +54,21 @@ pub use measure::Stored;
 pub use point_numbers::PlasticColumns;
 pub use saved::KeptBonds;
 
-/// Points whose sums over the undeformed family are held at once.
+/// Number of points whose sums over the undeformed family are in memory at once.
 const FAMILY_SUMS: usize = 1 << 16;
 
-/// One sum over the bonds.
+/// A sum over the bonds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Pass {
-    /// The smallest stretch of each point, which its threshold follows from.
+    /// Smallest stretch of each point; its threshold follows from it.
     SmallestStretch,
-    /// The sum of this number of the laws that have one.
+    /// The point sum with this index, for the laws that have one.
     PointSum(usize),
     /// The forces.
     Force,
 }
 
-/// Numbers that the laws of an interaction keep of a bond: as many for each end.
+/// Number of history values per bond and end for the laws of an interaction.
 fn history_width<const D: usize>(interaction: &Interaction) -> usize {
     let [i, j] = interaction.laws.laws();
     2 * i
@@ -77,7 +77,7 @@ fn history_width<const D: usize>(interaction: &Interaction) -> usize {
         .max(j.counts::<D>().bond_history)
 }
 
-/// An error if the numbers that laws keep of bonds do not fit in memory.
+/// Check that the bond history fits in memory.
 pub fn history_fits<const D: usize>(
     interactions: &[Interaction],
 ) -> std::result::Result<(), Fault> {
@@ -92,7 +92,7 @@ pub fn history_fits<const D: usize>(
     })
 }
 
-/// Strengths of the owned points over that of their blocks; empty without scatter.
+/// Strengths of the owned points relative to their blocks; empty without scatter.
 fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64> {
     if blocks.iter().all(|block| block.weibull.is_none()) {
         return Vec::new();
@@ -104,40 +104,41 @@ fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64>
     (0..model.owned()).into_par_iter().map(strength).collect()
 }
 
-/// The bonds of a rank and what it takes to sum over them.
+/// The bonds of a rank and the data for sums over them.
 pub struct Forces<const D: usize> {
     interactions: Vec<Interaction>,
     /// The laws of each block.
     blocks: Vec<BlockLaws>,
-    /// The points as lists of bonds read them; empty if there is no list.
+    /// Point data that list families read; empty if there is no list.
     nodes: Vec<Node>,
-    /// The points as lattices read them, by grid.
+    /// Point data that lattice families read, by grid.
     grids: Vec<GridValues<D>>,
     numbers: PointNumbers,
-    /// What criteria read of the local points.
+    /// Point data that failure criteria read.
     limits: LimitColumns,
-    /// Strengths of the owned points over that of their blocks; empty without scatter.
+    /// Strengths of the owned points relative to their blocks; empty without scatter.
     strength: Vec<f64>,
     /// The passes of a force evaluation.
     passes: Vec<Pass>,
     halo: Halo,
     instructions: Instructions,
-    /// Whether bonds of any law keep numbers; the same on all ranks.
+    /// Whether any law has a bond history; the same on all ranks.
     has_history: bool,
     /// Whether any bonds can break; the same on all ranks.
     breaks: bool,
     /// Whether points have thermal stretches; the same on all ranks.
     is_thermal: bool,
-    /// What came of bonds that broke in the last evaluation.
+    /// Changes by the bonds that broke in the last evaluation.
     broken: Vec<Broken<D>>,
 }
 
 impl<const D: usize> Forces<D> {
-    /// Puts together the bonds, the halo plan and the blocks' laws; `is_thermal` if points have thermal stretches. The
-    /// constants of the points are still to be [found](Self::find_constants). Collective.
+    /// Create the forces from the bonds, the halo plan and the blocks' laws. `is_thermal` says whether
+    /// points have thermal stretches. [`Self::find_constants`] must be called afterwards. Collective.
     ///
     /// # Errors
-    /// When the wish for [instructions](Instructions::of_all) is none; the same on all ranks.
+    /// If no instruction set has the [requested name](Instructions::of_all); the error is the same on all
+    /// ranks.
     pub fn new(
         comm: &dyn Communicator,
         model: &Model<D>,
@@ -188,8 +189,8 @@ impl<const D: usize> Forces<D> {
         })
     }
 
-    /// Finds the constants of the points from the intact bonds of their families: pre-cracks are cut before, and nothing
-    /// else is broken yet. Collective.
+    /// Compute the constants of the points from the intact bonds of their families. Call after pre-cracks
+    /// are cut and before other bonds break. Collective.
     pub fn find_constants(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let read = LimitsRead::by::<D>(&self.blocks);
         if read.thresholds && !self.passes.contains(&Pass::SmallestStretch) {
@@ -231,7 +232,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Finds the constants of some points: no part of those whose bonds are worked on together.
+    /// Compute the constants of a range of points that consists of whole lane groups.
     fn find_constants_of(&mut self, points: Range<usize>, model: &Model<D>) {
         let mut sums = vec![vec![0.0; points.len()]; MOST.reference_sum];
         self.for_each_interaction(|interaction, source| {
@@ -248,7 +249,7 @@ impl<const D: usize> Forces<D> {
         (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
     }
 
-    /// Sets the thresholds of the points, which no stretch changes. Collective.
+    /// Set the thresholds of the points that do not depend on a stretch. Collective.
     fn set_thresholds(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let Self {
             limits,
@@ -269,11 +270,11 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Calls `work` for all bonds between two blocks after one another.
+    /// Call `work` for the bonds of each pair of blocks in turn.
     fn for_each_interaction(&mut self, mut work: impl FnMut(&mut Interaction, PointData<'_, D>)) {
         let source = PointData {
             nodes: &self.nodes,
-            // Those beyond belong to owned points alone.
+            // Only owned points have the columns after these.
             numbers: &self.numbers.columns[..self.numbers.read],
             limits: &self.limits,
             grids: &self.grids,
@@ -285,12 +286,12 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Bonds of the rank's points, each counted from its end here, broken ones included.
+    /// Number of bonds of the owned points, including broken ones. A bond counts once per end on this rank.
     pub fn directed_bonds(&self) -> u64 {
         self.interactions.iter().map(|i| i.bonds.bonds()).sum()
     }
 
-    /// Those of [`Self::directed_bonds`] that are kept as lattices.
+    /// Number of [`Self::directed_bonds`] in lattice families.
     pub fn lattice_bonds(&self) -> u64 {
         let all = self.interactions.iter().map(|i| &i.bonds);
         all.filter(|bonds| matches!(bonds, BlockBonds::Lattice(_)))
@@ -298,28 +299,29 @@ impl<const D: usize> Forces<D> {
             .sum()
     }
 
-    /// The bonds of the rank's points from each block to each, counted from their ends here, broken ones
-    /// included.
+    /// Number of bonds of the owned points from each block to each block, including broken ones. A bond
+    /// counts once per end on this rank.
     pub fn bonds_of_blocks(&self) -> impl Iterator<Item = ([usize; 2], u64)> {
         let all = self.interactions.iter().map(|i| &i.bonds);
         all.map(|bonds| (bonds.blocks(), bonds.bonds()))
     }
 
-    /// Memory of the bonds and of what they read of the points, bytes.
+    /// Memory of the bonds and of the point data that they read, bytes.
     pub fn bytes(&self) -> usize {
         let bonds: usize = self.interactions.iter().map(|i| i.bonds.bytes()).sum();
         let grids: usize = self.grids.iter().map(GridValues::bytes).sum();
         bonds + size_of_val(&self.nodes[..]) + grids
     }
 
-    /// Frees the memory of the bonds and of what they read of the points; nothing can be evaluated then.
+    /// Free the memory of the bonds and of the point data that they read. No evaluation is possible
+    /// afterwards.
     pub fn release(&mut self) {
         self.interactions = Vec::new();
         self.nodes = Vec::new();
         self.grids = Vec::new();
     }
 
-    /// The owned points, one after the other, whose bonds are worked on together with those of one of them.
+    /// The lane group of a point: the range of owned points whose bonds are computed together.
     fn lane_group(&self, point: usize) -> Range<usize> {
         let bonds = self.interactions.iter().map(|it| &it.bonds);
         let together = bonds.map(|bonds| bonds.lane_group(point));
@@ -328,14 +330,14 @@ impl<const D: usize> Forces<D> {
         })
     }
 
-    /// Whether points of any law keep a plastic state; the same on all ranks.
+    /// Whether any law has a plastic state per point; the same on all ranks.
     pub fn has_plasticity(&self) -> bool {
         self.blocks
             .iter()
             .any(|block| Law::<D>::has_plasticity(&block.law))
     }
 
-    /// The vector instructions of the loops.
+    /// Instruction set of the loops.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
@@ -345,8 +347,8 @@ impl<const D: usize> Forces<D> {
         &self.halo
     }
 
-    /// Breaks the bonds for which `crosses` (of the two local indices) holds, of those points (by local index)
-    /// that are concerned.
+    /// Break the bonds for which `crosses` (of both local indices) is true. Only bonds of the given points
+    /// (by local index) are checked.
     pub fn cut(
         &mut self,
         concerned: impl Fn(usize) -> bool,
@@ -357,26 +359,26 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Calls `found` with the local indices of both ends of every intact bond of the owned points.
+    /// Call `found` with the local indices of both ends of every intact bond of the owned points.
     pub fn for_each_intact(&self, mut found: impl FnMut(usize, usize)) {
         for interaction in &self.interactions {
             interaction.bonds.for_each_intact(&mut found);
         }
     }
 
-    /// Calls `found` with the local index of every intact neighbour of an owned point.
+    /// Call `found` with the local index of every intact neighbour of an owned point.
     pub fn for_each_neighbour(&self, point: usize, mut found: impl FnMut(usize)) {
         for interaction in &self.interactions {
             interaction.bonds.for_each_neighbour(point, &mut found);
         }
     }
 
-    /// Whether bonds of any law keep numbers from step to step; the same on all ranks.
+    /// Whether any law has a bond history; the same on all ranks.
     pub fn has_history(&self) -> bool {
         self.has_history
     }
 
-    /// Calls `found` with the local indices of both ends of every broken bond of the owned points.
+    /// Call `found` with the local indices of both ends of every broken bond of the owned points.
     pub fn for_each_broken(&self, mut found: impl FnMut(usize, usize)) {
         for interaction in &self.interactions {
             interaction.bonds.for_each_broken(&mut found);
@@ -393,14 +395,14 @@ impl<const D: usize> Forces<D> {
         self.halo.update_ghosts(comm, columns);
     }
 
-    /// Brings the ghosts' displacements up to date.
+    /// Exchange the displacements of the ghosts.
     pub fn update_ghosts(&mut self, comm: &dyn Communicator, displacement: &mut [Vec<f64>; D]) {
         let mut components = displacement.each_mut().map(Vec::as_mut_slice);
         self.halo.update_ghosts(comm, &mut components);
     }
 
-    /// Makes those bonds unbreakable that join blocks for which `between` holds and have an end whose entry is 1; the
-    /// ghosts' entries are brought from their owners. `block` is that of the owned points. Collective.
+    /// Make bonds unbreakable if they join blocks for which `between` is true and an end has the entry 1.
+    /// The ghosts' entries are exchanged first. `block` gives the blocks of the owned points. Collective.
     pub fn protect(
         &mut self,
         comm: &dyn Communicator,

@@ -1,4 +1,4 @@
-//! The numbers of points that laws declare: how they follow from sums over bonds.
+//! The numbers of points that laws declare, and their computation from sums over bonds.
 
 use std::ops::Range;
 
@@ -13,28 +13,28 @@ use super::interaction::BlockLaws;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// Numbers of a point, at most.
+/// Maximum number of numbers of a point.
 pub const NUMBERS: usize = MOST.point + MOST.own;
 
-/// The first of the columns of the plastic state among those that a pass works on.
+/// Index of the first column of the plastic state among the columns of a pass.
 const PLASTIC: usize = NUMBERS + MOST.sum;
 
-/// Columns that a pass works on, at most: numbers, sums and plastic state.
+/// Maximum number of columns of a pass: numbers, sums and plastic state.
 const COLUMNS: usize = PLASTIC + PlasticState::COUNT;
 
-/// The columns of the plastic states of the owned points; empty where no law has any.
+/// Plastic states of the owned points by column; empty if no law has a plastic state.
 pub type PlasticColumns<'a> = [&'a mut [f64]; PlasticState::COUNT];
 
-/// The numbers of the local points by column: those that bonds read (of ghosts too), then those of a
-/// law alone (of owned points).
+/// Numbers of the local points by column: first those that bonds read (also of ghosts), then those that
+/// only a law reads (of owned points).
 pub struct PointNumbers {
-    /// By column; a law with fewer leaves the others at 0.
+    /// The numbers by column; columns that a law does not have are 0.
     pub columns: Vec<Column>,
-    /// How many columns bonds read.
+    /// Number of columns that bonds read.
     pub read: usize,
-    /// The first column that is found anew before each sum of forces.
+    /// Index of the first column that is recomputed before each force sum.
     pub first_changing: usize,
-    /// How many sums come before that of the forces.
+    /// Number of point sums before the force sum.
     pub passes: usize,
     /// Whether any law has constants.
     pub with_constants: bool,
@@ -43,7 +43,7 @@ pub struct PointNumbers {
 }
 
 impl PointNumbers {
-    /// For the laws of the blocks, the same on all ranks; all numbers are 0.
+    /// Allocate the numbers for the laws of the blocks, which are the same on all ranks. All numbers are 0.
     pub fn new<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Self {
         let counts: Vec<Counts> = blocks.iter().map(|b| b.law.counts::<D>()).collect();
         let most = |of: fn(&Counts) -> usize| counts.iter().map(of).max().unwrap_or(0);
@@ -65,8 +65,8 @@ impl PointNumbers {
         }
     }
 
-    /// Finds the constants of some owned points from sums over their whole families, by column, and their
-    /// [truncation factors](Law::truncation_factor), unless that column over all points is empty.
+    /// Compute the constants of some owned points from sums over their whole families, by column. Also
+    /// compute their [truncation factors](Law::truncation_factor), unless that column is empty.
     pub fn set_constants<const D: usize>(
         &mut self,
         points: Range<usize>,
@@ -83,7 +83,7 @@ impl PointNumbers {
             Law::<D>::constants(&law, sums, &mut numbers);
             (numbers, Law::<D>::truncation_factor(&law, sums))
         };
-        // Neighbours on a lattice mostly have equal families.
+        // Neighbours on a lattice usually have equal families.
         let found = points.clone().into_par_iter().with_min_len(CHUNK);
         let found = found.map_init(
             || None,
@@ -120,8 +120,8 @@ impl PointNumbers {
         std::array::from_fn(|k| get(k).copied().unwrap_or(0.0))
     }
 
-    /// Finds the rotations of some owned points from the sums of the first pass, by component; those of empty columns
-    /// are not wanted.
+    /// Compute the rotations of some owned points from the sums of the first pass, by component. Components
+    /// with empty columns are skipped.
     pub fn find_rotations<const D: usize>(
         &self,
         points: Range<usize>,
@@ -153,8 +153,8 @@ impl PointNumbers {
         });
     }
 
-    /// Finds the numbers of some owned points that follow from the sums of a pass. `keeps` says whether
-    /// plastic flow is for good.
+    /// Compute the numbers of some owned points that follow from the sums of a pass. `keeps` says whether
+    /// plastic flow is stored.
     pub fn finish<const D: usize>(
         &mut self,
         pass: usize,
@@ -207,8 +207,8 @@ impl PointNumbers {
     }
 }
 
-/// Calls `work` with parts of the columns, on all threads, and the points that they belong to; columns
-/// may be empty.
+/// Split the columns into parts, and call `work` with each part and its points on all threads. Columns may
+/// be empty.
 fn over_points<const N: usize>(
     points: Range<usize>,
     mut columns: [&mut [f64]; N],

@@ -1,4 +1,4 @@
-//! The sums over bonds that the numbers of points follow from.
+//! The sums over bonds from which the numbers of points are computed.
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use crate::material::bond::Wanted;
@@ -7,7 +7,7 @@ use crate::material::{AnyLaw, Law};
 use super::force::BondUpdate;
 use super::kernel::{Combine, Group, Kernel};
 
-/// Neither stretches nor forces.
+/// Request neither stretches nor forces.
 const fn extension_only(linear: bool) -> Wanted {
     Wanted {
         linear,
@@ -16,12 +16,12 @@ const fn extension_only(linear: bool) -> Wanted {
     }
 }
 
-/// Sums pass `N` of a law over the intact bonds.
+/// Sum pass `N` of a law over the intact bonds.
 #[derive(Clone, Copy)]
 pub struct PassSum<L, const N: usize> {
-    /// The law of the own end.
+    /// The law of point i.
     pub law: L,
-    /// Whether the history of bonds advances, as in the sum of the forces that follows.
+    /// Whether the bond history advances, as in the force sum that follows.
     pub bond_update: BondUpdate,
 }
 
@@ -56,7 +56,7 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
             .pass_contribution::<N>(&group.bond, group.own, &history);
         let weight = simd.keep(group.weighted_by_volume(Lanes::splat(1.0)), group.intact);
         for k in 0..L::Sum::COUNT {
-            // Length, stretch and direction of a bond that only fills up a group are not numbers.
+            // Lanes without a bond have no valid length, stretch or direction.
             let share = if L::SUM_READS_STRETCH || L::SUM_READS_DIRECTION {
                 simd.keep(share.get(k), group.intact)
             } else {
@@ -68,14 +68,14 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Sums over the bonds of the undeformed body what gives a point's constants: over the intact ones, without those that
-/// pre-cracks cut. A law that needs a shape tensor compares what is left of a family with all of it, so for such laws
-/// the cut bonds count, too.
+/// Sum the data for a point's constants over the undeformed family. The sum contains intact bonds only,
+/// without those that pre-cracks cut. A law with a shape tensor compares the intact family with the whole
+/// family, so for such laws the cut bonds count, too.
 #[derive(Clone, Copy)]
 pub struct FamilySum<const D: usize> {
     /// The law of point i.
     pub law: AnyLaw,
-    /// How many sums it has.
+    /// Number of sums.
     pub count: usize,
 }
 
@@ -117,8 +117,8 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     }
 }
 
-/// The smallest stretch s_min of the intact bonds of each point's own family, as x of
-/// [`crate::material::bond`]; +∞ where there is none.
+/// The smallest stretch s_min of the intact bonds within the horizon of each point, as x of
+/// [`crate::material::bond`]; +∞ if there is none.
 #[derive(Clone, Copy)]
 pub struct SmallestStretch;
 

@@ -1,15 +1,15 @@
-//! What is kept of the bonds: in checkpoints, and to undo a step.
+//! Copies of the bond state: for checkpoints, and to roll back a step.
 
 use crate::lanes::Lanes;
 
 use super::Forces;
 
-/// What bonds and energy were at the end of a step, to go back there.
+/// Bond state at the end of a step, for a rollback.
 #[derive(Debug, Default)]
 pub struct KeptBonds(Vec<(Vec<u8>, Vec<Lanes>)>);
 
 impl<const D: usize> Forces<D> {
-    /// How many bytes of a checkpoint the bonds of each owned point take.
+    /// Bytes of a checkpoint that the bonds of each owned point need.
     pub fn saved_lengths(&self, owned: usize) -> Vec<u32> {
         let mut lengths = vec![0; owned];
         for interaction in &self.interactions {
@@ -19,7 +19,7 @@ impl<const D: usize> Forces<D> {
         lengths
     }
 
-    /// What is kept of the bonds of all owned points, one after the other.
+    /// Serialize the bonds of all owned points in order.
     pub fn saved(&self, lengths: &[u32]) -> Vec<u8> {
         let (mut next, total) = starts(lengths);
         let mut bytes = vec![0; total];
@@ -29,7 +29,7 @@ impl<const D: usize> Forces<D> {
         bytes
     }
 
-    /// Puts back what [`Self::saved`] gave.
+    /// Restore the bonds from the bytes of [`Self::saved`].
     pub fn restore(&mut self, lengths: &[u32], bytes: &[u8]) {
         let (mut next, _) = starts(lengths);
         for interaction in &mut self.interactions {
@@ -37,7 +37,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Takes note of the bonds, for [`Self::undo`].
+    /// Copy the bond state for [`Self::undo`].
     pub fn keep(&self, kept: &mut KeptBonds) {
         kept.0
             .resize_with(self.interactions.len(), Default::default);
@@ -46,7 +46,7 @@ impl<const D: usize> Forces<D> {
         }
     }
 
-    /// Puts back the bonds that [`Self::keep`] took note of.
+    /// Restore the bond state that [`Self::keep`] copied.
     pub fn undo(&mut self, kept: &KeptBonds) {
         for (interaction, kept) in self.interactions.iter_mut().zip(&kept.0) {
             interaction.bonds.store_mut().undo(kept);
@@ -54,7 +54,7 @@ impl<const D: usize> Forces<D> {
     }
 }
 
-/// Where each point's bytes start, and how many there are in all.
+/// Offset of each point's bytes, and the total number of bytes.
 fn starts(lengths: &[u32]) -> (Vec<usize>, usize) {
     let mut end = 0;
     let starts = lengths

@@ -1,7 +1,7 @@
 //! Running a kernel over the bonds of two blocks, on all threads.
 //!
-//! A task owns some of the bonds and the results of their points, so there is no lock and no atomic;
-//! each point's sum is the same sequence of operations whatever the tasks are.
+//! Each task owns some of the bonds and the results of their points, so no locks or atomics are needed. The
+//! sum of each point is the same sequence of operations for any division into tasks.
 
 use std::ops::Range;
 
@@ -18,10 +18,10 @@ use super::kernel::{Combine, Kernel};
 use super::limit_columns::LimitColumns;
 use super::list_points::{ListPoints, Node, store_history};
 
-/// Bonds by groups of eight below which a task is not split further.
+/// Tasks with fewer groups of eight bonds are not split further.
 const LEAF: usize = 2048;
 
-/// As [`LEAF`], where the sums of one vector serve others of its task.
+/// Same as [`LEAF`], for kernels that reuse the sums of one vector for others of the task.
 const UNDEFORMED_LEAF: usize = 128 * LEAF;
 
 /// Cached bit patterns per task. Curved surfaces have many that never recur, so a full cache is cleared.
@@ -36,7 +36,7 @@ pub struct PointData<'a, const D: usize> {
     pub numbers: &'a [Column],
     /// Thresholds, truncation factors and rotations, for lists.
     pub limits: &'a LimitColumns,
-    /// All of these for lattices, by grid.
+    /// Point data for lattices (numbers, limits and geometry), by grid.
     pub grids: &'a [GridValues<D>],
     /// Points have thermal stretches.
     pub is_thermal: bool,
@@ -44,38 +44,38 @@ pub struct PointData<'a, const D: usize> {
     pub instructions: Instructions,
 }
 
-/// The columns of numbers of the points that a kernel adds to.
+/// The columns of point numbers that a kernel adds to.
 type Results<'a, K, const D: usize> = <<K as Kernel<D>>::Sums as LaneTuple>::ColumnsMut<'a>;
 
 /// Sums over the bonds of a point that break in a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct BrokenSums {
-    /// Its local index.
+    /// Local index of the point.
     pub point: usize,
     /// The sums; missing quantities are 0.
     pub sums: [f64; MAX_BROKEN_SUMS],
 }
 
-/// The most quantities of [`Kernel::Broken`].
+/// Maximum number of quantities of [`Kernel::Broken`].
 pub const MAX_BROKEN_SUMS: usize = 6;
 
-/// Part of the bonds of two blocks.
+/// A part of the bonds of two blocks.
 trait Part: Sized + Send {
     /// Number of rows or vectors.
     fn len(&self) -> usize;
 
-    /// Local index of the first point of one of them.
+    /// Local index of the first point of row or vector `k`.
     fn point(&self, k: usize) -> usize;
 
-    /// Those before one of them, and the rest.
+    /// Split before row or vector `k`.
     fn split_at(self, k: usize) -> (Self, Self);
 }
 
-/// A kernel with what it reads, for one kind of storage.
+/// A kernel with its input data, for one kind of storage.
 trait Runner<P: Part>: Sync {
     type Sums: LaneTuple;
 
-    /// Goes through a part; `base` is the local index of the first entry of the results.
+    /// Run the kernel over a part; `base` is the local index of the first entry of the results.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -84,15 +84,15 @@ trait Runner<P: Part>: Sync {
         results: <Self::Sums as LaneTuple>::ColumnsMut<'_>,
     ) -> Vec<BrokenSums>;
 
-    /// For which vector instructions it is compiled.
+    /// Instruction sets for which it is compiled.
     const ISA_SET: IsaSet;
 }
 
-/// Runs the kernel over the bonds of the owned points in a range of local indices. The results are
-/// columns over all owned points. Returns what bonds that break give, by ascending point.
+/// Run a kernel over the bonds of the owned points in a range of local indices. The results are columns
+/// over all owned points. Return the sums over breaking bonds, by ascending point.
 ///
 /// # Panics
-/// When an array that the kernel reads is too short for the bonds.
+/// If an array that the kernel reads is too short for the bonds.
 pub fn sweep<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
@@ -103,7 +103,7 @@ pub fn sweep<K: Kernel<D>, const D: usize>(
     sweep_from(bonds, points, 0, results, kernel, source)
 }
 
-/// As [`sweep`], with results that are columns over the owned points from `base` on.
+/// Same as [`sweep`], with results that are columns over the owned points from `base` on.
 pub fn sweep_from<K: Kernel<D>, const D: usize>(
     bonds: &mut BlockBonds,
     points: Range<usize>,
@@ -182,7 +182,7 @@ fn sweep_blocks<K: Kernel<D>, const D: usize>(
     }
 }
 
-/// Halves a part until a task is small.
+/// Halve a part until tasks are small, and run them.
 fn split<P: Part, R: Runner<P>>(
     part: P,
     base: usize,
@@ -214,10 +214,10 @@ fn split<P: Part, R: Runner<P>>(
     all
 }
 
-/// Half of the work of a task.
+/// A closure that runs half of a task.
 type Half<'a> = &'a mut (dyn FnMut(&mut Vec<BrokenSums>) + Send);
 
-/// Does both halves, on several threads if some are free; compiled once for all loops.
+/// Run both halves, in parallel if a thread is free. It is compiled once for all loops.
 fn both([first, second]: [Half<'_>; 2]) -> [Vec<BrokenSums>; 2] {
     let mut broken_sums = [Vec::new(), Vec::new()];
     let [of_first, of_second] = &mut broken_sums;
@@ -239,7 +239,7 @@ fn run<P: Part, R: Runner<P>>(
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512(simd) => {
             if const { R::ISA_SET.is_each() } {
-                // SAFETY: the machine has the instructions, as `simd` shows.
+                // SAFETY: `simd` proves that the CPU has these instructions.
                 unsafe { run_avx512(simd, part, base, results, runner) }
             } else {
                 // SAFETY: as above; AVX-512 has all of AVX2.
@@ -314,7 +314,7 @@ fn combine(combine: Combine, result: &mut f64, value: f64) {
     }
 }
 
-/// The sums over bonds that break, 0 for those that a kernel does not have.
+/// Return the sums over breaking bonds; quantities that the kernel does not have are 0.
 #[inline(always)]
 fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MAX_BROKEN_SUMS] {
     LaneTuple::each(|k| {
@@ -326,7 +326,7 @@ fn all_broken<N: LaneTuple>(broken: &N) -> [Lanes; MAX_BROKEN_SUMS] {
     })
 }
 
-/// Notes what comes of the bonds of a point that break.
+/// Record the sums over breaking bonds of a point.
 #[cold]
 #[inline(never)]
 fn note_point(broken_sums: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; MAX_BROKEN_SUMS]) {
@@ -334,7 +334,7 @@ fn note_point(broken_sums: &mut Vec<BrokenSums>, point: usize, broken: &[Lanes; 
     broken_sums.push(BrokenSums { point, sums });
 }
 
-/// Notes what comes of the bonds of eight adjacent points that break.
+/// Record the sums over breaking bonds of eight adjacent points.
 #[cold]
 #[inline(never)]
 fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes; MAX_BROKEN_SUMS]) {
@@ -347,14 +347,15 @@ fn note_vector(broken_sums: &mut Vec<BrokenSums>, first: usize, broken: &[Lanes;
     }
 }
 
-/// Vectors that skip the fast path after a failed attempt: large strains cluster.
+/// Number of vectors that skip the fast path after a failed attempt, because large strains cluster.
 const FAST_PATH_BACKOFF: usize = 7;
 
-/// Choice of the loop for the next vector. Lists have no fast path: there, loading points j takes the time.
+/// Choice of the loop for the next vector. Lists have no fast path, because loading points j dominates
+/// their time.
 struct FastPathGate {
-    /// The fast path is allowed.
+    /// Whether the fast path is allowed.
     is_allowed: bool,
-    /// Vectors left that skip it.
+    /// Number of vectors left that skip the fast path.
     skipped: usize,
 }
 
@@ -403,10 +404,11 @@ impl<N: LaneTuple> Known<N> {
     }
 }
 
-/// Sums over the bonds of a vector; `None` if one is beyond the series limit. Takes copies, which stay in registers.
+/// Sum over the bonds of a vector; `None` if a bond is beyond the series limit. The arguments are copies,
+/// which stay in registers.
 ///
 /// # Safety
-/// The vector must be one of the grid that `points` was made for.
+/// The vector must belong to the grid of `points`.
 #[inline(always)]
 unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     simd: S,
@@ -431,7 +433,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
 /// Sums over all bonds of a vector, with the bits of those that break.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    /// Made for the grid of the vector.
+    /// Points of the grid of the vector.
     points: GridPoints<'p, K, D>,
     /// The bits of all bonds, broken or not, if the kernel reads them.
     whole: Option<&'t [u8]>,
@@ -465,10 +467,10 @@ impl<K: Kernel<D>, const D: usize> Task for WholeVector<'_, '_, '_, K, D> {
     }
 }
 
-/// The sums over the bonds of a vector that break; clears their bits.
+/// Sums over the breaking bonds of a vector; it clears their intact bits.
 struct BrokenOfVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    /// Made for the grid of the vector.
+    /// Points of the grid of the vector.
     points: GridPoints<'p, K, D>,
     vector: &'t mut VectorBonds<'v>,
 }
@@ -492,10 +494,10 @@ impl<K: Kernel<D>, const D: usize> Task for BrokenOfVector<'_, '_, '_, K, D> {
     }
 }
 
-/// The sums over the bonds of a row that break; clears their bits.
+/// Sums over the breaking bonds of a row; it clears their intact bits.
 struct BrokenOfRow<'t, 'r, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
-    /// Made for the list of the row.
+    /// Points of the list of the row.
     points: ListPoints<'p, K, D>,
     row: &'t mut Row<'r>,
 }
@@ -542,7 +544,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
             let mut row: Row<'_> = rows.row(k);
             let mut sums = kernel.start();
             let mut gone = 0;
-            // SAFETY: the rows are those of the list whose reach `points` was made for.
+            // SAFETY: the rows belong to the list for whose reach `points` was made.
             let here = unsafe { points.load_point_i(row.point) };
             for group in 0..row.neighbours.len() {
                 // SAFETY: as above.
@@ -581,7 +583,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Rows<'b>> for OverRows<'_, K, D> {
 struct OverVectors<'a, K: Kernel<D>, const D: usize> {
     kernel: &'a K,
     points: GridPoints<'a, K, D>,
-    /// For kernels that want them, the bits of all vectors' bonds, broken or not.
+    /// For kernels that need them, the bits of all bonds of all vectors, broken or not.
     whole: Vec<u8>,
 }
 

@@ -12,11 +12,11 @@ use crate::solver::bonds::BondUpdate;
 /// Maximum number of bonds of a block, which takes some seconds.
 const MAX_BONDS: f64 = 1e6;
 
-/// Relative growth of the separation per step. Bonds break late by at most this; the overshoot energy is
+/// Relative growth of the separation per step. It limits how late bonds break. The overshoot energy is
 /// subtracted.
 const GROWTH: f64 = 0.01;
 
-/// First separation over that at which the first bond is expected to break.
+/// Ratio of the first separation to the one at which the first bond is expected to break.
 const START: f64 = 0.02;
 
 /// Maximum number of steps; blocks separate in far fewer.
@@ -28,14 +28,14 @@ const SLACK: f64 = 1e-9;
 /// Steps between checks of the bonds across the plane.
 const CHECK_INTERVAL: u32 = 20;
 
-/// The separation energy per area over the fracture energy, if the upper half moves at an angle (rad) to
-/// the normal of the plane.
+/// Compute the separation energy per area over the fracture energy. The upper half moves at an angle (rad)
+/// to the normal of the plane.
 ///
-/// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of
-/// bonds at breaking is subtracted.
+/// The normal is y (in 1D, x); the tangential part of the motion is along x. The overshoot energy of bonds
+/// at breaking is subtracted.
 ///
-/// `None` for a body without a fracture energy, for points from a file, for families that are too large,
-/// and for a body that does not separate.
+/// The result is `None` for a body without a fracture energy, for points from a file, for families that are
+/// too large, and for a body that does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;
@@ -44,7 +44,7 @@ pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Op
         DamageLaw::CriticalStretch(law) => law.critical,
         DamageLaw::BondEnergy(law) => law.stretch,
     };
-    // Large enough for complete families of the middle points and of their neighbours.
+    // The block is large enough for complete families of the middle points and of their neighbours.
     let cutoff = cutoffs(&block)[0];
     let dimension = problem.dimension.count();
     let normal = normal(dimension);
@@ -83,7 +83,7 @@ fn normal(dimension: usize) -> usize {
     usize::from(dimension > 1)
 }
 
-/// G0 of a body, J/m².
+/// Fracture energy G₀ of a body, J/m².
 fn fracture_energy(problem: &Problem, body: usize) -> Option<f64> {
     let body = &problem.bodies[body];
     let elastic = body.material.elastic;

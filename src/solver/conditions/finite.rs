@@ -1,4 +1,4 @@
-//! Whether loads, supports and initial values have a value at all their points.
+//! Check that loads, supports and initial values are finite at all of their points.
 
 use std::ops::Range;
 
@@ -14,11 +14,12 @@ use super::members;
 /// Subjects of messages on vectors.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
-/// An error if a condition has no finite value at one of its points at a time (s), or at the start an
-/// initial value. Collective.
+/// Check that every condition is finite at all of its points at a time (s), and every initial value at the
+/// start. Collective.
 ///
 /// # Errors
-/// Names the first such entry of the deck and its point with the smallest id; the same on all ranks.
+/// The message names the first entry of the deck that is not finite, and its point with the smallest id.
+/// The error is the same on all ranks.
 pub fn are_finite<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -75,7 +76,7 @@ pub fn are_finite<const D: usize>(
     Ok(())
 }
 
-/// Looks at the values of one entry after the other.
+/// Checks the entries of the deck one after the other.
 struct FiniteCheck<'a, const D: usize> {
     problem: &'a Problem,
     comm: &'a dyn Communicator,
@@ -84,7 +85,8 @@ struct FiniteCheck<'a, const D: usize> {
 }
 
 impl<const D: usize> FiniteCheck<'_, D> {
-    /// An error if the thermal stretch of a point of a set is -1 or less, which leaves its bonds no length.
+    /// Return an error if the thermal stretch of a point of a set is -1 or less: its bonds would have no
+    /// length.
     fn look_at_stretches(
         &self,
         key: &str,
@@ -122,7 +124,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
         Err(Error::input(message).at(place))
     }
 
-    /// An error if a component, times its factor, is not finite at a point of a set. `names` begin the message for each.
+    /// Return an error if a component, times its factor, is not finite at a point of a set. `names` are the
+    /// subjects of the messages.
     fn look<'e>(
         &self,
         key: &str,

@@ -8,10 +8,10 @@ use crate::solver::motion::Fields;
 
 use super::{members, not_empty};
 
-/// Sets the initial displacements and velocities.
+/// Set the initial displacements and velocities.
 ///
 /// # Errors
-/// On an empty set; the same on all ranks.
+/// If a set is empty; the error is the same on all ranks.
 pub fn apply_initials<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,

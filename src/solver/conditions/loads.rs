@@ -11,28 +11,28 @@ pub struct Load<const D: usize> {
     values: [Values; D],
     factors: [f64; D],
     now: [At; D],
-    /// Whether it is to be found on its points: it changes, or all are wanted.
+    /// Whether it must be computed: it changes with time, or all loads are requested.
     pub is_due: bool,
 }
 
-/// The points of a part that a load acts on.
+/// The points of a part on which a load acts.
 pub struct Loaded<const D: usize> {
-    /// Which load.
+    /// Index of the load.
     load: usize,
-    /// Their numbers in the part.
+    /// Indices of the points in the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
-    /// With which share they take part; wholly if there is none.
+    /// Fraction of each point on which the load acts; 1 for all points if there are none.
     shares: Option<Vec<f64>>,
-    /// Force density now, N/m³.
+    /// Present force density, N/m³.
     force: Vec<[f64; D]>,
-    /// Force density and place (m) before the step.
+    /// Force density (N/m³) and position (m) before the step.
     before: Vec<[f64; D]>,
     moved_from: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Load<D> {
-    /// Each component is its expression times its factor, N/m³.
+    /// Create a load. Each component is its expression times its factor, N/m³.
     pub fn new(values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
@@ -43,7 +43,7 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Gets ready for a time (s); `all`: also where nothing changes.
+    /// Prepare the load for a time (s). If `all`, a constant load is also computed.
     pub fn set_time(&mut self, time: f64, all: bool) {
         self.is_due = all || self.values.iter().any(|values| values.changes);
         if self.is_due {
@@ -51,14 +51,14 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// The force density (N/m³) on all of a point at a position (m).
+    /// Force density (N/m³) on a whole point at a position (m).
     fn on(&self, position: [f64; 3]) -> [f64; D] {
         std::array::from_fn(|d| self.factors[d] * self.values[d].of(&self.now[d], position))
     }
 }
 
 impl<const D: usize> Loaded<D> {
-    /// Of the load with this number, on the points with these numbers in the part.
+    /// Create the entry for the load with this index and the points with these indices in the part.
     pub fn new(
         load: usize,
         points: Vec<u16>,
@@ -77,7 +77,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Finds the force densities, if they are due.
+    /// Compute the force densities, if they are due.
     pub fn find(&mut self, loads: &[Load<D>]) {
         let load = &loads[self.load];
         if !load.is_due {
@@ -90,7 +90,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Takes the points out of the external forces.
+    /// Set the external forces of these points to 0.
     pub fn clear(&self, part: &mut Part<'_, D>) {
         for component in part.external_force.iter_mut().flatten() {
             for point in &self.points {
@@ -99,7 +99,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Adds the load to the external forces.
+    /// Add the load to the external forces.
     pub fn add(&self, part: &mut Part<'_, D>) {
         let components = part.external_force.iter_mut().flatten();
         for (d, component) in components.enumerate() {
@@ -109,8 +109,8 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Remembers force and place, for the work of the coming step, when the points of the part have these
-    /// displacements (m).
+    /// Store force density and position for the work of the next step. `displacement` (m) is that of the
+    /// points of the part.
     pub fn remember(&mut self, displacement: [&[f64]; D]) {
         self.before.copy_from_slice(&self.force);
         for (from, point) in self.moved_from.iter_mut().zip(&self.points) {
@@ -118,7 +118,7 @@ impl<const D: usize> Loaded<D> {
         }
     }
 
-    /// Add the work (J) of the loads.
+    /// Add the work (J) of the load.
     pub fn add_work(&self, part: &mut Part<'_, D>, kind: Work) {
         let Some([work]) = &mut part.external_work else {
             return;

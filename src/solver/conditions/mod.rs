@@ -24,17 +24,17 @@ use loads::{Load, Loaded};
 use supports::{Motion, Support, Supported};
 use temperatures::{Heated, Temperatures};
 
-/// Loads and supports, and this rank's points that they act on.
+/// Loads and supports, and the points of this rank on which they act.
 #[derive(Default)]
 pub struct Conditions<const D: usize> {
     loads: Vec<Load<D>>,
     supports: Vec<Support>,
     temperatures: Temperatures,
-    /// By part of the points.
+    /// Loads and supports on each part of the points.
     on_parts: Vec<OnPart<D>>,
 }
 
-/// What loads and supports act on in a part of the points, in the order of the deck.
+/// Points of a part on which loads and supports act, in the order of the deck.
 #[derive(Default)]
 pub struct OnPart<const D: usize> {
     loads: Vec<Loaded<D>>,
@@ -42,7 +42,7 @@ pub struct OnPart<const D: usize> {
     heated: Vec<Heated>,
 }
 
-/// Work of loads and supports from a state 0, which they remember, to the present state.
+/// Work of loads and supports from a stored state 0 to the present state.
 ///
 /// f is the force density of a load or a reaction, V the volume of a point. A load step in which bonds break has a first
 /// equilibrium 1 and a last equilibrium 2. From 0 to 1 the work is ½ (f₀ + f₁)·(u₁ − u₀) V. From 1 to 2 supports do not
@@ -58,13 +58,13 @@ pub enum Work {
     LastEquilibrium,
 }
 
-/// Loads and supports on a part of the points.
+/// Loads and supports on one part of the points.
 pub struct Here<'a, const D: usize> {
     all: All<'a, D>,
     on: &'a mut OnPart<D>,
 }
 
-/// Loads and supports, as all parts share them.
+/// Loads and supports that all parts share.
 #[derive(Clone, Copy)]
 pub struct All<'a, const D: usize> {
     loads: &'a [Load<D>],
@@ -85,8 +85,8 @@ pub fn members<const D: usize>(problem: &Problem, model: &Model<D>, set: usize) 
         .collect()
 }
 
-/// Local indices of the owned points that a load on a set acts on, and with which share where that can be less
-/// than all: so the sum of the load stays the same when the grid is refined.
+/// Local indices of the owned points on which a load on a set acts. Also the fraction of each point, if it
+/// can be below 1. With the fractions, the sum of the load does not change when the grid is refined.
 fn loaded<const D: usize>(
     problem: &Problem,
     model: &Model<D>,
@@ -97,7 +97,7 @@ fn loaded<const D: usize>(
         return (members(problem, model, set), None);
     }
     let mut shares = SetFractions::new(grids);
-    // Sets of a load are not given by ids here, see `is_possible`.
+    // Sets of a load are never given by ids here, see `is_possible`.
     let chosen = |body: usize, position: [f64; 3]| {
         set::contains(&problem.sets[set], problem.horizon, 0, position, body)
     };
@@ -110,10 +110,10 @@ fn loaded<const D: usize>(
     (points, Some(shares))
 }
 
-/// Local indices of the owned points that the result holds; `None` for all points. Collective.
+/// Local indices of the owned points that the result contains; `None` for all points. Collective.
 ///
 /// # Errors
-/// When the set of the result is empty; the same on all ranks.
+/// If the set of the result is empty; the error is the same on all ranks.
 pub fn output_members<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -127,7 +127,7 @@ pub fn output_members<const D: usize>(
     Ok(Some(points))
 }
 
-/// An input error if a set that something acts on has no points on any rank.
+/// Return an input error if a set of a condition has no points on any rank.
 pub fn not_empty(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -146,11 +146,11 @@ pub fn not_empty(
 }
 
 impl<const D: usize> Conditions<D> {
-    /// Finds the points of every condition that is `acting`. Where two supports prescribe the same
-    /// component of a point, the later one holds.
+    /// Find the points of every condition that is `acting`. If two supports prescribe the same component of
+    /// a point, the later one applies.
     ///
     /// # Errors
-    /// On an empty set; the same on all ranks.
+    /// If a set is empty; the error is the same on all ranks.
     pub fn new(
         problem: &Problem,
         comm: &dyn Communicator,
@@ -163,7 +163,7 @@ impl<const D: usize> Conditions<D> {
                 .collect(),
             ..Self::default()
         };
-        // The points of the supports, until all are known.
+        // The points of the supports, collected until all supports are known.
         let mut supported: Vec<Vec<u32>> = Vec::new();
         let of_deck = problem.conditions.iter().zip(acting);
         for (condition, _) in of_deck.filter(|(_, acting)| **acting) {
@@ -224,7 +224,7 @@ impl<const D: usize> Conditions<D> {
         Ok(conditions)
     }
 
-    /// Adds a load on some of the owned points, ascending, with their shares if it has them.
+    /// Add a load on some of the owned points, in ascending order, with their fractions if there are any.
     fn add_load(
         &mut self,
         model: &Model<D>,
@@ -253,30 +253,29 @@ impl<const D: usize> Conditions<D> {
         !self.supports.is_empty()
     }
 
-    /// Gets ready to put supported points in their place at `time` (s). `step` is the step just made (s), 0 at
-    /// the start.
+    /// Prepare the positions of supported points at `time` (s). `step` is the last step (s), 0 at the
+    /// start.
     pub fn set_places(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
             support.set_place(time, step);
         }
     }
 
-    /// Gets ready to find the external forces at `time` (s); those that do not change are found only where `all`
-    /// are wanted.
+    /// Prepare the external forces at `time` (s). Constant forces are computed only if `all`.
     pub fn set_loads(&mut self, time: f64, all: bool) {
         for load in &mut self.loads {
             load.set_time(time, all);
         }
     }
 
-    /// Gets ready to guide supported points at `time` (s). `step` is the time step (s).
+    /// Prepare the velocities of supported points at `time` (s). `step` is the time step (s).
     pub fn set_guidance(&mut self, time: f64, step: f64) {
         for support in &mut self.supports {
             support.set_guidance(time, step);
         }
     }
 
-    /// Prepare the temperatures of a time (s).
+    /// Prepare the temperatures at a time (s).
     pub fn set_temperatures(&mut self, time: f64) {
         self.temperatures.set_time(time);
     }
@@ -286,7 +285,7 @@ impl<const D: usize> Conditions<D> {
         self.temperatures.reset();
     }
 
-    /// What all parts share, and what each has.
+    /// Split into the data that all parts share, and the data of each part.
     pub fn by_part(&mut self) -> (All<'_, D>, &mut [OnPart<D>]) {
         let all = All {
             loads: &self.loads,
@@ -296,8 +295,8 @@ impl<const D: usize> Conditions<D> {
         (all, &mut self.on_parts)
     }
 
-    /// A column for each component over so many local points: 0 at owned points whose component a support
-    /// prescribes, else 1.
+    /// A column per component over `local` points: 0 at owned points whose component a support prescribes,
+    /// otherwise 1.
     pub fn free_components(&self, local: usize) -> [Vec<f64>; D] {
         let mut free = std::array::from_fn(|_| vec![1.0; local]);
         for (number, part) in self.on_parts.iter().enumerate() {
@@ -309,7 +308,7 @@ impl<const D: usize> Conditions<D> {
         free
     }
 
-    /// Sums the force of the supports on a set's points by component, N. `members` is sorted.
+    /// Sum the force of the supports on a set by component, N. `members` is sorted.
     pub fn reaction(&self, model: &Model<D>, fields: &Fields<D>, members: &[u32]) -> [ExactSum; D] {
         let mut sums = [const { ExactSum::ZERO }; D];
         let Some(reaction) = &fields.reaction else {
@@ -329,12 +328,13 @@ impl<const D: usize> Conditions<D> {
         sums
     }
 
-    /// Sums the kinetic energy, J, that loads and prescribed motions can give in a step (s) while the trapezoid rule
-    /// finds no work: that of loads acting for a step on points at rest, and that of supported components, whose velocity
-    /// and acceleration are prescribed.
+    /// Sum the kinetic energy, J, that loads and prescribed motions can add in a step (s) without work in
+    /// the trapezoidal rule. It has two parts: loads that act for one step on points at rest, and supported
+    /// components with prescribed velocity and acceleration.
     ///
-    /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇², so where the force density f of a point jumps, the energy
-    /// jumps by Δt² f²/8ρ. Internal forces are left out: in an unstable run they grow without bound.
+    /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density f of a point
+    /// jumps, the energy jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow without bound
+    /// in an unstable run.
     pub fn step_energy(&self, model: &Model<D>, fields: &Fields<D>, step: f64) -> ExactSum {
         let mut sum = ExactSum::ZERO;
         let kinetic = |point: usize, velocity: f64| {
@@ -360,12 +360,12 @@ impl<const D: usize> Conditions<D> {
     }
 }
 
-/// The part that an owned point is in.
+/// Index of the part that contains an owned point.
 fn part_of(point: u32) -> usize {
     point as usize / PART
 }
 
-/// The numbers in their part of owned points, and their positions (m).
+/// Indices of owned points in their part, and their positions (m).
 fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16>, Vec<[f64; 3]>) {
     let each = points.iter().map(|point| *point as usize);
     each.map(|point| ((point % PART) as u16, model.position(point)))
@@ -373,12 +373,12 @@ fn numbers_in_part<const D: usize>(model: &Model<D>, points: &[u32]) -> (Vec<u16
 }
 
 impl<'a, const D: usize> Here<'a, D> {
-    /// From what all parts share and what one has.
+    /// Combine the shared data with the data of one part.
     pub fn new(all: All<'a, D>, on: &'a mut OnPart<D>) -> Self {
         Self { all, on }
     }
 
-    /// Set temperature and thermal stretch of the points, if they have changed.
+    /// Set temperature and thermal stretch of the points, if temperatures have changed.
     pub fn apply_temperatures(&self, part: &mut Part<'_, D>) {
         self.all.temperatures.apply(&self.on.heated, part);
     }
@@ -388,7 +388,7 @@ impl<'a, const D: usize> Here<'a, D> {
         self.on.loads.is_empty() && self.on.supports.is_empty()
     }
 
-    /// Before the points move: remembers forces and places, for the work of the coming step.
+    /// Store forces and positions before the points move, for the work of the next step.
     pub fn before_moving(&mut self, part: &Part<'_, D>) {
         let displacement = part.displacement.each_ref().map(|column| &**column);
         let reaction = part.reaction.as_ref();
@@ -396,8 +396,8 @@ impl<'a, const D: usize> Here<'a, D> {
         self.remember(displacement, reaction);
     }
 
-    /// Remembers forces and places when the points of the part have these displacements (m) and supports exert
-    /// these reactions (N/m³).
+    /// Store forces and positions. The points of the part have these displacements (m) and reactions
+    /// (N/m³).
     pub fn remember(&mut self, displacement: [&[f64]; D], reaction: Option<[&[f64]; D]>) {
         for load in &mut self.on.loads {
             load.remember(displacement);
@@ -407,21 +407,21 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// After the points have moved: puts supported ones in their place.
+    /// After the points have moved, set the displacements of supported points.
     pub fn apply_displacements(&self, part: &mut Part<'_, D>) {
         for support in &self.on.supports {
             support.apply_displacements(self.all.supports, part);
         }
     }
 
-    /// Finds the forces of the loads that are due.
+    /// Compute the forces of the loads that are due.
     pub fn find_loads(&mut self) {
         for load in &mut self.on.loads {
             load.find(self.all.loads);
         }
     }
 
-    /// Finds the external forces, if any load is due.
+    /// Update the external forces, if any load is due.
     pub fn apply_loads(&mut self, part: &mut Part<'_, D>) {
         if !self.all.loads.iter().any(|load| load.is_due) {
             return;
@@ -435,7 +435,8 @@ impl<'a, const D: usize> Here<'a, D> {
         }
     }
 
-    /// Gives supported points their velocity, and finds the reactions. Returns whether all of that is finite.
+    /// Set the velocities of supported points, and compute the reactions. Returns whether all values are
+    /// finite.
     pub fn apply_velocities(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
@@ -444,8 +445,7 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Finds the reactions that keep supported points where they are, at rest. Returns whether they are
-    /// finite.
+    /// Compute the reactions that keep supported points at rest. Returns whether they are finite.
     pub fn project_residual(&self, part: &mut Part<'_, D>) -> bool {
         let mut finite = true;
         for support in &self.on.supports {
@@ -454,8 +454,8 @@ impl<'a, const D: usize> Here<'a, D> {
         finite
     }
 
-    /// Add the work of loads and supports since they were remembered, when forces and reactions are known at the
-    /// new place.
+    /// Add the work of loads and supports since the stored state. Forces and reactions must be those at the
+    /// present positions.
     pub fn add_work(&self, part: &mut Part<'_, D>, work: Work) {
         for load in &self.on.loads {
             load.add_work(part, work);

@@ -1,4 +1,4 @@
-//! Supports: prescribed motions, and the reactions that they take.
+//! Supports: prescribed motions and their reactions.
 
 use crate::expression::Expression;
 use crate::solver::motion::walk::Part;
@@ -6,7 +6,7 @@ use crate::solver::motion::walk::Part;
 use super::Work;
 use super::values::{At, Values};
 
-/// What a support prescribes.
+/// The quantity that a support prescribes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
     /// Displacement, m.
@@ -17,7 +17,7 @@ pub enum Motion {
 
 /// A prescribed component of motion.
 pub struct Support {
-    /// Which component.
+    /// Index of the component.
     pub component: usize,
     motion: Motion,
     values: Values,
@@ -25,36 +25,36 @@ pub struct Support {
     guidance: Guidance,
 }
 
-/// Where the points are put.
+/// Prescribed positions of the points.
 struct Place {
-    /// Length of the step just made, s; 0 at the start.
+    /// Length of the last step, s; 0 at the start.
     step: f64,
-    /// The values at its begin and its end.
+    /// The values at the beginning and the end of this step.
     values: [At; 2],
 }
 
-/// How the points move.
+/// Prescribed velocities of the points.
 struct Guidance {
     time: f64,
     step: f64,
-    /// Velocity (m/s) and acceleration (m/s²) of all points, if they have the same.
+    /// Velocity (m/s) and acceleration (m/s²), if they are the same for all points.
     same: Option<(f64, f64)>,
 }
 
-/// The points of a part that a support holds.
+/// The points of a part on which a support acts.
 pub struct Supported {
-    /// Which support.
+    /// Index of the support.
     support: usize,
-    /// Their numbers in the part.
+    /// Indices of the points in the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
-    /// Force density (N/m³) and place (m) before the step.
+    /// Force density (N/m³) and position (m) before the step.
     before: Vec<f64>,
     moved_from: Vec<f64>,
 }
 
 impl Support {
-    /// Prescribes a component of motion.
+    /// Create a support that prescribes a component of motion.
     pub fn new(component: usize, motion: Motion, value: &Expression) -> Self {
         let values = Values::new(value);
         let start = || values.at(0.0);
@@ -74,7 +74,7 @@ impl Support {
         }
     }
 
-    /// Gets ready to put points in their place at `time` (s). `step` is the step just made (s), 0 at the start.
+    /// Prepare the positions of points at `time` (s). `step` is the last step (s), 0 at the start.
     pub fn set_place(&mut self, time: f64, step: f64) {
         self.place = Place {
             step,
@@ -82,7 +82,7 @@ impl Support {
         };
     }
 
-    /// Gets ready to give points their velocity at `time` (s); `step` is the time step (s).
+    /// Prepare the velocities of points at `time` (s); `step` is the time step (s).
     pub fn set_guidance(&mut self, time: f64, step: f64) {
         let same = || self.moving([0.0; 3], time, step);
         self.guidance = Guidance {
@@ -92,10 +92,10 @@ impl Support {
         };
     }
 
-    /// The velocity (m/s) and the acceleration (m/s²) of a point at a position (m) that the Verlet scheme
-    /// makes at a time (s) with a step (s).
+    /// Velocity (m/s) and acceleration (m/s²) of a point at a position (m) in the Verlet scheme, at a time
+    /// (s) with a step (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
-        // Before the start the motion is extrapolated, and where it ends, as √(1 − t) does.
+        // Before the start, and where its expression ends, as √(1 − t) does, the motion is extrapolated.
         let change = |step: f64| self.values.expression.increment(position, time, step);
         let to_come = match change(step) {
             to_come if to_come.is_finite() || time < step => to_come,
@@ -120,7 +120,7 @@ impl Support {
 }
 
 impl Supported {
-    /// Of the support with this number, the points with these numbers in the part.
+    /// Create the entry for the support with this index and the points with these indices in the part.
     pub fn new(support: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
         Self {
             support,
@@ -131,13 +131,13 @@ impl Supported {
         }
     }
 
-    /// The component, and the numbers of the points in the part.
+    /// The component, and the indices of the points in the part.
     pub fn points<'a>(&'a self, supports: &[Support]) -> (usize, impl Iterator<Item = usize> + 'a) {
         let points = self.points.iter().map(|point| usize::from(*point));
         (supports[self.support].component, points)
     }
 
-    /// Remembers reaction (N/m³) and place, when the points of the part have these displacements (m).
+    /// Store reaction (N/m³) and position. The points of the part have these displacements (m).
     pub fn remember<const D: usize>(
         &mut self,
         supports: &[Support],
@@ -152,8 +152,7 @@ impl Supported {
         }
     }
 
-    /// After the points have moved: puts them in their place, and gives them their mean velocity in the step just
-    /// made.
+    /// After the points have moved, set their displacements, and their mean velocity in the last step.
     pub fn apply_displacements<const D: usize>(
         &self,
         supports: &[Support],
@@ -168,14 +167,14 @@ impl Supported {
             let place = &mut moving.displacement[point];
             match support.motion {
                 Motion::Displacement => *place = value(&at[1], k),
-                // The trapezoid rule, from where the points were before they drifted.
+                // Trapezoidal rule from the positions before the drift.
                 Motion::Velocity if *step > 0.0 => {
                     *place = self.moved_from[k];
                     for at in at {
                         *place += 0.5 * step * value(at, k);
                     }
                 }
-                // At the start the points are at their initial displacement.
+                // At the start, the points are at their initial displacement.
                 Motion::Velocity => {}
             }
             if *step > 0.0 {
@@ -184,8 +183,8 @@ impl Supported {
         }
     }
 
-    /// Gives the points their velocity, and finds the reactions: what must be added to the other forces so
-    /// that the Verlet scheme makes the prescribed motion. Returns whether all of that is finite.
+    /// Set the velocities of the points and compute the reactions, which together with the other forces
+    /// give the prescribed motion in the Verlet scheme. Returns whether all values are finite.
     pub fn apply_velocities<const D: usize>(
         &self,
         supports: &[Support],
@@ -201,19 +200,19 @@ impl Supported {
         })
     }
 
-    /// Finds the reactions that keep the points where they are, at rest. Returns whether they are
-    /// finite.
+    /// Compute the reactions that keep the points at rest. Returns whether they are finite.
     pub fn project_residual<const D: usize>(
         &self,
         supports: &[Support],
         part: &mut Part<'_, D>,
     ) -> bool {
-        // A reaction is then the force with its sign changed, that of 0 as well.
+        // With -0, the reaction is the force with the opposite sign, even for a force of 0.
         self.react(supports[self.support].component, part, |_, _| (0.0, -0.0))
     }
 
-    /// Gives the points their velocities, and finds the reactions with which the forces are those that are needed
-    /// (N/m³): both are `wanted` of a point, by its number here and in the part. Returns whether all is finite.
+    /// Set the velocities of the points, and compute the reactions that give the required total force
+    /// density (N/m³). `wanted` returns both for a point, given its index in this support and in the part.
+    /// Returns whether all values are finite.
     fn react<const D: usize>(
         &self,
         component: usize,

@@ -1,4 +1,4 @@
-//! Prescribed temperatures, and the thermal stretches that follow.
+//! Prescribed temperatures and the resulting thermal stretches.
 
 use crate::expression::Expression;
 use crate::solver::motion::walk::Part;
@@ -13,9 +13,9 @@ pub struct Temperature {
 
 /// The points of a part whose temperature is prescribed.
 pub struct Heated {
-    /// By which condition.
+    /// Index of the temperature condition.
     temperature: usize,
-    /// Their numbers in the part.
+    /// Indices of the points in the part.
     points: Vec<u16>,
     positions: Vec<[f64; 3]>,
 }
@@ -26,12 +26,12 @@ pub struct Temperatures {
     each: Vec<Temperature>,
     /// The time (s) of the last [`Self::set_time`].
     time: Option<f64>,
-    /// The points must be given their temperatures.
+    /// Whether the temperatures of the points must be set.
     is_due: bool,
 }
 
 impl Temperatures {
-    /// Add a temperature; returns its number.
+    /// Add a temperature; return its index.
     pub fn add(&mut self, value: &Expression) -> usize {
         let values = Values::new(value);
         self.each.push(Temperature {
@@ -41,8 +41,8 @@ impl Temperatures {
         self.each.len() - 1
     }
 
-    /// Prepare the temperatures of a time (s). The points are due at the first call, and when the time of changing
-    /// temperatures is new.
+    /// Prepare the temperatures at a time (s). The points are due at the first call. If temperatures
+    /// change, they are also due at each new time.
     pub fn set_time(&mut self, time: f64) {
         let is_new = self.time != Some(time);
         let changes = self.each.iter().any(|one| one.values.changes);
@@ -53,13 +53,13 @@ impl Temperatures {
         }
     }
 
-    /// Forget what the points have been given.
+    /// Make the points due again at the next call of [`Self::set_time`].
     pub fn reset(&mut self) {
         self.time = None;
     }
 
-    /// Set temperature and thermal stretch of the points of a part, if they are due: the reference temperature of the material
-    /// where no condition acts, else that of the last condition.
+    /// Set temperature and thermal stretch of the points of a part, if they are due. The last condition at
+    /// a point applies; without a condition, the point has the reference temperature of its material.
     pub fn apply<const D: usize>(&self, heated: &[Heated], part: &mut Part<'_, D>) {
         let (model, first) = (part.model, part.first);
         let (Some([temperature]), Some([stretch]), true) = (
@@ -80,14 +80,14 @@ impl Temperatures {
         }
         for (k, (stretch, value)) in stretch.iter_mut().zip(temperature.iter()).enumerate() {
             let free = model.expansion_of(first + k).stretch_at(*value);
-            // Not a number ends the run, whose message then names the temperature.
+            // NaN ends the run with a message that names the temperature.
             *stretch = if free > -1.0 { free } else { f64::NAN };
         }
     }
 }
 
 impl Heated {
-    /// By the condition with this number, the points with these numbers in the part.
+    /// Create the entry for the condition with this index and the points with these indices in the part.
     pub fn new(temperature: usize, points: Vec<u16>, positions: Vec<[f64; 3]>) -> Self {
         Self {
             temperature,

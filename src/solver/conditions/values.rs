@@ -2,20 +2,20 @@
 
 use crate::expression::{Expression, Variable};
 
-/// An expression, evaluated no more often than it can change.
+/// An expression that is evaluated only as often as it can change.
 pub struct Values {
     pub expression: Expression,
-    /// In time.
+    /// Whether it depends on time.
     pub changes: bool,
-    /// From point to point.
+    /// Whether it depends on the position.
     pub varies: bool,
 }
 
-/// The values at a time.
+/// The values at a given time.
 pub struct At {
-    /// s.
+    /// Time, s.
     time: f64,
-    /// That of all points, if they have the same.
+    /// Value of all points, if it is the same.
     same: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! What touches now, over all ranks: in all, and by pair of bodies.
+//! Global quantities of contact: totals over all ranks, and values per pair of bodies.
 
 use super::rigid::RigidState;
 use crate::comm::sum::{ExactSum, reduce};
@@ -10,38 +10,39 @@ use crate::solver::Simulation;
 pub struct ContactNow {
     /// Potential energy, J.
     pub energy: f64,
-    /// Energy taken by friction so far, J.
+    /// Energy dissipated by friction so far, J.
     pub friction: f64,
-    /// Energy taken by contact damping so far, J.
+    /// Energy dissipated by contact damping so far, J.
     pub damping: f64,
-    /// All pairs of points.
+    /// Contact of all pairs of points.
     pub all: Touching,
-    /// Those of each pair of bodies with a rule of its own.
+    /// Contact of each pair of bodies with its own rule.
     pub pairs: Vec<Touching>,
     /// Rigid bodies and their kinetic energies, J.
     pub rigid: Vec<(RigidState, f64)>,
 }
 
-/// The pairs of points that touch.
+/// Pairs of points in contact.
 #[derive(Debug, Clone, Default)]
 pub struct Touching {
-    /// Number of them.
+    /// Number of pairs.
     pub count: u64,
     /// The largest overlap, m.
     pub overlap: f64,
-    /// Force on the first of two bodies by component, N; friction and damping follow from the velocities at the full step.
+    /// Force on the first of two bodies by component, N. Friction and damping follow from the velocities at
+    /// the full step.
     pub force: Vec<f64>,
 }
 
 /// Sums of a pair of bodies on one rank.
 struct PairSum<const D: usize> {
-    /// Touches of owned points, so that a pair of points counts twice over all ranks.
+    /// Number of contacts of owned points. A pair of points counts twice over all ranks.
     count: u64,
     overlap: f64,
     force: [ExactSum; D],
 }
 
-/// Contact of a run at this moment; nothing where the run has none. Collective.
+/// Compute the present contact quantities; they are empty if the run has no contact. Collective.
 pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> ContactNow {
     let (comm, model, fields) = (simulation.comm, &simulation.model, &simulation.fields);
     let Some(contact) = &mut simulation.contact else {
@@ -55,7 +56,7 @@ pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Contac
         overlap: 0.0,
         force: [ExactSum::ZERO; D],
     };
-    // All, then each pair.
+    // The first entry is the total; one entry per pair of bodies follows.
     let mut sums: Vec<PairSum<D>> = (0..=bodies.len()).map(|_| new()).collect();
     for point in contact.open.iter().map(|point| *point as usize) {
         let body = simulation.problem.body_of(usize::from(model.block[point]));
@@ -123,7 +124,7 @@ pub fn contact_now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Contac
     }
 }
 
-/// The bodies of each pair with a rule of its own.
+/// The bodies of each pair with its own rule.
 fn bodies_of_pairs(problem: &Problem) -> Vec<[usize; 2]> {
     let index = |name: &String| problem.bodies.iter().position(|body| body.name == *name);
     let pairs = problem.contact.iter().flat_map(|contact| &contact.pairs);

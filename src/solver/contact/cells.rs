@@ -1,10 +1,9 @@
-//! Points in cells of present space, for the search of contact. Cells are hashed, so that a fragment may fly as far as
-//! it likes.
+//! Cells of present positions, for the contact search. Cells are hashed, so positions are not bounded.
 
-/// A cell by its coordinates; 0 beyond the dimension.
+/// Integer coordinates of a cell; 0 beyond the dimension.
 pub(super) type Cell = [i64; 3];
 
-/// The cell of a place (m), for cells with this edge (m).
+/// The cell of a position (m), for cells with this edge (m).
 pub(super) fn cell_of(place: [f64; 3], edge: f64) -> Cell {
     place.map(|x| (x / edge).floor() as i64)
 }
@@ -17,7 +16,7 @@ pub(super) fn hash(cell: Cell) -> u64 {
     })
 }
 
-/// The cells around a cell and itself, in a space of so many dimensions.
+/// The cell and its adjacent cells in this dimension.
 pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item = Cell> {
     (0..3_usize.pow(dimension as u32)).map(move |k| {
         let shift = [k % 3, k / 3 % 3, k / 9].map(|shift| shift as i64 - 1);
@@ -35,14 +34,14 @@ pub(super) fn neighbourhood(cell: Cell, dimension: usize) -> impl Iterator<Item 
 pub(super) struct Cells {
     edge: f64,
     dimension: usize,
-    /// Where the points of each bucket begin in `entries`.
+    /// Index of the first point of each bucket in `entries`.
     starts: Vec<u32>,
     /// Cell and index of each point.
     entries: Vec<(Cell, u32)>,
 }
 
 impl Cells {
-    /// Places (m) in cells of this edge (m).
+    /// Sort positions (m) into cells with this edge (m).
     pub fn new(places: &[[f64; 3]], edge: f64, dimension: usize) -> Self {
         let buckets = places.len().next_power_of_two();
         let mut starts = vec![0_u32; buckets + 1];
@@ -69,8 +68,8 @@ impl Cells {
         }
     }
 
-    /// Calls `visit` with the index of every point in the cell of a place (m) and in those around it: all within an edge
-    /// of the place are among them.
+    /// Call `visit` with the index of every point in the cell of a position (m) and in the adjacent cells.
+    /// These include all points within one edge of the position.
     pub fn near(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
         let mask = self.starts.len() - 2;
         for cell in neighbourhood(cell_of(place, self.edge), self.dimension) {

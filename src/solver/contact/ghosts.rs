@@ -1,8 +1,9 @@
-//! The ghosts of contact: points of other ranks that may touch own ones. They are not those of the bonds, for contact
-//! follows present positions.
+//! The ghosts of contact: points of other ranks that may touch owned points. They differ from the ghosts of
+//! the bonds, because contact depends on present positions.
 //!
-//! Any two ranks can meet. Each cell of present space has a home rank, found by its hash. It tells every rank with points
-//! in the cell which other ranks have points in the cell or next to it.
+//! Any two ranks can have contact. Each cell of present space has a home rank, which is found by the hash
+//! of the cell. The home rank informs every rank with points in the cell about the other ranks with points
+//! in this or an adjacent cell.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,16 +16,16 @@ use crate::solver::motion::Fields;
 
 use super::cells::{Cell, Cells, cell_of, hash, neighbourhood};
 
-/// Edge of a cell in reaches: few points are near a border then.
+/// Edge of a cell, in reaches. With large cells, few points are near a cell border.
 const CELL: f64 = 4.0;
 
-/// A point as other ranks see it.
+/// A point as it is sent to other ranks.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Ghost {
     /// Its id.
     pub id: u64,
-    /// Local index with its owner.
+    /// Local index on its owner.
     pub index: u64,
     /// Its block.
     pub block: u64,
@@ -36,22 +37,23 @@ pub(super) struct Ghost {
     pub place: [f64; 3],
 }
 
-/// The points of other ranks that may touch own ones, with their motion.
+/// The points of other ranks that may touch owned points, with their motion.
 #[derive(Default)]
 pub(super) struct Ghosts<const D: usize> {
     /// The points, sorted by owner and then by id.
     pub points: Vec<Ghost>,
     /// Edges of their cells, m.
     pub edges: Vec<f64>,
-    /// By component, m.
+    /// Displacements by component, m.
     pub displacement: Vec<Vec<f64>>,
-    /// By component, m/s.
+    /// Velocities by component, m/s.
     pub velocity: Vec<Vec<f64>>,
     halo: Halo,
 }
 
 impl<const D: usize> Ghosts<D> {
-    /// Those within `reach` (m) of own points; their motion is still to be brought. Collective.
+    /// Find the points of other ranks within `reach` (m) of owned points. [`Self::update`] must be called
+    /// to exchange their motion. Collective.
     pub fn within(
         comm: &dyn Communicator,
         dimension: Dimension,
@@ -70,7 +72,7 @@ impl<const D: usize> Ghosts<D> {
         }
     }
 
-    /// Brings their motion. Collective.
+    /// Exchange the motion of the ghosts. Collective.
     pub fn update(&mut self, comm: &dyn Communicator, fields: &Fields<D>) {
         let column = |k: usize| -> &[f64] {
             match k.checked_sub(D) {
@@ -85,16 +87,16 @@ impl<const D: usize> Ghosts<D> {
     }
 }
 
-/// A rank has points in a cell, or beside it.
+/// Message that a rank has points in a cell or in an adjacent one.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Claim {
     cell: Cell,
-    /// 1 where it has points in the cell.
+    /// 1 if it has points in the cell itself.
     inside: u64,
 }
 
-/// Another rank has points in a cell or beside it.
+/// Message that another rank has points in a cell or in an adjacent one.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Partner {
@@ -102,8 +104,8 @@ struct Partner {
     rank: u64,
 }
 
-/// The points of other ranks within `reach` (m) of own ones, in a space of so many dimensions, sorted by owner and then by
-/// id, and the plan by which values of them arrive, as many as `width` a point. Collective.
+/// Find the points of other ranks within `reach` (m) of owned points in this dimension, sorted by owner,
+/// then by id. Also return the plan of their exchange with `width` values per point. Collective.
 fn find(
     comm: &dyn Communicator,
     own: &[Ghost],
@@ -168,8 +170,8 @@ fn find(
     (found, halo)
 }
 
-/// For each other rank with points in or beside one of the cells that own points are in: the cell and the rank.
-/// Collective.
+/// For each cell with owned points, find the other ranks with points in this or an adjacent cell. Return
+/// pairs of cell and rank. Collective.
 fn partners(
     comm: &dyn Communicator,
     inside: &BTreeMap<Cell, Vec<u32>>,

@@ -1,14 +1,16 @@
 //! Contact: repulsion, friction and damping between points that no intact bond joins.
 //!
-//! Every owned point has a list of the points that may touch it before the next search, in ascending order of ids, so
-//! that its forces are summed in the same order on any ranks. The lists are rebuilt when a point has moved half a skin
-//! since the last search. A pair touches where it is nearer than its distance of contact, which is never more than its reference
-//! distance: a body at rest has no contact forces. The faces of cracks are points whose bond has broken.
+//! Every owned point has a list of the points that it may touch before the next search. The list is in
+//! ascending order of ids, so the order of the force sum does not depend on the ranks. The lists are
+//! rebuilt when a point has moved by half the skin since the last search. A pair touches if its distance is
+//! below its contact distance. The contact distance never exceeds the reference distance, so a body at rest
+//! has no contact forces. Crack faces consist of points whose bonds have broken.
 //!
-//! Rigid bodies repel all points. Every rank integrates all of them, from exact sums, so their states are identical.
+//! Rigid bodies repel all points. Every rank integrates all rigid bodies from exact sums, so their states
+//! are identical.
 //!
-//! Forces are those at the new positions; friction and damping are those of the velocities half a step before. Their work
-//! in a step is the trapezoid of both ends.
+//! Repulsion follows from the new positions. Friction and damping follow from the velocities half a step
+//! earlier. Their work in a step is computed by the trapezoidal rule.
 
 mod by_pair;
 mod cells;
@@ -48,22 +50,23 @@ pub use state::ContactState;
 /// Points handled by one task.
 const CHUNK: usize = 4096;
 
-/// Steps ahead: pairs that will touch within so many steps count as touching, so the step is shortened in time.
+/// Look-ahead, steps: pairs that will touch within this time already count in the stable step, so it is
+/// shortened in time.
 const LOOK_AHEAD: f64 = 2.0;
 
 /// Contact on one rank.
 pub struct Contact<const D: usize> {
     dimension: Dimension,
-    /// By block of both points; the same for both orders.
+    /// Rule of each pair of blocks, in both orders.
     rules: Vec<Option<PairRule>>,
     blocks: usize,
-    /// The largest distance at which any points touch, m.
+    /// Largest contact distance of any points, m.
     largest: f64,
-    /// Edge of a cell of each owned point's volume, m.
+    /// Edge of a cell with the volume of each owned point, m.
     edges: Vec<f64>,
     ghosts: Ghosts<D>,
     rigid: Vec<RigidBody>,
-    /// Owned points that touch a rigid body, now and at the last evaluation.
+    /// Owned points that touch a rigid body: at present, and at the last evaluation.
     at_rigid: [Vec<u32>; 2],
     rows: Rows,
     /// Owned points with a candidate that no bond joins to them.
@@ -71,61 +74,63 @@ pub struct Contact<const D: usize> {
     is_open: Vec<bool>,
     /// Displacements of the owned points at the last search, m.
     searched: [Vec<f64>; D],
-    /// The lists and their bonds must be rebuilt; equal on all ranks.
+    /// Whether the lists and their bonds must be rebuilt; the same on all ranks.
     is_stale: bool,
-    /// What contact demands of the step.
+    /// Limits that contact sets for the time step.
     demand: StepDemand,
-    /// Sum of the squares of the forces of rigid bodies on the owned points at the last evaluation, N².
+    /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N².
     rigid_forces: ExactSum,
-    /// Buffers of [`Self::add_forces`]: the points with forces, and these.
+    /// Buffers of [`Self::add_forces`]: the points with contact forces, and their forces.
     active: Vec<u32>,
     sums: Vec<PointSum<D>>,
 }
 
-/// When forces of contact are evaluated.
+/// Settings of a contact force evaluation.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactEvaluation {
-    /// In a relaxation nothing has a velocity, and what touches adds to the fictitious density.
+    /// In a relaxation there are no velocities, and contact adds to the fictitious density.
     pub is_quasi_static: bool,
     /// Set at the end of a step, or when a load step has reached equilibrium.
     pub end: Option<StepEnd>,
 }
 
-/// The end of a step.
+/// Time and steps at the end of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepEnd {
-    /// Its time, s.
+    /// Time, s.
     pub time: f64,
-    /// Length of the step, s; 0 at the start.
+    /// Length of this step, s; 0 at the start.
     pub step: f64,
-    /// Length of the next one, s.
+    /// Length of the next step, s.
     pub next: f64,
 }
 
 /// The contact forces on a point.
 #[derive(Clone, Copy)]
 struct PointSum<const D: usize> {
-    /// N.
+    /// Repulsion, N.
     repulsion: [f64; D],
-    /// N.
+    /// Damping, N.
     damping: [f64; D],
-    /// N.
+    /// Friction, N.
     friction: [f64; D],
-    /// What rigid bodies exert of all that, N.
+    /// Part of these forces that rigid bodies exert, N.
     of_rigid: [f64; D],
-    /// Its share of the potential energies, J.
+    /// Half of the potential energies of its contacts with points, and the whole of those with rigid
+    /// bodies, J.
     energy: f64,
-    /// Summed over what touches or will within two steps.
+    /// Contribution to the step limits, summed over contacts now and within the look-ahead.
     demand: Demand,
-    /// Whether it touches any point.
+    /// Whether the point touches anything.
     touches: bool,
 }
 
 impl<const D: usize> Contact<D> {
-    /// Contact of the points of a run with one another and with rigid bodies, if its deck asks for any. Collective.
+    /// Create the contact of the points with each other and with rigid bodies, if the deck has contact.
+    /// Collective.
     ///
     /// # Errors
-    /// When a point lies in a rigid body; the same on all ranks.
+    /// If a point lies in a rigid body; the error is the same on all ranks.
     pub fn new(
         problem: &Problem,
         comm: &dyn Communicator,
@@ -192,33 +197,33 @@ impl<const D: usize> Contact<D> {
         }))
     }
 
-    /// The rigid body, by index, whose motion is not finite, if there is one.
+    /// Index of a rigid body whose motion is not finite, if there is one.
     pub fn lost_rigid(&self) -> Option<usize> {
         self.rigid.iter().position(|rigid| !rigid.is_finite())
     }
 
-    /// Moves the rigid bodies on to a time (s) by a step (s).
+    /// Advance the rigid bodies to a time (s) by a step (s).
     pub fn drift(&mut self, time: f64, step: f64) {
         for rigid in &mut self.rigid {
             rigid.drift(time, step);
         }
     }
 
-    /// Puts driven rigid bodies in their places at a time (s), for the next load step of a relaxation.
+    /// Move driven rigid bodies to their positions at a time (s), for the next load step of a relaxation.
     pub fn place_rigid(&mut self, time: f64) {
         for rigid in &mut self.rigid {
             rigid.place(time);
         }
     }
 
-    /// Sum of the squares of the forces of rigid bodies on the owned points at the last evaluation, N².
+    /// Sum of the squared forces of rigid bodies on the owned points at the last evaluation, N².
     pub fn rigid_forces(&self) -> &ExactSum {
         &self.rigid_forces
     }
 
-    /// Adds the forces of contact at the present positions to the internal forces. At the end of a step, friction and
-    /// damping follow from the present velocities, their work is booked, and rigid bodies get their second half kick; else
-    /// they stay as they are. Collective.
+    /// Add the contact forces at the present positions to the internal forces. At the end of a step, update
+    /// friction and damping from the present velocities, book their work, and apply the second half kick of
+    /// rigid bodies. Otherwise, friction and damping do not change. Collective.
     pub fn add_forces(
         &mut self,
         comm: &dyn Communicator,
@@ -264,7 +269,7 @@ impl<const D: usize> Contact<D> {
             if let Some(StepEnd { step, .. }) = end {
                 fields.book_dissipation(point, volume, step, [friction, damping]);
             }
-            // A sum with 0 would change the sign of −0.
+            // Adding 0 would change the sign of −0.
             if sum.touches {
                 fields.add_contact(point, repulsion, sum.energy);
             } else {
@@ -284,7 +289,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Finds the owned points that have forces, or had some at the last evaluation.
+    /// Find the owned points that have contact forces now or had some at the last evaluation.
     fn find_active(
         &mut self,
         model: &Model<D>,
@@ -313,8 +318,9 @@ impl<const D: usize> Contact<D> {
         active.extend(&self.open);
     }
 
-    /// Sums what points exert on rigid bodies, ends their step, and finds what contact demands of the next one, of which
-    /// `largest` are the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the own points. Collective.
+    /// Sum the forces of points on rigid bodies, finish their step, and compute the limits for the next
+    /// step. `largest` contains the largest 2 Σ k/m (1/s²) and 2 Σ c/m (1/s) of the owned points.
+    /// Collective.
     fn close_step(
         &mut self,
         comm: &dyn Communicator,
@@ -329,7 +335,8 @@ impl<const D: usize> Contact<D> {
             [self.demand.stiffness, self.demand.damping] = largest;
             return;
         }
-        // Then the distance of the farthest point that touches each rigid body.
+        // The following entries are the largest distances of a touching point from the centre of each rigid
+        // body.
         let mut largest = vec![0.0; 2 + self.rigid.len()];
         (largest[0], largest[1]) = (stiffness, damping);
         let mut sums = Vec::new();
@@ -364,7 +371,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// A point by its index: owned points, then ghosts.
+    /// Data of a point by its index: owned points first, then ghosts.
     fn point(
         &self,
         model: &Model<D>,
@@ -406,8 +413,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Calls `visit` with an owned point, each point that may touch it, its block, and their rule, in ascending order of
-    /// ids.
+    /// Call `visit` for each point that may touch an owned point, in ascending order of ids. The arguments
+    /// are the owned point, the other point, its block, and their rule.
     fn for_each_candidate(
         &self,
         model: &Model<D>,
@@ -427,8 +434,8 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Calls `visit` with the block of each point that touches an owned one, and with what the owned one feels of it, in
-    /// ascending order of ids.
+    /// Call `visit` for each point that touches an owned point, in ascending order of ids. The arguments
+    /// are the block of the other point and the contact force on the owned point.
     fn for_each_touch(
         &self,
         model: &Model<D>,
@@ -443,7 +450,8 @@ impl<const D: usize> Contact<D> {
         });
     }
 
-    /// The contact forces on a point, and what they demand of a step if all that touches within a time (s) touches now.
+    /// Sum the contact forces on a point. The step limits also include contacts that will begin within a
+    /// time (s).
     fn point_sum(
         &self,
         model: &Model<D>,
@@ -463,7 +471,7 @@ impl<const D: usize> Contact<D> {
         self.for_each_candidate(model, fields, point, |here, there, _, rule| {
             sum.add_demand(rule.demand(here, there, look_ahead));
             if let Some(touch) = rule.touch(here, there) {
-                // The other half of its energy is the other point's.
+                // The other half of the energy belongs to the other point.
                 sum.add(&touch, 0.5);
             }
         });
@@ -485,7 +493,7 @@ impl<const D: usize> Contact<D> {
 }
 
 impl<const D: usize> PointSum<D> {
-    /// Adds what a pair does, of whose energy the point has a share.
+    /// Add the force of a contact, and the given fraction of its energy.
     fn add(&mut self, touch: &Touch<D>, share: f64) {
         for d in 0..D {
             self.repulsion[d] += touch.repulsion[d];

@@ -1,4 +1,4 @@
-//! The force between two points that touch.
+//! Contact force between two points.
 
 use std::f64::consts::PI;
 
@@ -6,13 +6,14 @@ use crate::dimension::Dimension;
 use crate::material::Pmb;
 use crate::problem::{Block, ContactModel, ContactRule};
 
-/// Points touch with short-range forces at this share of the sum of their half edges (Silling & Askari 2005, §5).
+/// Contact distance of short-range forces, as a fraction of the sum of the half edges of both points
+/// (Silling & Askari 2005, §5).
 const SHORT_RANGE: f64 = 1.35;
 
-/// Short-range forces act below this share of the reference distance at most.
+/// Upper limit of the contact distance of short-range forces, as a fraction of the reference distance.
 const SHORT_RANGE_OF_REFERENCE: f64 = 0.9;
 
-/// Short-range forces are so many times as stiff as the bonds of a bond-based law (Macek & Silling 2007).
+/// Stiffness of short-range forces relative to the bonds of a bond-based law (Macek & Silling 2007).
 const SHORT_RANGE_STIFFNESS: f64 = 15.0;
 
 /// Damping ratio of two points that stick by friction.
@@ -21,34 +22,35 @@ const STICKING: f64 = 0.5;
 /// Contact between points of two blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PairRule {
-    /// The points touch at this distance, m; at `edge_share` times the mean of their edges if not given.
+    /// Contact distance, m; if it is not given, `edge_share` times the mean of the edges of both points.
     radius: Option<f64>,
     edge_share: f64,
-    /// Points do not touch beyond this share of their reference distance, so no force acts at rest.
+    /// Upper limit of the contact distance as a fraction of the reference distance, so no force acts at
+    /// rest.
     reference_share: f64,
     stiffness: Stiffness,
     response: Response,
 }
 
-/// How forces follow from the overlap and the velocities of what touches.
+/// Rule for the forces from overlap and velocities.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Response {
     static_friction: f64,
     kinetic_friction: f64,
-    /// Damping ratio of the collision of two points.
+    /// Damping ratio of a collision of two points.
     damping_ratio: f64,
 }
 
 /// The stiffness of a pair of points, N/m.
 #[derive(Debug, Clone, Copy)]
 enum Stiffness {
-    /// This times ℓ^(D − 1), ℓ the mean edge (m): a layer of material between them.
+    /// Factor of ℓ^(D − 1) with the mean edge ℓ (m): a layer of material between the points.
     OfLayer(f64),
-    /// This (N/m⁷) times the volumes of both.
+    /// Factor (N/m⁷) of the product of both volumes.
     OfVolumes(f64),
 }
 
-/// What contact needs to know of a point.
+/// Data of a point that contact needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ContactPoint<const D: usize> {
     /// Reference position, m.
@@ -73,23 +75,23 @@ impl<const D: usize> ContactPoint<D> {
     }
 }
 
-/// A vector in space; components beyond the dimension are 0.
+/// Extend a vector to three components; those beyond the dimension are 0.
 pub(super) fn whole<const D: usize>(vector: [f64; D]) -> [f64; 3] {
     let mut whole = [0.0; 3];
     whole[..D].copy_from_slice(&vector);
     whole
 }
 
-/// What contact demands of the step: of a pair, or summed over those of a point.
+/// Contribution of a pair, or of all contacts of a point, to the limits of the time step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Demand {
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness: f64,
-    /// The larger coefficient of damping and of sticking, N s/m.
+    /// The larger of the coefficients of damping and of sticking, N s/m.
     pub damping: f64,
 }
 
-/// The force on a point that touches another one.
+/// The contact force between two points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch<const D: usize> {
     /// Repulsive force on the first point, N; it has the potential `energy`.
@@ -100,7 +102,7 @@ pub(super) struct Touch<const D: usize> {
     pub friction: [f64; D],
     /// Potential energy of the pair, J.
     pub energy: f64,
-    /// How much nearer the points are than where they begin to touch, m.
+    /// Contact distance minus present distance, m.
     pub overlap: f64,
 }
 
@@ -111,7 +113,7 @@ impl PairRule {
         let horizon = blocks[0].horizon.min(blocks[1].horizon);
         let (edge_share, reference_share, stiffness) = match rule.model {
             ContactModel::Penalty => {
-                // Half a horizon of each material, one after the other.
+                // Both materials act in series, each with a thickness of half a horizon.
                 let [first, second] = elastic.map(|elastic| elastic.youngs_modulus);
                 let series = 2.0 * first * second / (first + second);
                 let modulus = rule.stiffness.unwrap_or(series);
@@ -136,19 +138,19 @@ impl PairRule {
         }
     }
 
-    /// The largest distance (m) at which points with edges of at most `edge` (m) touch.
+    /// Largest contact distance (m) of points with edges of at most `edge` (m).
     pub fn largest_distance(&self, edge: f64) -> f64 {
         self.radius.unwrap_or(self.edge_share * edge)
     }
 
-    /// The distance (m) at which points with these edges (m) begin to touch, `reference` (m) apart at the start.
+    /// Contact distance (m) of points with these edges (m) and the reference distance `reference` (m).
     pub fn distance(&self, edges: [f64; 2], reference: f64) -> f64 {
         let distance = self.largest_distance(0.5 * (edges[0] + edges[1]));
         distance.min(self.reference_share * reference)
     }
 
-    /// How much nearer (m) two points are than where they begin to touch, how far apart (m), and the way from the first to
-    /// the second (m).
+    /// Return contact distance minus present distance (m), the present distance (m), and the vector from
+    /// the first to the second point (m).
     fn overlap<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -163,7 +165,7 @@ impl PairRule {
         (distance - apart, apart, place)
     }
 
-    /// The stiffness of a pair, N/m.
+    /// Contact stiffness of a pair, N/m.
     fn stiffness<const D: usize>(&self, first: &ContactPoint<D>, second: &ContactPoint<D>) -> f64 {
         match self.stiffness {
             Stiffness::OfLayer(layer) => {
@@ -174,7 +176,8 @@ impl PairRule {
         }
     }
 
-    /// What a pair demands of the step if it touches or will within a time (s), at the speed at which it approaches now.
+    /// Contribution of a pair to the step limits, if it touches, or will touch within a time (s) at its
+    /// present approach speed.
     pub fn demand<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -191,7 +194,8 @@ impl PairRule {
         })
     }
 
-    /// The contact force of the second point on the first, if they touch. Exchanging the points flips every sign exactly.
+    /// Contact force of the second point on the first, if they touch. Exchanging the points flips every
+    /// sign exactly.
     pub fn touch<const D: usize>(
         &self,
         first: &ContactPoint<D>,
@@ -213,7 +217,7 @@ impl PairRule {
 }
 
 impl Response {
-    /// Friction and damping of a rule.
+    /// Create the response from friction and damping of a rule.
     pub fn new(rule: &ContactRule) -> Self {
         Self {
             static_friction: rule.static_friction,
@@ -226,7 +230,7 @@ impl Response {
         self.static_friction > 0.0 || self.kinetic_friction > 0.0
     }
 
-    /// What a pair with this stiffness (N/m) and reduced mass (kg) demands of the step.
+    /// Contribution of a pair with this stiffness (N/m) and reduced mass (kg) to the step limits.
     pub fn demand(&self, stiffness: f64, mass: f64) -> Demand {
         let sticking = if self.is_rough() { STICKING } else { 0.0 };
         let ratio = sticking.max(self.damping_ratio);
@@ -236,8 +240,9 @@ impl Response {
         }
     }
 
-    /// The contact force for an overlap (m) and a stiffness (N/m). `normal` points from the point to what it touches,
-    /// `velocity` (m/s) is that of the point relative to it, `mass` the reduced mass of both, kg.
+    /// Contact force for an overlap (m) and a stiffness (N/m). `normal` points from the point towards the
+    /// other object, `velocity` (m/s) is the velocity of the point relative to it, and `mass` is the
+    /// reduced mass, kg.
     pub fn touch<const D: usize>(
         &self,
         stiffness: f64,
@@ -249,7 +254,7 @@ impl Response {
         let repulsion = stiffness * overlap;
         let critical = 2.0 * (stiffness * mass).sqrt();
         let approach = dot(velocity, normal);
-        // Damping never pulls.
+        // The total normal force is never attractive.
         let pressure = (repulsion + self.damping_ratio * critical * approach).max(0.0);
         let sliding: [f64; D] = std::array::from_fn(|d| velocity[d] - approach * normal[d]);
         let speed = norm(sliding);
@@ -279,7 +284,7 @@ impl Response {
     }
 }
 
-/// The damping ratio with which two points have this coefficient of restitution, above 0 and up to 1.
+/// Damping ratio of two points with this coefficient of restitution, which is above 0 and at most 1.
 fn damping_ratio(restitution: f64) -> f64 {
     if restitution == 1.0 {
         return 0.0;
@@ -288,7 +293,7 @@ fn damping_ratio(restitution: f64) -> f64 {
     while restitution_of(high) > restitution {
         high *= 2.0;
     }
-    // Halved until no number lies between them.
+    // Bisect until the interval contains no further number.
     for _ in 0..64 {
         let middle = 0.5 * (low + high);
         if restitution_of(middle) >= restitution {
@@ -300,7 +305,8 @@ fn damping_ratio(restitution: f64) -> f64 {
     low
 }
 
-/// The coefficient of restitution of a damped linear spring that never pulls (Schwager & Pöschel 2007, eq. 19 to 21).
+/// Coefficient of restitution of a damped linear spring without attraction (Schwager & Pöschel 2007, eq. 19
+/// to 21).
 fn restitution_of(ratio: f64) -> f64 {
     let root = (1.0 - ratio * ratio).abs().sqrt();
     if root < 1e-8 {
@@ -314,7 +320,7 @@ fn restitution_of(ratio: f64) -> f64 {
     libm::exp(-ratio / root * turned)
 }
 
-/// c of a bond-based law with this bulk modulus (Pa) and horizon (m), N/m⁶.
+/// Micromodulus c of a bond-based law with this bulk modulus (Pa) and horizon (m), N/m⁶.
 fn micromodulus(dimension: Dimension, modulus: f64, horizon: f64) -> f64 {
     let youngs_modulus = 3.0 * (1.0 - 2.0 * dimension.bond_based_poisson_ratio()) * modulus;
     Pmb::new(dimension, youngs_modulus, horizon).micromodulus

@@ -1,4 +1,4 @@
-//! A rigid body: its motion, and where points touch it.
+//! Rigid bodies: their motion, and their contact with points.
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -11,7 +11,7 @@ use crate::problem::{self, Block, RigidMotion};
 use super::pair::{ContactPoint, Demand, Response, Touch, whole};
 use super::shape::{distance, inertia};
 
-/// Numbers of a [`Wrench`].
+/// Number of components of a [`Wrench`].
 const WRENCH: usize = 6;
 
 /// A force (N) and its torque about the centre (N m).
@@ -21,28 +21,28 @@ type Wrench = [f64; WRENCH];
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RigidState {
-    /// Its centre, m.
+    /// Position of the centre, m.
     pub position: [f64; 3],
-    /// m/s; of a driven body the mean of the last step.
+    /// Velocity, m/s; for a driven body, the mean of the last step.
     pub velocity: [f64; 3],
-    /// From its axes to those of space: i, j, k, w.
+    /// Rotation from the body's axes to the space axes: quaternion i, j, k, w.
     pub rotation: [f64; 4],
-    /// kg m²/s.
+    /// Angular momentum, kg m²/s.
     pub angular_momentum: [f64; 3],
-    /// What points exert on it.
+    /// Contact force and torque of the points on the body.
     pub contact: Wrench,
-    /// The shares of friction and damping in that.
+    /// Parts of `contact` that come from friction and from damping.
     friction: Wrench,
     damping: Wrench,
-    /// Displacement since the last equilibrium, m; 0 but in a relaxation.
+    /// Displacement since the last equilibrium, m; 0 except in a relaxation.
     advance: [f64; 3],
     /// Prescribed force, N.
     load: [f64; 3],
-    /// Work done on it by its load, or by what drives it, J.
+    /// Work of its load or of its drive, J.
     pub work: f64,
-    /// What friction has taken of it, J; the rest has been taken of the points.
+    /// Energy that friction has taken from the body, J; the rest is taken from the points.
     pub friction_energy: f64,
-    /// As `friction_energy`, by contact damping.
+    /// Same as `friction_energy`, for contact damping.
     pub damping_energy: f64,
 }
 
@@ -50,22 +50,22 @@ pub struct RigidState {
 #[derive(Debug)]
 pub(super) struct RigidBody {
     problem: problem::Rigid,
-    /// Its centre at the start, m.
+    /// Position of the centre at the start, m.
     start: [f64; 3],
     dimension: Dimension,
     pub state: RigidState,
-    /// 0 for a driven one, kg.
+    /// Mass, kg; 0 for a driven body.
     mass: f64,
-    /// In its own axes, kg m², and its inverse.
+    /// Inertia in the body's axes, kg m², and its inverse.
     inertia: [Matrix3<f64>; 2],
     response: Response,
-    /// The modulus of its surface over the thickness of the layer, N/m³, by block.
+    /// Stiffness of the contact layer by block: modulus over thickness, N/m³.
     layers: Vec<f64>,
 }
 
-/// The sums of what points exert on a body.
+/// Sums of the forces and torques of points on a body.
 pub(super) struct WrenchSums {
-    /// Contact, friction, damping.
+    /// Sums of contact, friction and damping.
     sums: [[ExactSum; WRENCH]; 3],
 }
 
@@ -80,17 +80,17 @@ impl WrenchSums {
         self.sums.into_iter().flatten()
     }
 
-    /// How many sums there are.
+    /// Number of sums.
     pub const COUNT: usize = 3 * WRENCH;
 }
 
 impl RigidBody {
-    /// Its name and place in the deck.
+    /// The rigid body's definition in the deck.
     pub fn problem(&self) -> &problem::Rigid {
         &self.problem
     }
 
-    /// At the start of a run.
+    /// Create the body at the start of a run.
     pub fn new(problem: &problem::Rigid, dimension: Dimension, blocks: &[Block<'_>]) -> Self {
         let mut start = problem.centre;
         let (mass, velocity, spin) = match &problem.motion {
@@ -109,7 +109,7 @@ impl RigidBody {
         let moments = mass.max(f64::MIN_POSITIVE) * inertia(&problem.shape, dimension.count());
         let inverse = moments.try_inverse().unwrap_or_else(Matrix3::identity);
         let layer = |block: &Block<'_>| {
-            // Half a horizon of the points' material.
+            // Thickness of the layer: half a horizon of the points' material.
             let modulus = problem
                 .rule
                 .stiffness
@@ -140,7 +140,7 @@ impl RigidBody {
         )))
     }
 
-    /// The angular velocity (1/s) at the present angular momentum with this rotation.
+    /// Angular velocity (1/s) for the present angular momentum and this rotation.
     fn angular_velocity(&self, rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
         if self.mass == 0.0 {
             return Vector3::zeros();
@@ -159,7 +159,7 @@ impl RigidBody {
         0.5 * (self.mass * Vector3::from(self.state.velocity).norm_squared() + turning)
     }
 
-    /// Expressions of t at a time (s); 0 where there are none.
+    /// Values of expressions of t at a time (s); 0 if there are none.
     fn values(expressions: &[Expression], time: f64) -> [f64; 3] {
         std::array::from_fn(|d| {
             let value = expressions.get(d).map(|it| it.evaluate([0.0; 3], time));
@@ -167,7 +167,7 @@ impl RigidBody {
         })
     }
 
-    /// Moves on to a time (s) by a step (s), with half a kick before.
+    /// Apply half a kick, and advance to a time (s) by a step (s).
     pub fn drift(&mut self, time: f64, step: f64) {
         match &self.problem.motion {
             RigidMotion::Driven(displacement) => {
@@ -183,7 +183,7 @@ impl RigidBody {
                 for d in 0..3 {
                     self.state.position[d] += step * self.state.velocity[d];
                 }
-                // The midpoint rule: angular momentum stays, and so does energy to second order.
+                // The midpoint rule conserves angular momentum exactly, and energy to second order.
                 let rotation = self.rotation();
                 let middle = rotated(&rotation, self.angular_velocity(&rotation), 0.5 * step);
                 let new = rotated(&rotation, self.angular_velocity(&middle), step);
@@ -192,7 +192,7 @@ impl RigidBody {
         }
     }
 
-    /// Goes to the place of a driven body at a time (s), at rest: the next load step of a relaxation begins.
+    /// Move a driven body to its position at a time (s), at rest, for the next load step of a relaxation.
     pub fn place(&mut self, time: f64) {
         if let RigidMotion::Driven(displacement) = &self.problem.motion {
             let moved = Self::values(displacement, time);
@@ -215,15 +215,15 @@ impl RigidBody {
         }
     }
 
-    /// Ends a step (s) that has come to a time (s): stores what points exert, books its work, and makes the second half
-    /// kick.
+    /// Finish a step (s) that ends at a time (s): store the forces of the points, book their work, and
+    /// apply the second half kick.
     pub fn close_step(&mut self, sums: &[f64], time: f64, step: f64) {
         let wrench = |k: usize| -> Wrench { std::array::from_fn(|c| sums[k * WRENCH + c]) };
         let [contact, friction, damping] = [0, 1, 2].map(wrench);
         let spin = self.angular_velocity(&self.rotation());
         let state = &mut self.state;
         let velocity = [state.velocity, spin.into()].concat();
-        // The trapezoid of both ends of the step.
+        // Trapezoidal rule over the step.
         let work = |before: &Wrench, after: &Wrench| -> f64 {
             let powers = (0..WRENCH).map(|c| (before[c] + after[c]) * velocity[c]);
             0.5 * step * powers.sum::<f64>()
@@ -233,7 +233,7 @@ impl RigidBody {
         match &self.problem.motion {
             RigidMotion::Driven(_) => {
                 state.work -= work(&state.contact, &contact);
-                // In a relaxation there is no velocity; further equilibria of a load step have no advance.
+                // A relaxation has no velocities. Further equilibria of a load step have no advance.
                 for (d, advance) in state.advance.iter_mut().enumerate() {
                     let advance = std::mem::take(advance);
                     state.work -= 0.5 * (state.contact[d] + contact[d]) * advance;
@@ -258,8 +258,9 @@ impl RigidBody {
         (apart, rotation.transform_vector(&normal))
     }
 
-    /// How much nearer (m) a point is to the surface than where it begins to touch, and the normal there. It touches at half
-    /// the edge of its cell, or as near as it began.
+    /// Return contact distance minus present distance (m) of a point and the surface, and the normal there.
+    /// The contact distance is half the edge of the point's cell, or the distance at the start if that is
+    /// smaller.
     fn overlap<const D: usize>(&self, point: &ContactPoint<D>) -> (f64, Vector3<f64>) {
         let (apart, normal) = self.surface(point.place());
         let half = 0.5 * point.edge;
@@ -272,13 +273,13 @@ impl RigidBody {
         )
     }
 
-    /// How far (m) a place is from the surface at the start, negative inside.
+    /// Distance (m) of a position from the surface at the start; negative inside.
     pub fn start_distance(&self, place: [f64; 3]) -> f64 {
         let seen = Vector3::from(place) - Vector3::from(self.start);
         distance(&self.problem.shape, seen, self.dimension.count()).0
     }
 
-    /// What a point of a block feels of the body if it touches it.
+    /// Contact force of the body on a point of a block, if they touch.
     pub fn touch<const D: usize>(&self, block: usize, point: &ContactPoint<D>) -> Option<Touch<D>> {
         let (overlap, normal) = self.overlap(point);
         if overlap <= 0.0 {
@@ -290,7 +291,7 @@ impl RigidBody {
         let arm = Vector3::from(place) - Vector3::from(self.state.position);
         let surface = self.surface_velocity(arm);
         let relative = std::array::from_fn(|d| velocity[d] - surface[d]);
-        // Out of the point, as between points.
+        // The normal points out of the point, as for pairs of points.
         let normal = std::array::from_fn(|d| -normal[d]);
         Some(
             self.response
@@ -298,12 +299,12 @@ impl RigidBody {
         )
     }
 
-    /// How far a place (m) is from the centre, m.
+    /// Distance of a position (m) from the centre, m.
     pub fn arm(&self, place: [f64; 3]) -> f64 {
         (Vector3::from(place) - Vector3::from(self.state.position)).norm()
     }
 
-    /// Adds the opposite of what a point at a place (m) feels.
+    /// Add the reaction to the contact force on a point at a position (m) to the sums.
     pub fn add_opposite<const D: usize>(
         &self,
         sums: &mut WrenchSums,
@@ -324,8 +325,9 @@ impl RigidBody {
         }
     }
 
-    /// What a point demands of the step if it touches the body or will within a time (s), at the speed at which it
-    /// approaches now; only within an edge of its cell, so that most points need no velocity.
+    /// Contribution of a point to the step limits, if it touches the body or will touch it within a time
+    /// (s) at its present approach speed. Points farther away than an edge of their cell are skipped, so
+    /// most points need no velocity.
     pub fn demand<const D: usize>(
         &self,
         block: usize,
@@ -351,7 +353,7 @@ impl RigidBody {
         self.layers[block] * point.edge.powi(D as i32 - 1)
     }
 
-    /// The reduced mass of the body and a point, kg.
+    /// Reduced mass of the body and a point, kg.
     fn reduced(&self, mass: f64) -> f64 {
         if self.mass > 0.0 {
             mass * self.mass / (mass + self.mass)
@@ -360,13 +362,14 @@ impl RigidBody {
         }
     }
 
-    /// The velocity (m/s) of the surface at a place seen from the centre (m).
+    /// Velocity (m/s) of the surface at a position relative to the centre (m).
     fn surface_velocity(&self, arm: Vector3<f64>) -> Vector3<f64> {
         let spin = self.angular_velocity(&self.rotation());
         Vector3::from(self.state.velocity) + spin.cross(&arm)
     }
 
-    /// 1/m + r²/I at most, for points that touch it within a distance r (m) of its centre, 1/kg; 0 for a driven body.
+    /// Upper bound of 1/m + r²/I for points that touch the body within a distance r (m) of its centre,
+    /// 1/kg; 0 for a driven body.
     pub fn mobility(&self, reach: f64) -> f64 {
         if self.mass == 0.0 {
             return 0.0;
@@ -375,7 +378,7 @@ impl RigidBody {
         let largest = if self.dimension.count() == 2 {
             inverse[(2, 2)]
         } else {
-            // No eigenvalue is larger than the largest sum of a row.
+            // No eigenvalue exceeds the largest row sum.
             let rows = inverse
                 .row_iter()
                 .map(|row| row.iter().map(|entry| entry.abs()).sum::<f64>());
@@ -384,7 +387,7 @@ impl RigidBody {
         1.0 / self.mass + reach * reach * largest
     }
 
-    /// Whether all that is known of its motion is finite.
+    /// Whether all values of its state are finite.
     pub fn is_finite(&self) -> bool {
         let RigidState {
             position, velocity, ..
@@ -396,10 +399,10 @@ impl RigidBody {
     }
 }
 
-/// A rotation followed by that of an angular velocity (1/s) in a time (s).
+/// Rotate `rotation` further by an angular velocity (1/s) over a time (s).
 fn rotated(rotation: &UnitQuaternion<f64>, spin: Vector3<f64>, time: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * time * spin;
-    // (1 + ½ Δt ω) q: the angle is right to third order, and needs no sine.
+    // (1 + ½ Δt ω) q: the angle is accurate to third order, without a sine.
     let turn = Quaternion::from_parts(1.0, half);
     UnitQuaternion::new_normalize(turn * rotation.quaternion())
 }

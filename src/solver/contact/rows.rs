@@ -8,16 +8,16 @@ const CHUNK: usize = 1024;
 /// The points that may touch each owned point, in ascending order of ids.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    /// Where the pairs of each owned point begin.
+    /// Index of the first pair of each owned point.
     starts: Vec<usize>,
-    /// Index of the other point: owned points, then those of other ranks.
+    /// Index of the other point: owned points first, then those of other ranks.
     others: Vec<u32>,
     ids: Vec<u64>,
-    /// Whether an intact bond joins the pair: it does not touch then.
+    /// Whether an intact bond joins the pair; such a pair has no contact.
     is_bonded: Vec<bool>,
 }
 
-/// A pair that is searched for bonds.
+/// A pair found by the contact search.
 pub(super) struct FoundPair {
     /// Id of the other point.
     pub id: u64,
@@ -26,7 +26,7 @@ pub(super) struct FoundPair {
 }
 
 impl Rows {
-    /// The candidates of so many points, each found by `find`. All pairs start unbonded.
+    /// Create the rows of `points` points. `find` finds the candidates of each. All pairs start unbonded.
     pub fn new(points: usize, find: impl Fn(usize, &mut Vec<FoundPair>) + Sync) -> Self {
         let chunks = points.div_ceil(CHUNK);
         let chunks: Vec<(Vec<usize>, Vec<FoundPair>)> = (0..chunks)
@@ -58,7 +58,7 @@ impl Rows {
         rows
     }
 
-    /// The indices of the points that may touch an owned point: no bond joins them.
+    /// Indices of the points that may touch an owned point and that no bond joins to it.
     pub fn touching(&self, point: usize) -> impl Iterator<Item = usize> {
         let row = self.starts[point]..self.starts[point + 1];
         row.filter(|pair| !self.is_bonded[*pair])
@@ -76,7 +76,7 @@ impl Rows {
         self.starts[point] == self.starts[point + 1]
     }
 
-    /// Takes note that a bond joins an owned point to the point with this id.
+    /// Mark that a bond joins an owned point to the point with this id.
     pub fn set_bonded(&mut self, point: usize, id: u64) {
         let row = self.starts[point]..self.starts[point + 1];
         if let Ok(place) = self.ids[row.clone()].binary_search(&id) {
@@ -84,13 +84,13 @@ impl Rows {
         }
     }
 
-    /// Note that an owned point has no bond to any point of its row.
+    /// Mark that no bond joins an owned point to a point of its row.
     pub fn set_unbonded(&mut self, point: usize) {
         self.is_bonded[self.starts[point]..self.starts[point + 1]].fill(false);
     }
 
-    /// Takes over which pairs are bonded from earlier rows of the same points, and returns the points with pairs that were
-    /// not in them.
+    /// Copy the bonded flags from earlier rows of the same points. Return the points with pairs that were
+    /// not in the earlier rows.
     pub fn inherit(&mut self, earlier: &Self) -> Vec<usize> {
         let mut new = Vec::new();
         for point in 0..self.starts.len() - 1 {

@@ -1,4 +1,4 @@
-//! The search of the pairs that may touch, and of the bonds that keep them apart.
+//! The search of pairs that may touch, and of the bonds that exclude pairs from contact.
 
 use rayon::prelude::*;
 
@@ -12,12 +12,13 @@ use super::ghosts::{Ghost, Ghosts};
 use super::rows::{FoundPair, Rows};
 use super::{CHUNK, Contact};
 
-/// The distance that points may approach between two searches, as a share of the largest distance of contact: at rest, a
-/// row of a lattice holds the nearest neighbours only.
+/// Skin as a fraction of the largest contact distance: the distance by which points may approach between
+/// two searches. With this value, a row of a lattice at rest contains only the nearest neighbours.
 const SKIN: f64 = 0.4;
 
 impl<const D: usize> Contact<D> {
-    /// Searches if a point has moved half a skin. Returns whether all positions are finite on all ranks. Collective.
+    /// Repeat the search if a point has moved by half the skin. Returns whether all positions are finite on
+    /// all ranks. Collective.
     pub(super) fn search_where_due(
         &mut self,
         comm: &dyn Communicator,
@@ -56,7 +57,7 @@ impl<const D: usize> Contact<D> {
         true
     }
 
-    /// Finds the pairs that may touch before the next search. Collective.
+    /// Find the pairs that may touch before the next search. Collective.
     fn search(
         &mut self,
         comm: &dyn Communicator,
@@ -143,7 +144,8 @@ impl<const D: usize> Contact<D> {
         self.is_stale = false;
     }
 
-    /// Finds the bonds again of the points where some broke in the last evaluation of bonds, or were put back since.
+    /// Update the bonded flags of the points whose bonds broke in the last evaluation or were restored
+    /// since.
     pub(super) fn update_bonds(&mut self, model: &Model<D>, forces: &Forces<D>) {
         for broken in forces.broken() {
             let point = broken.point;
@@ -156,7 +158,7 @@ impl<const D: usize> Contact<D> {
     }
 }
 
-/// Finds which candidates of a point an intact bond joins to it.
+/// Find the candidates of a point that an intact bond joins to it.
 fn find_bonds<const D: usize>(rows: &mut Rows, model: &Model<D>, forces: &Forces<D>, point: usize) {
     if rows.is_empty(point) {
         return;

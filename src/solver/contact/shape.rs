@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::problem::RigidShape;
 
-/// Distance (m) of a place from the surface of a shape, negative inside, and the unit vector out of it there. The place is
-/// seen from the centre of the shape, with its axes, in so many dimensions.
+/// Return the distance (m) of a position from the surface of a shape, negative inside, and the outward unit
+/// normal there. The position is relative to the centre of the shape, in its axes and dimension.
 pub(super) fn distance(
     shape: &RigidShape,
     place: Vector3<f64>,
@@ -25,7 +25,7 @@ pub(super) fn distance(
             let along = place.dot(&axis);
             let across = place - along * axis;
             let length = across.norm();
-            // As of a box, in the plane of the axis and the place.
+            // Same as for a box, in the plane through the axis and the position.
             let beyond = [along.abs() - half_length, length - radius];
             let normals = [along.signum() * axis, direction(across, length)];
             outside(&beyond, &normals)
@@ -43,7 +43,7 @@ pub(super) fn distance(
     }
 }
 
-/// Distance and normal from the signed distances (m) to faces at right angles to one another.
+/// Distance and normal from the signed distances (m) to mutually perpendicular faces.
 fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     let faces = beyond.iter().zip(normals);
     let outer: Vector3<f64> = faces
@@ -60,7 +60,7 @@ fn outside(beyond: &[f64], normals: &[Vector3<f64>]) -> (f64, Vector3<f64>) {
     (*beyond, *normal)
 }
 
-/// The direction of a vector of this length; any one for 0.
+/// Direction of a vector of this length; arbitrary for length 0.
 fn direction(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     if length > 0.0 {
         vector / length
@@ -69,7 +69,7 @@ fn direction(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     }
 }
 
-/// The moments of inertia (m²) of a shape of mass 1 in so many dimensions; in the plane only that about z counts.
+/// Inertia tensor (m²) of a shape with mass 1 in this dimension. In 2D, only the moment about z is used.
 pub(super) fn inertia(shape: &RigidShape, dimension: usize) -> Matrix3<f64> {
     match shape {
         RigidShape::Ball { radius } => {
@@ -99,7 +99,7 @@ pub(super) fn inertia(shape: &RigidShape, dimension: usize) -> Matrix3<f64> {
                 square(0) + square(2),
                 square(0) + square(1),
             );
-            // A rectangle does not turn about its own axes.
+            // A rectangle does not rotate about its own axes.
             Matrix3::from_diagonal(&moments.map(|moment| if moment > 0.0 { moment } else { 1.0 }))
         }
         RigidShape::HalfSpace { .. } => Matrix3::identity(),
@@ -135,7 +135,8 @@ mod tests {
                 );
                 let (apart, normal) = distance(shape, place, 3);
                 assert!((normal.norm() - 1.0).abs() < 1e-12);
-                // The surface is there, and the distance falls by as much as one comes nearer.
+                // `surface` is on the surface, and moving by `apart` along the normal changes the distance
+                // by `apart`.
                 let surface = place - apart * normal;
                 assert!(
                     distance(shape, surface, 3).0.abs() < 1e-12,

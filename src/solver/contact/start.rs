@@ -1,4 +1,4 @@
-//! What must hold of contact at the start.
+//! Checks of contact at the start.
 
 use crate::comm::{Communicator, Found, least, total};
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use crate::solver::model::Model;
 use super::Contact;
 use super::rigid::RigidBody;
 
-/// An error if a point begins in a rigid body. Collective.
+/// Return an error if a point starts in a rigid body. Collective.
 pub(super) fn check_outside<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -42,7 +42,7 @@ pub(super) fn check_outside<const D: usize>(
     Ok(())
 }
 
-/// Pairs of points of different bodies that begin at the same position and therefore never touch.
+/// Pairs of points of different bodies that start at the same position and therefore never touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coincident {
     /// Number of pairs.
@@ -54,8 +54,8 @@ pub struct Coincident {
 }
 
 impl<const D: usize> Contact<D> {
-    /// The points of different bodies that begin at the same position, if there are any; the same on all ranks. To be
-    /// called before the first step. Collective.
+    /// Find the points of different bodies that start at the same position, if there are any; the result is
+    /// the same on all ranks. Call before the first step. Collective.
     pub fn coincident(
         &self,
         problem: &Problem,
@@ -80,7 +80,7 @@ impl<const D: usize> Contact<D> {
                 let own = usize::from(model.block[point]);
                 let coincide = position == model.position(point)
                     && problem.body_of(own) != problem.body_of(block);
-                // Each pair once.
+                // Count each pair once.
                 if !coincide || id < model.ids[point] {
                     continue;
                 }

@@ -1,4 +1,4 @@
-//! What contact demands of the step, and what of contact a checkpoint holds.
+//! The limits that contact sets for the time step, and the contact state in checkpoints.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -8,22 +8,24 @@ use crate::solver::model::Model;
 use super::Contact;
 use super::rigid::RigidState;
 
-/// Steps that could have been longer before they become so.
+/// Number of consecutive steps for which a longer step was possible, before the step is lengthened.
 const CALM: u64 = 100;
 
-/// What contact demands of the step, over all ranks and over what will touch within two steps.
+/// Limits that contact sets for the time step, over all ranks. They include contacts that will begin within
+/// two steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct StepDemand {
-    /// The largest 2 Σ k/m of a point or body, 1/s²: a bound of what contact adds to the squares of the frequencies.
+    /// Largest 2 Σ k/m of a point or rigid body, 1/s²: an upper bound of the contribution of contact to
+    /// squared frequencies.
     pub stiffness: f64,
-    /// The largest 2 Σ c/m, 1/s.
+    /// Largest 2 Σ c/m, 1/s.
     pub damping: f64,
-    /// Steps in a row that could have been longer.
+    /// Number of consecutive steps for which a longer step was possible.
     calm: u64,
 }
 
-/// What of contact changes besides the fields of the points; the same on all ranks.
+/// The contact state that is not in the fields of the points; the same on all ranks.
 #[derive(Debug, Clone, Default)]
 pub struct ContactState {
     rigid: Vec<RigidState>,
@@ -33,13 +35,14 @@ pub struct ContactState {
 }
 
 impl ContactState {
-    /// As a checkpoint holds it; points that touch rigid bodies are found again.
+    /// Encode the state for a checkpoint. Points that touch rigid bodies are not included, because they are
+    /// found again.
     pub fn words(&self) -> Vec<u64> {
         let demand = bytemuck::cast_slice(std::slice::from_ref(&self.demand));
         [demand, bytemuck::cast_slice(&self.rigid)].concat()
     }
 
-    /// What [`Self::words`] gave.
+    /// Decode the words of [`Self::words`].
     pub fn of_words(words: &[u64]) -> Self {
         let (demand, rigid) = words.split_at(size_of::<StepDemand>() / size_of::<u64>());
         Self {
@@ -51,7 +54,7 @@ impl ContactState {
 }
 
 impl<const D: usize> Contact<D> {
-    /// What of it changes besides the fields.
+    /// Copy the contact state that is not in the fields.
     pub fn state(&self) -> ContactState {
         ContactState {
             rigid: self.rigid.iter().map(|rigid| rigid.state).collect(),
@@ -60,13 +63,14 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Goes back to a state of the present points before the last step, whose bonds were put back.
+    /// Restore the state before the last step, for the same points. The bonds must have been restored
+    /// already.
     pub fn undo(&mut self, state: &ContactState, model: &Model<D>, forces: &Forces<D>) {
         self.set_state(state);
         self.update_bonds(model, forces);
     }
 
-    /// Goes back to a state of a checkpoint.
+    /// Restore the state of a checkpoint.
     pub fn restore(&mut self, state: &ContactState) {
         self.set_state(state);
         self.is_stale = true;
@@ -80,26 +84,26 @@ impl<const D: usize> Contact<D> {
         self.at_rigid[0].clone_from(&state.at_rigid);
     }
 
-    /// Whether anything touches or will soon.
+    /// Whether contact limits the step, now or soon.
     pub fn is_felt(&self) -> bool {
         self.demand.stiffness > 0.0
     }
 
-    /// Whether steps have been shorter than they must be for so long that they may become longer.
+    /// Whether a longer step has been possible for long enough to lengthen it.
     pub fn is_calm(&self) -> bool {
         self.demand.calm >= CALM
     }
 
-    /// The stable step (s) with contact as it is now, where it is `step` (s) without.
+    /// Stable step (s) with the present contact; `step` is the stable step without contact.
     ///
-    /// With damping at the velocities half a step before, Δt² ω² + 2 Δt C/m < 4 is stable.
+    /// With damping from the velocities half a step earlier, Δt² ω² + 2 Δt C/m < 4 is stable.
     pub fn stable_step(&self, step: f64) -> f64 {
         let square = 4.0 / (step * step) + self.demand.stiffness;
         let damping = self.demand.damping;
         ((damping * damping + 4.0 * square).sqrt() - damping) / square
     }
 
-    /// Counts the present step if it could have been longer.
+    /// Count the present step if it could have been longer.
     pub fn count_calm(&mut self, could_be_longer: bool) {
         self.demand.calm = if could_be_longer {
             self.demand.calm + 1
@@ -108,7 +112,7 @@ impl<const D: usize> Contact<D> {
         };
     }
 
-    /// Densities of the points were multiplied by a factor.
+    /// Scale the limits after the densities of the points were multiplied by a factor.
     pub fn scale_density(&mut self, factor: f64) {
         self.demand.stiffness /= factor.min(1.0);
         self.demand.damping /= factor.min(1.0);

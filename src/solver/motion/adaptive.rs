@@ -1,22 +1,23 @@
-//! The adaptive step: one in which too many bonds of a point break is undone and made again, shorter.
+//! Adaptive time step: a step in which too many bonds of a point break is rolled back and repeated with a
+//! shorter step.
 //!
-//! Willberg, Hesse & Heinecke 2022, §5. A bond that breaks sheds its load to others, which must feel it
-//! before they break themselves:
+//! Willberg, Hesse & Heinecke 2022, §5. A broken bond transfers its load to other bonds. These must carry
+//! it before they break themselves:
 //!
 //! ```text
 //! N_b > most broken, Δt > smallest        undo the step, Δt ← Δt · reduce
 //! N_b ≤ stable broken, so many steps      Δt ← Δt · raise, up to the largest
 //! ```
 //!
-//! N_b is the largest number of bonds of a point that break in a step, over all ranks, which therefore
-//! decide alike.
+//! N_b is the largest number of bonds of a point that break in a step, over all ranks. So all ranks make the
+//! same decision.
 
 use crate::problem::Adaptive;
 use crate::solver::Simulation;
 
 use super::integrator::Integrator;
 
-/// Steps that follow a rule.
+/// Verlet integrator with steps that follow this rule.
 pub struct AdaptiveVerlet(pub Adaptive);
 
 impl<const D: usize> Integrator<D> for AdaptiveVerlet {
@@ -26,33 +27,33 @@ impl<const D: usize> Integrator<D> for AdaptiveVerlet {
     }
 }
 
-/// How much longer than the step the rest of a stage may be to count as one.
+/// Relative tolerance: a step this much shorter than the rest of the stage still ends the stage.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
-/// What the rule remembers from step to step; the same on all ranks.
+/// State of the rule between steps; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StepControl {
-    /// Size that the rule wants, s.
+    /// Step that the rule requests, s.
     step: f64,
-    /// The smallest and the largest size, s.
+    /// Smallest and largest step, s.
     limits: [f64; 2],
-    /// Steps in a row in which few bonds broke.
+    /// Number of consecutive steps in which few bonds broke.
     calm: u64,
-    /// Steps undone so far.
+    /// Number of steps rolled back so far.
     pub undone: u64,
-    /// The largest number of bonds of a point that a step has broken since the last row of the history.
+    /// Largest number of bonds of one point that broke in one step since the last row of the history.
     pub most_broken: u64,
 }
 
 impl StepControl {
-    /// Begins a stage for which a step of this size (s) was chosen.
+    /// Start a stage with a chosen step (s).
     pub fn begin(&mut self, rule: &Adaptive, step: f64) {
         self.limits = rule.limits(step);
         self.step = step.min(self.limits[1]);
         self.calm = 0;
     }
 
-    /// All of it, as a checkpoint holds it.
+    /// Encode the state for a checkpoint.
     pub fn words(&self) -> [u64; 6] {
         let [smallest, largest] = self.limits.map(f64::to_bits);
         let counts = [self.calm, self.undone, self.most_broken];
@@ -60,7 +61,7 @@ impl StepControl {
         [step, smallest, largest, counts[0], counts[1], counts[2]]
     }
 
-    /// What [`Self::words`] gave.
+    /// Decode the words of [`Self::words`].
     pub fn of_words([step, smallest, largest, calm, undone, most_broken]: [u64; 6]) -> Self {
         Self {
             step: f64::from_bits(step),
@@ -71,8 +72,8 @@ impl StepControl {
         }
     }
 
-    /// Whether a step of this size (s) that broke so many bonds of a point is undone; the next one has
-    /// the size that the rule wants then.
+    /// Decide whether a step of this size (s) is rolled back, given the largest number of bonds of a point
+    /// that broke in it. Adjust the size of the next step.
     fn undoes(&mut self, rule: &Adaptive, size: f64, broken: u64) -> bool {
         let [smallest, largest] = self.limits;
         if broken > rule.most_broken && size > smallest {
@@ -96,12 +97,12 @@ impl StepControl {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Makes one step by the equation of motion, as short as the rule wants it. Collective.
+    /// Make one explicit step with the size that the rule requests. Collective.
     fn make_adaptive_step(&mut self, rule: &Adaptive) {
         let mut kept = std::mem::take(&mut self.kept);
         self.keep(&mut kept);
         loop {
-            // The stage ends where it must.
+            // The last step ends at the end of the stage.
             let left = self.clock.end() - self.clock.time();
             let felt = self.contact.as_ref().filter(|contact| contact.is_felt());
             let limit = felt.and_then(|_| self.contact_limit());

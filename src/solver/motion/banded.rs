@@ -1,22 +1,23 @@
-//! Symmetric matrices with a band, and their Cholesky factor.
+//! Symmetric band matrices and their Cholesky factor.
 
-/// Share of a diagonal entry below which its pivot is round-off.
+/// A pivot below this fraction of its diagonal entry is round-off.
 const SINGULAR: f64 = 1e-10;
 
-/// A symmetric, positive semidefinite matrix, or its Cholesky factor: the lower half of the band, row by row.
+/// A symmetric, positive semidefinite band matrix, or its Cholesky factor. The lower half of the band is
+/// stored by rows.
 #[derive(Debug, Clone, Default)]
 pub struct Banded {
     size: usize,
-    /// Entries of a row beside the diagonal.
+    /// Number of entries of a row left of the diagonal.
     band: usize,
     /// Rows of `band + 1` entries, the diagonal last.
     entries: Vec<f64>,
-    /// 1/L_ii of the factor; 0 where the pivot is round-off.
+    /// 1/L_ii of the factor; 0 if the pivot is round-off.
     inverse: Vec<f64>,
 }
 
 impl Banded {
-    /// Zero, of a size and with so many entries of a row beside the diagonal.
+    /// Create a zero matrix with `size` rows and `band` entries per row left of the diagonal.
     pub fn zero(size: usize, band: usize) -> Self {
         Self {
             size,
@@ -34,7 +35,7 @@ impl Banded {
     /// Add to an entry of the lower half.
     ///
     /// # Panics
-    /// Outside of the band.
+    /// If the entry is outside the band.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         assert!(
             column <= row && row - column <= self.band,
@@ -43,8 +44,8 @@ impl Banded {
         self.entries[row * (self.band + 1) + self.band + column - row] += value;
     }
 
-    /// Replace the matrix by its factor L, L Lᵀ = A. Rows whose pivot is round-off become 0: their unknowns are 0 in
-    /// [`Self::solve`], which is then a generalized inverse.
+    /// Replace the matrix A by its factor L, L Lᵀ = A. Rows whose pivot is round-off become 0. Their
+    /// unknowns are 0 in [`Self::solve`], which then applies a generalized inverse.
     pub fn factor(&mut self) {
         let width = self.band + 1;
         for row in 0..self.size {
@@ -54,7 +55,7 @@ impl Banded {
             let at = |column: usize| self.band + column - row;
             let diagonal = own[self.band];
             for column in first..row {
-                // The entries of both rows from where both have any up to this column.
+                // The range of columns, up to this one, in which both rows have entries.
                 let from = first.max(column.saturating_sub(self.band));
                 let other = &above[column * width..][..width];
                 let start = self.band + from - column;
@@ -109,7 +110,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Springs from each of `count` nodes to the next two, the first one held by `support`.
+    /// Springs from each of `count` nodes to the next two nodes; `support` holds the first node.
     fn chain(count: usize, support: f64) -> (Banded, Vec<Vec<f64>>) {
         let mut matrix = Banded::zero(count, 2);
         let mut full = vec![vec![0.0; count]; count];

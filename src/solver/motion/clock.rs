@@ -1,10 +1,10 @@
-//! The clock of a run: time, step, and how many steps have been made.
+//! The clock of a run: time, step and number of steps.
 
-/// Time moves in steps, the size of which may change; between changes it is a multiple of the step, so
-/// that rounding does not add up.
+/// Time, step and step count. The step may change. Between changes, time is a multiple of the step, so
+/// round-off does not accumulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
-    /// Time and number of the step since which the step has had its size.
+    /// Time (s) and step number at the last change of the step.
     since: (f64, u64),
     /// Time before the last step, s.
     before: f64,
@@ -14,7 +14,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// At time 0, with steps of `step` (s) until `end` (s).
+    /// Create a clock at time 0 with steps of `step` (s) until `end` (s).
     pub fn new(step: f64, end: f64) -> Self {
         Self {
             since: (0.0, 0),
@@ -25,13 +25,13 @@ impl Clock {
         }
     }
 
-    /// All of it but the end, as a checkpoint holds it.
+    /// Encode the clock, except its end, for a checkpoint.
     pub fn words(&self) -> [u64; 5] {
         let [since, before, step] = [self.since.0, self.before, self.step].map(f64::to_bits);
         [since, self.since.1, before, step, self.number]
     }
 
-    /// What [`Self::words`] gave, in a run that ends at `end` (s).
+    /// Decode the words of [`Self::words`] in a run that ends at `end` (s).
     pub fn of_words([since, at, before, step, number]: [u64; 5], end: f64) -> Self {
         let [since, before, step] = [since, before, step].map(f64::from_bits);
         Self {
@@ -43,7 +43,7 @@ impl Clock {
         }
     }
 
-    /// Time reached, s.
+    /// Present time, s.
     pub fn time(&self) -> f64 {
         let (time, number) = self.since;
         time + (self.number - number) as f64 * self.step
@@ -69,31 +69,31 @@ impl Clock {
         self.end
     }
 
-    /// Moves on by a step.
+    /// Advance by one step.
     pub fn advance(&mut self) {
         self.before = self.time();
         self.number += 1;
     }
 
-    /// Gives the steps from here on another size (s).
+    /// Change the step (s) from the present time on.
     pub fn set_step(&mut self, step: f64) {
         self.since = (self.time(), self.number);
         self.step = step;
     }
 
-    /// Go back to before the last step, and give the steps from there another size (s).
+    /// Return to the time before the last step, and change the step (s) from there on.
     pub fn retreat(&mut self, step: f64) {
         self.number -= 1;
         self.since = (self.before, self.number);
         self.step = step;
     }
 
-    /// Whether the next step has another size than the last one, or is the first.
+    /// Whether the next step differs in size from the last one, or is the first.
     pub fn is_new_size(&self) -> bool {
         self.number == self.since.1
     }
 
-    /// Goes on with steps of another size (s) until another end (s).
+    /// Continue with another step (s) until another end (s).
     pub fn set_stage(&mut self, step: f64, end: f64) {
         self.set_step(step);
         self.end = end;
@@ -111,7 +111,7 @@ impl Clock {
     }
 }
 
-/// The number of steps (s) that take a time (s), up to rounding; at least one.
+/// Number of steps (s) in a time (s), up to round-off; at least one.
 pub fn steps_to(time: f64, step: f64) -> f64 {
     let steps = time / step;
     let whole = if (steps - steps.round()).abs() < 1e-9 * steps {

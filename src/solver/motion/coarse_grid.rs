@@ -1,14 +1,15 @@
-//! The coarse grid of a preconditioner: what long waves of the displacement of a body need.
+//! The coarse grid of a preconditioner, for the long waves of the displacement of a body.
 //!
-//! A grid of box cells over all bodies, each edge at least a horizon long, has a displacement at each node and is
-//! linear along each axis within a cell. Its stiffness is that of the classical solid: a cell has the elastic constants of
-//! the points in it, weighted by their volume and by the share of their bonds that is intact. Supported components of
-//! points are springs at their place in the cell. A force on a point goes to the nodes of its cell (restriction), and
-//! displacements of nodes come back to the points (prolongation) with the same weights, so the preconditioner is
-//! symmetric.
+//! A grid of box cells covers all bodies. Each edge is at least one horizon long. Displacements are defined
+//! at the nodes and are linear along each axis within a cell. The stiffness is that of the classical solid.
+//! The elastic constants of a cell are averages over its points, weighted by volume and by the fraction of
+//! intact bonds. Supported components of points are springs at their position in the cell. Forces on points
+//! are distributed to the nodes of their cells (restriction). Displacements of nodes are interpolated to
+//! the points (prolongation) with the same weights, so the preconditioner is symmetric.
 //!
-//! Every rank has the whole grid, factors its matrix and solves with it; there are few nodes. Sums over points are
-//! [rounded](crate::comm::rounded_sum::Unit), hence the same on any ranks and threads.
+//! The grid has few nodes, so every rank stores the whole grid, factors its matrix and solves with it. Sums
+//! over points are [rounded](crate::comm::rounded_sum::Unit) and therefore do not depend on the number of
+//! ranks and threads.
 
 use std::ops::Range;
 
@@ -21,40 +22,40 @@ use crate::solver::model::Model;
 use super::banded::Banded;
 use super::load_step::CHUNK;
 
-/// The shortest edge of a cell, horizons.
+/// Minimum edge of a cell, horizons.
 const EDGE: f64 = 1.0;
 
 /// The factor by which edges grow until the matrix is small enough.
 const GROWTH: f64 = 1.1;
 
-/// Multiply-adds of a solution for each point: about those of a force evaluation of few bonds.
+/// Multiply-adds of a solution per point: about as many as a force evaluation with few bonds needs.
 const SOLUTION: f64 = 16.0;
 
-/// Multiply-adds of a solution that any body may have.
+/// Multiply-adds of a solution that are allowed for a body of any size.
 const LEAST_SOLUTION: f64 = 2e4;
 
-/// Most multiply-adds of the factorization.
+/// Maximum number of multiply-adds of the factorization.
 const FACTORIZATION: f64 = 2e8;
 
-/// The nodes of a cell at most.
+/// Maximum number of nodes of a cell.
 const CORNERS: usize = 8;
 
-/// Pairs of nodes of a cell at most.
+/// Maximum number of pairs of nodes of a cell.
 const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 
-/// The grid with the factor of its stiffness.
+/// The grid, and the factor of its stiffness matrix.
 pub struct CoarseGrid<const D: usize> {
     lower: [f64; D],
-    /// Cells for each m, by axis.
+    /// Cells per length along each axis, 1/m.
     per_length: [f64; D],
     cells: [usize; D],
-    /// Distance of the numbers of nodes and of cells that are adjacent along an axis.
+    /// Index distance of nodes, and of cells, that are adjacent along an axis.
     node_strides: [usize; D],
     cell_strides: [usize; D],
     matrix: Banded,
-    /// Forces on the nodes in units, for each thread.
+    /// Forces on the nodes in rounding units, per thread.
     parts: Vec<Vec<i64>>,
-    /// Their sums.
+    /// Sums of these forces over threads and ranks.
     words: Vec<u64>,
     /// Displacements of the nodes by component, m.
     values: Vec<f64>,
@@ -69,17 +70,17 @@ pub struct PointStiffness<const D: usize> {
     pub springs: [f64; D],
 }
 
-/// Cell of a point and its coordinates there.
+/// The cell of a point, and the coordinates of the point in it.
 struct CellPosition<const D: usize> {
     cell: usize,
-    /// The first node of the cell.
+    /// First node of the cell.
     node: usize,
-    /// From 0 to 1 along each axis.
+    /// Coordinates from 0 to 1 along each axis.
     along: [f64; D],
 }
 
 impl<const D: usize> CoarseGrid<D> {
-    /// Over all points, with cells of a few horizons (m). Collective.
+    /// Create a grid that covers all points, with cells of a few horizons (m). Collective.
     pub fn new(comm: &dyn Communicator, model: &Model<D>, horizon: f64) -> Self {
         let owned = model.owned();
         let column = |d: usize| model.reference[d][..owned].iter().copied();
@@ -119,7 +120,7 @@ impl<const D: usize> CoarseGrid<D> {
         }
     }
 
-    /// Find the stiffness from that of each owned point. Collective.
+    /// Assemble the stiffness matrix from the contributions of the owned points. Collective.
     pub fn assemble(
         &mut self,
         comm: &dyn Communicator,
@@ -194,7 +195,7 @@ impl<const D: usize> CoarseGrid<D> {
                         let stiffness = moduli[0] * bulk[entry] + moduli[1] * shear[entry];
                         let row = (first + self.corner(p)) * D + a;
                         let column = (first + self.corner(q)) * D + b;
-                        // The other half of a pair of nodes is the transposed one.
+                        // The matrix is symmetric, so only the lower half is added.
                         if row >= column {
                             self.matrix.add(row, column, stiffness + spring);
                         } else if p != q {
@@ -207,7 +208,8 @@ impl<const D: usize> CoarseGrid<D> {
         self.matrix.factor();
     }
 
-    /// Find the displacements of the nodes under forces on the owned points (N/m³, by component). Collective.
+    /// Solve for the displacements of the nodes under forces on the owned points (N/m³, by component).
+    /// Collective.
     pub fn solve(&mut self, comm: &dyn Communicator, model: &Model<D>, force: &[Vec<f64>; D]) {
         let owned = model.owned();
         let largest = (0..owned).into_par_iter().with_min_len(CHUNK).map(|point| {
@@ -221,7 +223,7 @@ impl<const D: usize> CoarseGrid<D> {
             self.values.fill(0.0);
             return;
         };
-        // Taken out while they are written.
+        // The buffers are taken out of `self` while they are written.
         let mut parts = std::mem::take(&mut self.parts);
         let size = owned.div_ceil(parts.len()).max(1);
         parts.par_iter_mut().enumerate().for_each(|(part, sums)| {
@@ -258,7 +260,7 @@ impl<const D: usize> CoarseGrid<D> {
         (0..1 << D).map(of).sum()
     }
 
-    /// The place of an owned point.
+    /// Cell position of an owned point.
     fn place(&self, model: &Model<D>, point: usize) -> CellPosition<D> {
         let mut place = CellPosition {
             cell: 0,
@@ -275,19 +277,19 @@ impl<const D: usize> CoarseGrid<D> {
         place
     }
 
-    /// The first node of a cell.
+    /// Index of the first node of a cell.
     fn first_node(&self, cell: usize) -> usize {
         let along = |d: usize| cell / self.cell_strides[d] % self.cells[d];
         (0..D).map(|d| along(d) * self.node_strides[d]).sum()
     }
 
-    /// The number of a node of a cell, from that of the first one.
+    /// Index of a node of a cell, relative to its first node.
     fn corner(&self, corner: usize) -> usize {
         let strides = self.node_strides.iter().enumerate();
         strides.map(|(d, stride)| (corner >> d & 1) * stride).sum()
     }
 
-    /// The stiffness of a cell for λ V = 1 and for G V = 1, over its volume, between components of its nodes.
+    /// Stiffness of a cell per volume for λ V = 1 and for G V = 1, between components of its nodes.
     fn reference_stiffness(&self) -> [Vec<f64>; 2] {
         let mut both = [0; 2].map(|_| vec![0.0; (CORNERS * D) * (CORNERS * D)]);
         let gauss = [0.5 - 0.5 / f64::sqrt(3.0), 0.5 + 0.5 / f64::sqrt(3.0)];
@@ -319,7 +321,7 @@ impl<const D: usize> CoarseGrid<D> {
 }
 
 impl<const D: usize> CellPosition<D> {
-    /// The weight of a node of the cell.
+    /// Interpolation weight of a node of the cell.
     fn weight(&self, corner: usize) -> f64 {
         let along = self.along.iter().enumerate();
         along
@@ -327,7 +329,7 @@ impl<const D: usize> CellPosition<D> {
             .product()
     }
 
-    /// The slope of the weight of a node, 1/m.
+    /// Gradient of the weight of a node, 1/m.
     fn slope(&self, corner: usize, per_length: &[f64; D]) -> [f64; D] {
         std::array::from_fn(|d| {
             let others = (0..D).filter(|other| *other != d);
@@ -340,7 +342,7 @@ impl<const D: usize> CellPosition<D> {
     }
 }
 
-/// The weight of the lower (0) or the upper (1) end of a cell along an axis.
+/// Weight of the lower (0) or upper (1) end of a cell along an axis.
 fn weight(end: usize, along: f64) -> f64 {
     if end == 1 { along } else { 1.0 - along }
 }
@@ -350,19 +352,19 @@ fn pairs<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     (0..1 << D).flat_map(|q| (0..=q).map(move |p| (p, q)))
 }
 
-/// How many cells a grid has along each axis, and in which order its nodes are numbered.
+/// Number of cells of a grid along each axis, and the numbering of its nodes.
 struct Shape<const D: usize> {
     cells: [usize; D],
     node_strides: [usize; D],
     cell_strides: [usize; D],
-    /// Size and band of its matrix.
+    /// Size and bandwidth of its matrix.
     size: usize,
     band: usize,
 }
 
 impl<const D: usize> Shape<D> {
-    /// Of a box with these lengths (m) and cells of at least an edge (m). Nodes are numbered along the axis with the
-    /// fewest first, so that the band is narrow.
+    /// Create the shape for a box with these lengths (m) and cells with at least this edge (m). Nodes are
+    /// numbered first along the axis with the fewest nodes, so the band is narrow.
     fn new(length: [f64; D], edge: f64) -> Self {
         let cells = length.map(|length| ((length / edge) as usize).max(1));
         let mut axes: [usize; D] = std::array::from_fn(|d| d);
@@ -391,7 +393,8 @@ mod tests {
     use crate::comm::threads;
     use crate::solver::palette_column::PaletteColumn;
 
-    /// Every `size`-th of 41 points, 1 m apart and of 1 m³, from one on.
+    /// Every `size`-th of 41 points, beginning with `first`. The points are 1 m apart and have a volume of
+    /// 1 m³.
     fn bar(first: usize, size: usize) -> (Model<1>, Vec<usize>) {
         let own: Vec<usize> = (first..41).step_by(size).collect();
         let model = Model {
@@ -431,7 +434,7 @@ mod tests {
         let of = |point: usize| f64::from_bits(one[point].1);
         let (start, end) = (force / spring, force / spring + force * 40.0 / modulus);
         assert!((of(0) - start).abs() < 1e-9, "{}", of(0));
-        // The last cell has one point more than the others.
+        // The last cell has one more point than the other cells.
         assert!((of(40) / end - 1.0).abs() < 0.03, "{} {end}", of(40));
         for ranks in [2, 3] {
             assert_eq!(run(ranks), one);

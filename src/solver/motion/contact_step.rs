@@ -1,19 +1,19 @@
-//! The step that contact allows: shorter before stiff contact, longer again after it.
+//! The time step that contact allows: shorter before stiff contact, longer again afterwards.
 
 use crate::error::{Error, Result};
 use crate::problem::{Rigid, StepRule};
 use crate::solver::Simulation;
 use crate::solver::contact::Contact;
 
-/// A step that contact has made too long becomes so much shorter than it must, for contact most likely stiffens further.
+/// Safety factor for a step that contact shortens, because contact probably stiffens further.
 const CONTACT_RESERVE: f64 = 0.95;
 
-/// A step is worth being longer that is below this share of what it may be.
+/// The step is lengthened only if it is below this fraction of the allowed step.
 const CALM_SHARE: f64 = 0.8;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// The step (s) from here on, where contact is too stiff for the present one, or has long been soft enough for a longer
-    /// one. It divides the rest of the stage evenly.
+    /// Return a new step (s) if contact is too stiff for the present step, or if a longer step has been
+    /// possible for long enough. The new step divides the rest of the stage evenly.
     pub fn step_for_contact(&self) -> Option<f64> {
         if self.is_quasi_static() {
             return None;
@@ -30,7 +30,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(left / (left / most).ceil())
     }
 
-    /// The longest step (s) with contact as it is now.
+    /// The largest stable step (s) with the present contact.
     pub(in crate::solver) fn contact_limit(&self) -> Option<f64> {
         let contact = self.contact.as_ref()?;
         let safety = match self.time_rule().step {
@@ -40,7 +40,7 @@ impl<const D: usize> Simulation<'_, D> {
         Some(safety * contact.stable_step(self.scaled_stable_step()))
     }
 
-    /// Counts the steps that contact would have let be longer.
+    /// Count consecutive steps for which contact would allow a longer step.
     pub(in crate::solver) fn count_calm_steps(&mut self) {
         let Some(limit) = self.contact_limit() else {
             return;
@@ -51,7 +51,7 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// An error if the motion of a rigid body is not finite; the same on all ranks.
+    /// Return an error if the motion of a rigid body is not finite; the error is the same on all ranks.
     pub(in crate::solver) fn check_rigid(&self) -> Result<()> {
         let lost = self.contact.as_ref().and_then(Contact::lost_rigid);
         lost.map_or(Ok(()), |lost| {

@@ -1,46 +1,48 @@
-//! The fields of the points, declared once: what they are, and what happens to them.
+//! The fields of the points: one declaration for each, with its meaning and its handling.
 //!
-//! Checkpoints, the undoing of a step and the result walk this list; a field that is added to it is
-//! saved, undone and offered as it says here. A field is a column of numbers for each component.
+//! Checkpoints, rollbacks and the result iterate over this list. A field that is added to it is saved,
+//! rolled back and output as its description says. A field has one column of numbers per component.
 
 use crate::problem::Field;
 use crate::solver::bonds::{Broken, PlasticColumns};
 use crate::solver::model::Model;
 
-/// What a field is, and what happens to it.
+/// The meaning and the handling of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Description {
-    /// In the field's standard terms.
+    /// Name in standard terms.
     pub name: &'static str,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// Whether ghosts have it too, brought up to date from their owners.
+    /// Whether ghosts have the field. Their values are exchanged from their owners.
     pub exchanged: bool,
-    /// Whether it is the state of a run, which checkpoints hold and points take along to another
-    /// rank; else it is found anew from the state.
+    /// Whether the field is part of the state of a run. Checkpoints contain state, and it migrates with its
+    /// points. Other fields are recomputed from the state.
     pub state: bool,
-    /// Whether a step that is undone changes it back.
+    /// Whether a rollback of a step restores the field.
     pub undone: bool,
-    /// What a point that is born during a run gets, and what those get that it lies between when it leaves.
+    /// Values of the field at a point that is created during a run, and at its parents when it is removed.
     pub birth: Birth,
-    /// The name under which decks ask for it.
+    /// Name of the field in decks, if they can request it.
     pub output: Option<Field>,
 }
 
-/// What a new point gets from those that it lies between, and what a point that leaves gives them, in equal
-/// parts.
+/// Values that a new point gets from its parents, and values that a removed point returns to its parents,
+/// in equal parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Birth {
-    /// The mean value; and nothing.
+    /// A new point gets the mean; a removed point returns nothing.
     Interpolated,
-    /// The mean value; and its volume times what it has beyond that, so that momentum stays, and so do values that
-    /// are linear in place.
+    /// A new point gets the mean. A removed point returns its volume times its difference from the mean.
+    /// Momentum and linear fields are conserved.
     Conserved,
-    /// The mean value; and its own by volume, so that no value leaves the range that there was.
+    /// A new point gets the mean. A removed point is mixed into its parents by volume, so that no value
+    /// leaves the previous range.
     Mixed,
-    /// A share by volume, so that the sum over all points stays; and all of it.
+    /// A new point gets a part by volume, so that the sum over all points is conserved. A removed point
+    /// returns all of its value.
     Shared,
-    /// What is found anew; and nothing.
+    /// The field is recomputed for a new point; a removed point returns nothing.
     FoundAnew,
 }
 
@@ -70,7 +72,7 @@ impl<const D: usize> Columns for [Vec<f64>; D] {
     }
 }
 
-/// A field that not every run has.
+/// A field that only some runs have.
 impl<T: Columns> Columns for Option<T> {
     fn columns(&self) -> &[Vec<f64>] {
         self.as_ref().map_or(&[], T::columns)
@@ -83,7 +85,7 @@ impl<T: Columns> Columns for Option<T> {
 
 macro_rules! fields {
     ($($(#[$doc:meta])* $name:ident: $type:ty = $description:expr;)+) => {
-        /// The fields over the points. Those that a run does not need are not there, on all ranks alike.
+        /// The fields over the points. Fields that a run does not need are absent on all ranks.
         pub struct Fields<const D: usize> {
             $($(#[$doc])* pub $name: $type,)+
         }
@@ -102,7 +104,7 @@ macro_rules! fields {
     };
 }
 
-/// A field of the state that is changed back with a step.
+/// A field of the state that a rollback restores.
 const STATE: Description = Description {
     name: "",
     unit: "",
@@ -113,7 +115,7 @@ const STATE: Description = Description {
     output: None,
 };
 
-/// An energy that points have taken up so far.
+/// A cumulative energy of the points.
 const ENERGY: Description = Description {
     unit: "J",
     birth: Birth::Shared,
@@ -129,7 +131,7 @@ const FORCE_DENSITY: Description = Description {
 };
 
 fields! {
-    /// u, m; owned points, then ghosts.
+    /// u, m; first owned points, then ghosts.
     displacement: [Vec<f64>; D] = Description {
         name: "displacement",
         unit: "m",
@@ -147,7 +149,8 @@ fields! {
         output: Some(Field::Temperature),
         ..STATE
     };
-    /// Thermal stretch in the directions of the setting; owned points, then ghosts; none without prescribed temperatures.
+    /// Thermal stretch in the directions of the setting; first owned points, then ghosts; none without
+    /// prescribed temperatures.
     thermal_stretch: Option<Vec<f64>> = Description {
         name: "thermal_stretch",
         unit: "1",
@@ -157,7 +160,7 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// u̇, m/s, at full steps but between the steps of a [`Stepper`](crate::solver::Stepper).
+    /// u̇, m/s, at full steps, except between the steps of a [`Stepper`](crate::solver::Stepper).
     velocity: [Vec<f64>; D] = Description {
         name: "velocity",
         unit: "m/s",
@@ -171,19 +174,19 @@ fields! {
         output: Some(Field::ForceDensity),
         ..FORCE_DENSITY
     };
-    /// What loads exert, N/m³; none without loads.
+    /// Force density of the loads, N/m³; none without loads.
     external_force: Option<[Vec<f64>; D]> = Description {
         name: "external_force",
         ..FORCE_DENSITY
     };
-    /// What supports exert, N/m³; none without supports.
+    /// Force density of the supports, N/m³; none without supports.
     reaction: Option<[Vec<f64>; D]> = Description {
         name: "reaction",
         unit: "N/m^3",
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Number of a point's bonds that have broken since the start; none without damage.
+    /// Number of bonds of a point that have broken since the start; none without damage.
     broken_bonds: Option<Vec<f64>> = Description {
         name: "broken_bonds",
         unit: "1",
@@ -191,7 +194,7 @@ fields! {
         output: Some(Field::BrokenBonds),
         ..STATE
     };
-    /// Number of a point's bonds that have broken since the last output; none without damage.
+    /// Number of bonds of a point that have broken since the last output; none without damage.
     newly_broken_bonds: Option<Vec<f64>> = Description {
         name: "newly_broken_bonds",
         unit: "1",
@@ -199,25 +202,25 @@ fields! {
         output: Some(Field::NewlyBrokenBonds),
         ..STATE
     };
-    /// Energy that a point's share of bonds has set free by breaking, J; none without damage.
+    /// Energy that broken bonds have released at a point, J; none without damage.
     freed_energy: Option<Vec<f64>> = Description {
         name: "freed_energy",
         ..ENERGY
     };
-    /// How much of the freed energy bonds held above their criterion when they were seen to break, J;
-    /// none without damage.
+    /// Part of the freed energy that bonds held above their criterion when they broke, J; none without
+    /// damage.
     overshoot_energy: Option<Vec<f64>> = Description {
         name: "overshoot_energy",
         ..ENERGY
     };
-    /// Plastic strain of a point, xx, yy, zz, yz, xz, xy; none where no points flow.
+    /// Plastic strain of a point, xx, yy, zz, yz, xz, xy; none without plasticity.
     plastic_strain: Option<[Vec<f64>; 6]> = Description {
         name: "plastic_strain",
         unit: "1",
         birth: Birth::Mixed,
         ..STATE
     };
-    /// Equivalent plastic strain of a point; none where no points flow.
+    /// Equivalent plastic strain of a point; none without plasticity.
     plastic_strain_equivalent: Option<Vec<f64>> = Description {
         name: "plastic_strain_equivalent",
         unit: "1",
@@ -225,14 +228,15 @@ fields! {
         output: Some(Field::PlasticStrainEquivalent),
         ..STATE
     };
-    /// Energy of the zero-energy control that an elastic body would have at a point, J/m³; none where no points flow.
+    /// Energy of the zero-energy control that an elastic body would have at a point, J/m³; none without
+    /// plasticity.
     control_energy: Option<Vec<f64>> = Description {
         name: "control_energy",
         unit: "J/m^3",
         birth: Birth::Mixed,
         ..STATE
     };
-    /// What plastic flow of a point has dissipated, J/m³; none where no points flow.
+    /// Energy density that plastic flow of a point has dissipated, J/m³; none without plasticity.
     plastic_work: Option<Vec<f64>> = Description {
         name: "plastic_work",
         unit: "J/m^3",
@@ -244,7 +248,7 @@ fields! {
         name: "external_work",
         ..ENERGY
     };
-    /// Power that viscous damping takes, r ρ V u̇², W; none without it.
+    /// Power that viscous damping dissipates, r ρ V u̇², W; none without it.
     damping_power: Option<Vec<f64>> = Description {
         name: "damping_power",
         unit: "W",
@@ -252,20 +256,20 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// What contact exerts, N/m³, part of the internal force; none without contact.
+    /// Force density of contact, N/m³, part of the internal force; none without contact.
     contact_force: Option<[Vec<f64>; D]> = Description {
         name: "contact_force",
         output: Some(Field::ContactForceDensity),
         ..FORCE_DENSITY
     };
-    /// The share of friction in it, N/m³; none without contact.
+    /// Part of the contact force that is friction, N/m³; none without contact.
     friction: Option<[Vec<f64>; D]> = Description {
         name: "friction",
         unit: "N/m^3",
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// The share of contact damping in it, N/m³; none without contact.
+    /// Part of the contact force that is contact damping, N/m³; none without contact.
     contact_damping: Option<[Vec<f64>; D]> = Description {
         name: "contact_damping",
         unit: "N/m^3",
@@ -280,37 +284,37 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Energy taken by friction, J; none without contact.
+    /// Energy dissipated by friction, J; none without contact.
     friction_energy: Option<Vec<f64>> = Description {
         name: "friction_energy",
         ..ENERGY
     };
-    /// Energy taken by contact damping, J; none without contact.
+    /// Energy dissipated by contact damping, J; none without contact.
     contact_damping_energy: Option<Vec<f64>> = Description {
         name: "contact_damping_energy",
         ..ENERGY
     };
-    /// u̇ of the relaxation at half iterations, m an iteration; none without relaxation.
+    /// u̇ of the relaxation at half iterations, m per iteration; none without relaxation.
     relaxation_velocity: Option<[Vec<f64>; D]> = Description {
         name: "relaxation_velocity",
         unit: "m",
         ..STATE
     };
-    /// u at the last equilibrium, m; none without equilibria.
+    /// u at the last equilibrium, m; none without load steps.
     equilibrium_displacement: Option<[Vec<f64>; D]> = Description {
         name: "equilibrium_displacement",
         unit: "m",
         ..STATE
     };
-    /// What supports exerted at the last equilibrium, N/m³; none without equilibria or supports.
+    /// Force density of the supports at the last equilibrium, N/m³; none without load steps or supports.
     equilibrium_reaction: Option<[Vec<f64>; D]> = Description {
         name: "equilibrium_reaction",
         unit: "N/m^3",
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Bound of the stiffness as a density, with which an iteration of a relaxation is stable without contact, N/m⁴; none without
-    /// equilibria.
+    /// Fictitious density: upper bound of the stiffness of a point, N/m⁴. With it, an iteration of a
+    /// relaxation without contact is stable. None without load steps.
     fictitious_density: Option<Vec<f64>> = Description {
         name: "fictitious_density",
         unit: "N/m^4",
@@ -319,7 +323,7 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// The share of contact in the density of the relaxation, N/m⁴; none without contact or relaxation.
+    /// Contribution of contact to the density of the relaxation, N/m⁴; none without contact or relaxation.
     contact_density: Option<Vec<f64>> = Description {
         name: "contact_density",
         unit: "N/m^4",
@@ -328,22 +332,22 @@ fields! {
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Time at which a point was last within the horizon of a trigger of refinement or of a point that misses
-    /// bonds, s; none where grids do not become coarser again.
+    /// Time at which a point was last within the horizon of a trigger of refinement or of a point with
+    /// missing bonds, s; none without coarsening.
     last_seen: Option<Vec<f64>> = Description {
         name: "last_seen",
         unit: "s",
         birth: Birth::FoundAnew,
         ..STATE
     };
-    /// Energy taken by viscous damping, J; none without it.
+    /// Energy dissipated by viscous damping, J; none without it.
     damped_energy: Option<Vec<f64>> = Description {
         name: "damped_energy",
         ..ENERGY
     };
 }
 
-/// Which fields a run needs beside those that every run has; the same on all ranks.
+/// The optional fields that a run needs; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Whether there are loads.
@@ -354,21 +358,21 @@ pub struct Needs {
     pub temperature: bool,
     /// Whether there is viscous damping.
     pub damping: bool,
-    /// Whether there are equilibria.
+    /// Whether there are load steps.
     pub equilibria: bool,
     /// Whether there is relaxation.
     pub relaxation: bool,
     /// Whether bonds can break.
     pub damage: bool,
-    /// Whether points keep a plastic state.
+    /// Whether points have a plastic state.
     pub plasticity: bool,
     /// Whether there is contact.
     pub contact: bool,
-    /// Whether grids become coarser again.
+    /// Whether grids are coarsened again.
     pub coarsening: bool,
 }
 
-/// The columns of the plastic state; empty where there is none.
+/// The columns of the plastic state; empty without plasticity.
 pub fn plastic_columns<'a>(
     strain: &'a mut Option<[Vec<f64>; 6]>,
     equivalent: &'a mut Option<Vec<f64>>,
@@ -388,7 +392,7 @@ pub struct RelaxationDensity<'a> {
 }
 
 impl RelaxationDensity<'_> {
-    /// That of a point.
+    /// Density of the relaxation at a point, N/m⁴.
     #[inline(always)]
     pub fn at(&self, point: usize) -> f64 {
         match self.contact {
@@ -401,14 +405,14 @@ impl RelaxationDensity<'_> {
 /// A component of the force densities of bonds and loads, N/m³.
 #[derive(Clone, Copy)]
 pub struct Exerted<'a> {
-    /// Of bonds.
+    /// Force density of the bonds.
     pub internal: &'a [f64],
-    /// Of loads, if there are any.
+    /// Force density of the loads, if there are any.
     pub external: Option<&'a [f64]>,
 }
 
 impl<'a> Exerted<'a> {
-    /// A component of [`Fields::internal_force`] and [`Fields::external_force`].
+    /// Select a component of [`Fields::internal_force`] and [`Fields::external_force`].
     pub fn new<const D: usize>(
         internal: &'a [Vec<f64>; D],
         external: Option<&'a [Vec<f64>; D]>,
@@ -420,7 +424,7 @@ impl<'a> Exerted<'a> {
         }
     }
 
-    /// Their sum.
+    /// Sum of both at a point.
     #[inline(always)]
     pub fn at(&self, k: usize) -> f64 {
         match self.external {
@@ -431,7 +435,7 @@ impl<'a> Exerted<'a> {
 }
 
 impl<const D: usize> Fields<D> {
-    /// Everything at rest in its reference place.
+    /// Allocate the fields with all points at rest at their reference positions.
     pub fn new(model: &Model<D>, needs: Needs) -> Self {
         let (owned, local) = (model.owned(), model.volume.len());
         let vector = |count: usize| std::array::from_fn(|_| vec![0.0; count]);
@@ -470,8 +474,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// The force density of internal and external forces and of viscous damping on an owned point,
-    /// N/m³: all but the reaction.
+    /// Force density on an owned point without the reaction, N/m³: internal force, external force and
+    /// viscous damping.
     #[inline]
     pub fn acting(&self, model: &Model<D>, d: usize, point: usize) -> f64 {
         let exerted = Exerted::new(&self.internal_force, self.external_force.as_ref(), d);
@@ -485,12 +489,12 @@ impl<const D: usize> Fields<D> {
         self.acting(model, d, point) + reaction
     }
 
-    /// Books what bonds set free that broke at the end of a step (s).
+    /// Book the energy and force of the bonds that broke at the end of a step (s).
     ///
-    /// Their force has acted in the first half kick of the step and is missing in the second, so that
-    /// they have taken up ½ F·Δℓ less than they held in the end: that stays with the points. On
-    /// average a bond breaks in the middle of the step at whose end it is seen, so that neither motion
-    /// nor energy depends on the step to first order.
+    /// Their force acted in the first half kick of the step but not in the second. So the points received ½
+    /// F·Δℓ less energy from these bonds than the bonds held at the end. This difference stays with the
+    /// points. On average, a bond breaks in the middle of the step at whose end the break is detected. So
+    /// neither motion nor energy depends on the step to first order.
     pub fn book_broken(&mut self, model: &Model<D>, all: &[Broken<D>], step: f64) {
         let velocity = &self.velocity;
         let (Some(count), Some(new), Some(freed), Some(overshoot)) = (
@@ -511,8 +515,8 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Adds the forces of contact on an owned point to the internal ones: repulsion (N/m³) with its potential (J), and
-    /// friction and damping as they were [booked](Self::book_dissipation).
+    /// Add the contact forces on an owned point to the internal forces: the repulsion (N/m³) with its
+    /// potential (J), and the [booked](Self::book_dissipation) friction and damping.
     pub fn add_contact(&mut self, point: usize, repulsion: [f64; D], energy: f64) {
         let (Some(contact), Some(friction), Some(damping), Some(potential)) = (
             &mut self.contact_force,
@@ -529,7 +533,7 @@ impl<const D: usize> Fields<D> {
         potential[point] = energy;
     }
 
-    /// An owned point touches nothing.
+    /// Clear the contact fields of an owned point without contact.
     pub fn clear_contact(&mut self, point: usize) {
         let columns = self.contact_force.iter_mut().flatten();
         let scalars = self
@@ -541,15 +545,15 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Forgets friction and contact damping, which do not act in a relaxation.
+    /// Clear friction and contact damping, which do not act in a relaxation.
     pub fn clear_dissipative_contact(&mut self) {
         let forces = [&mut self.friction, &mut self.contact_damping];
         let columns = forces.into_iter().flatten().flatten();
         columns.for_each(|column| column.fill(0.0));
     }
 
-    /// Density of the relaxation, with which an iteration is stable, of each owned point (N/m⁴); infinite for one that does
-    /// not take part, having no bonds.
+    /// Density of the relaxation of each owned point (N/m⁴), with which an iteration is stable. It is
+    /// infinite for a point that does not take part because it has no bonds.
     ///
     /// # Panics
     /// Without relaxation.
@@ -560,8 +564,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Takes note of friction and contact damping (N/m³) on an owned point at the end of a step (s), and books what they
-    /// took in it, by the trapezoid rule. Velocities are those in the middle of the step.
+    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s), and book the
+    /// energy that they dissipated in this step by the trapezoidal rule. Velocities are those in the middle
+    /// of the step.
     pub fn book_dissipation(
         &mut self,
         point: usize,
@@ -590,14 +595,14 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Counts bonds that break from now on as new.
+    /// Reset the count of newly broken bonds.
     pub fn forget_newly_broken(&mut self) {
         if let Some(new) = &mut self.newly_broken_bonds {
             new.fill(0.0);
         }
     }
 
-    /// The columns of a field, if decks may ask for it and it is one of the points'.
+    /// The columns of a field, if it is a field of the points that a deck can request.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
             let there = !columns.is_empty() && description.output == Some(field);

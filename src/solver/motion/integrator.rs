@@ -1,4 +1,4 @@
-//! How a stage of a run advances: one integrator for each method.
+//! Time integration of a stage: one integrator per method.
 
 use crate::problem::{Method, Time};
 use crate::solver::Simulation;
@@ -8,14 +8,15 @@ use super::newton::NewtonKrylov;
 use super::relaxation::DynamicRelaxation;
 use super::verlet::Verlet;
 
-/// The method of a stage.
+/// The integration method of a stage.
 pub trait Integrator<const D: usize>: Send + Sync {
-    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending`: the half kick of
-    /// the step before is not applied yet. Returns whether this step has one pending. Collective.
+    /// Make one step without its second half kick, or one iteration of a load step. `half_kick_pending`:
+    /// the second half kick of the previous step is still to be applied. Returns whether that of this step
+    /// is pending. Collective.
     fn advance(&mut self, simulation: &mut Simulation<'_, D>, half_kick_pending: bool) -> bool;
 }
 
-/// The integrator of a stage.
+/// Create the integrator of a stage.
 pub fn integrator<const D: usize>(time: &Time) -> Box<dyn Integrator<D>> {
     match (time.method, time.adaptive) {
         (Method::Explicit, None) => Box::new(Verlet),

@@ -1,16 +1,17 @@
-//! Load steps: from one equilibrium to the next, whichever method finds it.
+//! Load steps: from one equilibrium to the next, with any method.
 //!
-//! A load step moves time, which is the load parameter, and with it loads and supports. A method then looks for the
-//! equilibrium: [`super::relaxation`] or [`super::newton`].
+//! A load step advances the time, which is the load parameter, and with it loads and supports. A method
+//! then solves for the equilibrium: [`super::relaxation`] or [`super::newton`].
 //!
-//! Bonds break at equilibria only: bonds that reach their criterion there break, and the next equilibrium is found at
-//! the same load, until nothing breaks. The history of bonds and points is part of the equilibrium. Each iteration takes
-//! the forces from the history that a step from the last equilibrium to the present place would leave, and stores it
-//! when the equilibrium is found.
+//! Bonds break only at equilibria. Bonds that reach their criterion there break, and the next equilibrium
+//! is found at the same load, until no bond breaks. The history of bonds and points is part of the
+//! equilibrium. Each iteration computes the forces from trial values of the history: those after a step
+//! from the last equilibrium to the present positions. The history is stored at equilibrium.
 //!
-//! The equilibrium is found when ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). Without loads and reactions, as in a
-//! free body that is moved, both sides are round-off; so ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is an equilibrium, too. ρ bounds
-//! the stiffness of a point, hence ε ‖V ρ u‖ the forces that come from rounding u.
+//! The convergence criterion is ‖f‖ ≤ tolerance · (‖loads‖ + ‖reactions‖). In a free body that is moved,
+//! loads and reactions are 0, and both sides are round-off. Therefore ‖f‖ ≤ `ROUND_OFF` ‖V ρ u‖ is also
+//! accepted as equilibrium. ρ is an upper bound of the stiffness of a point, so ε ‖V ρ u‖ is a bound of the
+//! forces from rounding u.
 
 use rayon::prelude::*;
 
@@ -28,32 +29,32 @@ use super::stable_step::largest_eigenvalue;
 /// Points handled by one task.
 pub(super) const CHUNK: usize = 4096;
 
-/// How much larger the fictitious density is than the bound, for bonds that turn.
+/// Factor from the stiffness bound to the fictitious density; it covers bonds that rotate.
 const MARGIN: f64 = 1.2;
 
-/// Forces on the points are round-off below this share of ‖V ρ u‖.
+/// Forces on the points below this fraction of ‖V ρ u‖ are round-off.
 const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
-/// How far a load step has come; the same on all ranks.
+/// Progress of a load step; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadStep {
     /// Iterations made in this load step.
     pub iterations: u64,
-    /// Those of them since bonds broke.
+    /// Number of iterations since bonds broke in this load step.
     pub since_breaking: u64,
-    /// ‖f‖/(‖loads‖ + ‖reactions‖), norms of the forces on the points; 0 where f is round-off, not a number before
-    /// the first load step.
+    /// ‖f‖/(‖loads‖ + ‖reactions‖), norms of the forces on the points. It is 0 if f is round-off, and NaN
+    /// before the first load step.
     pub residual: f64,
-    /// c of a relaxation; not a number from rest.
+    /// Damping c of a relaxation; NaN at rest.
     pub(super) damping: f64,
-    /// The largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N: a body that is unloaded, or broken
-    /// in two, is not looked at more closely than when it was loaded.
+    /// Largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N. It keeps the tolerance of a body that is
+    /// unloaded or broken the same as under load.
     pub(super) scale: f64,
-    /// Bonds have broken in an equilibrium of this load step.
+    /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,
-    /// Whether the equilibrium has been found, and nothing more breaks.
+    /// Whether the equilibrium has been found, and no more bonds break.
     pub is_settled: bool,
-    /// Whether it has not been found in as many iterations as there may be.
+    /// Whether the maximum number of iterations was reached without an equilibrium.
     pub has_failed: bool,
 }
 
@@ -73,13 +74,13 @@ impl Default for LoadStep {
 }
 
 impl LoadStep {
-    /// What has failed at a time (s).
+    /// Message of the failure at a time (s).
     fn failure(&self, time: f64) -> String {
         let iterations = self.since_breaking;
         format!("t = {time:.6e} s: no equilibrium within {iterations} iterations")
     }
 
-    /// Find the residual from the squares of the norms of [`balance`].
+    /// Compute the residual from the squared norms of [`balance`].
     pub(super) fn set_residual(&mut self, squares: [f64; 4]) {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
         let scale = (loads + reactions).max(self.scale);
@@ -87,7 +88,7 @@ impl LoadStep {
         self.residual = if is_round_off { 0.0 } else { free / scale };
     }
 
-    /// All of it, as a checkpoint holds it.
+    /// Encode the state for a checkpoint.
     pub fn words(&self) -> [u64; 8] {
         let [residual, damping, scale] =
             [self.residual, self.damping, self.scale].map(f64::to_bits);
@@ -99,7 +100,7 @@ impl LoadStep {
         ]
     }
 
-    /// What [`Self::words`] gave.
+    /// Decode the words of [`Self::words`].
     pub fn of_words(words: [u64; 8]) -> Self {
         let [
             iterations,
@@ -125,14 +126,14 @@ impl LoadStep {
     }
 }
 
-/// The density (N/m⁴) with which iterations of Δt = 1 are stable, for the largest eigenvalue of D of
-/// [`super::stable_step`], N/m⁴.
+/// Density (N/m⁴) with which iterations of Δt = 1 are stable. `eigenvalue` is the largest eigenvalue of D
+/// of [`super::stable_step`], N/m⁴.
 pub fn stable_density(eigenvalue: f64) -> f64 {
     0.5 * MARGIN * eigenvalue
 }
 
-/// Bound of the stiffness of each owned point as a density (N/m⁴): with it iterations of Δt = 1 are stable; infinite for one
-/// without bonds. `stiffness` is that of [`super::stable_step`].
+/// Upper bound of the stiffness of each owned point as a density (N/m⁴), with which iterations of Δt = 1
+/// are stable. It is infinite for a point without bonds. `stiffness` is D of [`super::stable_step`].
 pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     let density = |point: usize| {
         let entries = stiffness.each_ref().map(|column| column[point]);
@@ -144,8 +145,8 @@ pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     (0..stiffness[0].len()).map(density).collect()
 }
 
-/// Squares of the norms that the residual follows from, of a point with a fictitious density (N/m⁴): the total force,
-/// loads, reactions (N), and V ρ u.
+/// Squared norms for the residual, for a point with a fictitious density (N/m⁴): total force, loads,
+/// reactions (N), and V ρ u.
 pub(super) fn balance<const D: usize>(
     model: &Model<D>,
     fields: &Fields<D>,
@@ -165,8 +166,8 @@ pub(super) fn balance<const D: usize>(
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Take note of the last equilibrium, and move time, loads and supports on. Where the step keeps its size and
-    /// `extrapolates`, the points move as far as in the last load step.
+    /// Record the last equilibrium, and advance time, loads and supports. If the step has the same size as
+    /// the last one and `extrapolates`, the points repeat their motion of the last load step.
     pub(super) fn begin_load_step(&mut self, extrapolates: bool) {
         self.walk(|part, mut here| {
             here.before_moving(part);
@@ -187,7 +188,7 @@ impl<const D: usize> Simulation<'_, D> {
         };
     }
 
-    /// Take note of the last equilibrium, and move the points `again` as far as in the last load step.
+    /// Record the last equilibrium. If `again`, repeat the motion of the last load step.
     fn note_equilibrium(&mut self, again: bool) {
         let owned = self.model.owned();
         let fields = &mut self.fields;
@@ -211,14 +212,14 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Evaluate the forces and reactions at the present place, for the history that the points would have if this were the
-    /// equilibrium of the load step. Collective.
+    /// Evaluate forces and reactions at the present positions, with the history that the points would have
+    /// if this were the equilibrium of the load step. Collective.
     pub(super) fn evaluate_at_rest(&mut self) {
         self.evaluate(self.bond_update_at_rest());
         self.apply_velocities();
     }
 
-    /// Find the residual. Returns ‖f‖, N. Collective.
+    /// Compute the residual. Returns ‖f‖, N. Collective.
     pub(super) fn find_residual(&mut self) -> f64 {
         let (model, fields) = (&self.model, &self.fields);
         let mut squares = sums(model, fields, |point, density| {
@@ -230,8 +231,8 @@ impl<const D: usize> Simulation<'_, D> {
         f64::sqrt(squares[0])
     }
 
-    /// The time by which the history of bonds advances at the next equilibrium (s): once in a load step, however often
-    /// bonds break.
+    /// Time increment of the bond history at the next equilibrium (s). The history advances once per load
+    /// step, no matter how often bonds break.
     fn time_to_advance(&self) -> f64 {
         if self.load_step.has_broken {
             0.0
@@ -240,8 +241,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// How to evaluate forces at the present positions without changing the state: during a load step with the history that
-    /// bonds would have if this were its equilibrium.
+    /// Bond update for a force evaluation at the present positions that does not change the state. During a
+    /// load step, it uses the history that bonds would have if this were the equilibrium.
     pub(in crate::solver) fn bond_update_at_rest(&self) -> BondUpdate {
         if self.load_step.is_settled {
             BondUpdate::None
@@ -250,8 +251,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// In equilibrium: break the bonds that must. Where none does, the load step is over. Returns whether any broke; then
-    /// the forces are still those before.
+    /// At equilibrium, break the bonds that reach their criterion. If none does, the load step is finished.
+    /// Returns whether any bond broke; in this case, the forces are still those before the breaks.
     pub(super) fn break_or_settle(&mut self) -> bool {
         self.raise_scale();
         let is_first = !self.load_step.has_broken;
@@ -271,13 +272,13 @@ impl<const D: usize> Simulation<'_, D> {
         breaks
     }
 
-    /// Sum of the squares of the forces of rigid bodies on the points of this rank, N².
+    /// Sum of the squared forces of rigid bodies on the points of this rank, N².
     pub(super) fn rigid_forces(&self) -> ExactSum {
         let contact = self.contact.as_ref();
         contact.map_or(ExactSum::ZERO, |contact| contact.rigid_forces().clone())
     }
 
-    /// Raise the scale to the loads and reactions of the present equilibrium.
+    /// Raise `scale` to the loads and reactions of the present equilibrium, if they are larger.
     fn raise_scale(&mut self) {
         let (model, fields) = (&self.model, &self.fields);
         let [loads, mut reactions] = sums(model, fields, |point, _| {
@@ -293,10 +294,11 @@ impl<const D: usize> Simulation<'_, D> {
         self.load_step.scale = self.load_step.scale.max(scale);
     }
 
-    /// An error if the present load step has failed. Collective.
+    /// Return an error if the present load step has failed. Collective.
     ///
     /// # Errors
-    /// Names a piece that loads act on and nothing holds, if there is one, else says how near it came.
+    /// The message names a piece that is loaded but not supported, if there is one. Otherwise, it gives the
+    /// residual reached.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.load_step.has_failed {
             return Ok(());
@@ -305,7 +307,7 @@ impl<const D: usize> Simulation<'_, D> {
         if self.newton.halvings > 0 {
             failure += &format!(", the load step halved {} times", self.newton.halvings);
         }
-        // Contact can hold pieces as well.
+        // Contact can also support pieces.
         if self.contact.is_none() {
             self.check_pieces_are_held(&failure)?;
         }
@@ -326,7 +328,7 @@ impl<const D: usize> Simulation<'_, D> {
         )))
     }
 
-    /// Where the largest force out of balance acts, as words. Collective.
+    /// Describe the point with the largest unbalanced force. Collective.
     fn worst_point(&self) -> String {
         let (model, fields) = (&self.model, &self.fields);
         let density = fields.fictitious_density.as_deref().unwrap_or_default();
@@ -364,10 +366,10 @@ impl<const D: usize> Simulation<'_, D> {
         )
     }
 
-    /// Add the work of loads and supports since the last load step, which ended in equilibrium.
+    /// Add the work of loads and supports in the last load step, which ended in equilibrium.
     fn add_work_since_equilibrium(&mut self, work: Work) {
         let (then, now) = (self.clock.time_before(), self.clock.time());
-        // Taken out while they are read.
+        // The columns are taken out of `fields` while they are read.
         let displacement = self.fields.equilibrium_displacement.take();
         let reaction = self.fields.equilibrium_reaction.take();
         if let Some(displacement) = &displacement {
@@ -390,7 +392,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Sums over the owned points with bonds: `terms` finds those of a point from its index and its
+/// Sum over the owned points with bonds. `terms` returns the terms of a point, given its index and its
 /// fictitious density (N/m⁴).
 pub(super) fn sums<const D: usize, const N: usize>(
     model: &Model<D>,

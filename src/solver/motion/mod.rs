@@ -1,4 +1,4 @@
-//! Motion: the fields of the points, the clock, time integration.
+//! Motion: the fields of the points, the clock, and time integration.
 
 pub mod adaptive;
 mod banded;

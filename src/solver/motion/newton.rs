@@ -1,6 +1,6 @@
 //! Equilibria by an inexact Newton method with conjugate gradients.
 //!
-//! [`super::load_step`] says what an equilibrium is, and when bonds break. An iteration is
+//! [`super::load_step`] defines an equilibrium, and when bonds break. An iteration is
 //!
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
@@ -8,21 +8,24 @@
 //! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: by how much the forces are not linear
 //! ```
 //!
-//! (Eisenstat & Walker 1996 for η; Knoll & Keyes 2004 for the differences.) f holds the reactions, so that it is 0 for
-//! supported components. All differences are taken at the history of the last equilibrium with its trial update, so that
-//! K is the consistent tangent where points yield. ε moves no point by more than `SHIFT` horizons: the error
-//! of the difference is then of the order of this share for bonds that turn, and of ε/`SHIFT` from rounding.
+//! (Eisenstat & Walker 1996 for η; Knoll & Keyes 2004 for the differences.) f includes the reactions, so it
+//! is 0 for supported components. All differences use the history of the last equilibrium with its trial
+//! update, so K is the consistent tangent at points that yield. ε is limited so that no point moves by more
+//! than `SHIFT` horizons. The relative error of the difference is then of the order of `SHIFT` for bonds
+//! that rotate, and of the order of (machine ε)/`SHIFT` from rounding.
 //!
-//! K is symmetric for laws with an energy. Where it is not positive definite, as in a body that softens or buckles, the
-//! conjugate gradients end at the first direction of negative curvature. The preconditioner adds up two parts: the
-//! diagonal, which is good for short waves, and a coarse grid (`coarse_grid.rs`), for long ones.
+//! K is symmetric for laws with an energy. In a body that softens or buckles, K may not be positive
+//! definite. The conjugate gradients then stop at the first direction of negative curvature. The
+//! preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
+//! (`coarse_grid.rs`), for long waves.
 //!
-//! The first iteration of a load step of another size than the one before, and after one in which bonds broke, is taken
-//! about the last equilibrium with the prescribed displacements as part of the motion. Others begin where the points get to
-//! if they move as far as in the last load step.
+//! If the size of a load step differs from the last one, or if bonds broke in the last one, the first
+//! iteration linearizes about the last equilibrium. The prescribed displacements are then part of the
+//! motion. Otherwise, the points first repeat their motion of the last load step.
 //!
-//! A load step without an equilibrium is repeated with half its size, and again up to `max_halvings` times, unless bonds
-//! have broken in it: then its load has been reached. The halves are made up to where the whole load step would have ended.
+//! A load step without an equilibrium is repeated with half its size, at most `max_halvings` times. If
+//! bonds have broken in it, its load has been reached, and it is not repeated. The smaller load steps
+//! continue up to the end of the original load step.
 
 use std::time::Instant;
 
@@ -39,40 +42,40 @@ use super::coarse_grid::{CoarseGrid, PointStiffness};
 use super::integrator::Integrator;
 use super::load_step::{CHUNK, sums};
 
-/// How far the largest component of a difference moves a point, horizons.
+/// Largest component of the motion of a point in a difference, horizons.
 const SHIFT: f64 = 1e-6;
 
-/// Most conjugate gradients of an iteration.
+/// Maximum number of conjugate gradient iterations per Newton iteration.
 const MAX_CG_ITERATIONS: u64 = 500;
 
-/// Most step lengths that are tried along a direction.
+/// Maximum number of step lengths that are tried along a direction.
 const MAX_LINE_SEARCH_STEPS: usize = 8;
 
-/// The search along a direction ends where |x·f| is at most this share of its initial value.
+/// The line search ends when |x·f| is at most this fraction of its initial value.
 const LINE_SEARCH_TOLERANCE: f64 = 0.9;
 
 /// η of the first iteration of a run, and the largest η.
 const FIRST_FORCING: f64 = 0.01;
 const MOST_FORCING: f64 = 0.1;
 
-/// Share of the tolerance to which the linear problem is solved at most.
+/// Lower bound of the tolerance of the linear problem, as a fraction of the tolerance of the load step.
 const LINEAR_TOLERANCE_SHARE: f64 = 0.5;
 
-/// The least share of intact bonds that counts in the diagonal.
+/// Lower bound of the fraction of intact bonds in the diagonal.
 const LEAST_INTACT: f64 = 1e-3;
 
-/// What the method remembers from one load step to the next; the same on all ranks.
+/// State of the method between load steps; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonState {
-    /// Force evaluations of the present load step, whichever method makes it.
+    /// Number of force evaluations of the present load step, with either method.
     pub evaluations: u64,
     /// η of the next iteration.
     forcing: f64,
-    /// The mean diagonal of K over the fictitious density; not a number before it is known.
+    /// Mean of the diagonal of K over the fictitious density; NaN until it is computed.
     diagonal: f64,
-    /// How often the present load step has been halved.
+    /// Number of times that the present load step has been halved.
     pub halvings: u64,
-    /// Load steps of the present size up to where the whole one ends.
+    /// Number of load steps of the present size up to the end of the original load step.
     left: u64,
 }
 
@@ -89,7 +92,7 @@ impl Default for NewtonState {
 }
 
 impl NewtonState {
-    /// All of it, as a checkpoint holds it.
+    /// Encode the state for a checkpoint.
     pub fn words(&self) -> [u64; 5] {
         let [forcing, diagonal] = [self.forcing, self.diagonal].map(f64::to_bits);
         [
@@ -101,7 +104,7 @@ impl NewtonState {
         ]
     }
 
-    /// What [`Self::words`] gave.
+    /// Decode the words of [`Self::words`].
     pub fn of_words([evaluations, forcing, diagonal, halvings, left]: [u64; 5]) -> Self {
         let [forcing, diagonal] = [forcing, diagonal].map(f64::from_bits);
         Self {
@@ -114,7 +117,7 @@ impl NewtonState {
     }
 }
 
-/// The method with its vectors.
+/// Newton–Krylov method with its vectors.
 pub struct NewtonKrylov<const D: usize> {
     rule: Static,
     /// Allocated in the first iteration.
@@ -122,7 +125,7 @@ pub struct NewtonKrylov<const D: usize> {
 }
 
 impl<const D: usize> NewtonKrylov<D> {
-    /// Follows a rule.
+    /// Create the method for a rule of the deck.
     pub fn new(rule: Static) -> Self {
         Self {
             rule,
@@ -162,23 +165,24 @@ impl<const D: usize> Integrator<D> for NewtonKrylov<D> {
 
 /// Vectors over the owned points.
 struct Vectors<const D: usize> {
-    /// u about which differences are taken, m, and f there, N/m³.
+    /// u about which differences are computed, m, and f at this u, N/m³.
     base: [Vec<f64>; D],
     force: [Vec<f64>; D],
     /// x, m.
     correction: [Vec<f64>; D],
     /// f − K x, N/m³.
     residual: [Vec<f64>; D],
-    /// The present direction, m.
+    /// Present search direction, m.
     direction: [Vec<f64>; D],
-    /// K times it, N/m³.
+    /// K times the search direction, N/m³.
     product: [Vec<f64>; D],
-    /// The residual times the preconditioner, m.
+    /// Preconditioned residual, m.
     preconditioned: [Vec<f64>; D],
-    /// Of the diagonal of K, m⁴/N; 0 for supported components and points that have never had a bond.
+    /// Inverse of the diagonal of K, m⁴/N; 0 for supported components and for points that have never had a
+    /// bond.
     inverse_diagonal: [Vec<f64>; D],
     coarse: CoarseGrid<D>,
-    /// Bonds have broken since the preconditioner was made.
+    /// Whether bonds have broken since the preconditioner was computed.
     is_stale: bool,
     /// The shortest horizon, m.
     horizon: f64,
@@ -205,7 +209,7 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Begin a load step, and find the residual at the place that the points are expected in.
+    /// Begin a load step, and compute the residual at the predicted positions.
     fn begin_load_step(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let follows_the_last = !simulation.clock.is_new_size() && !simulation.load_step.has_broken;
         self.refresh(simulation);
@@ -218,7 +222,7 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Make the first iteration of a load step about the last equilibrium.
+    /// Make the first iteration of a load step, linearized about the last equilibrium.
     fn predict(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let owned = simulation.model.owned();
         let fields = &mut simulation.fields;
@@ -245,7 +249,7 @@ impl<const D: usize> Vectors<D> {
         simulation.newton.adapt(linear, force);
     }
 
-    /// Make an iteration.
+    /// Make one Newton iteration.
     fn iterate(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         simulation.load_step.iterations += 1;
         simulation.load_step.since_breaking += 1;
@@ -262,7 +266,7 @@ impl<const D: usize> Vectors<D> {
         simulation.newton.adapt(linear, force);
     }
 
-    /// Take note of the forces at the base.
+    /// Store the forces at the base.
     fn note_force(&mut self, simulation: &Simulation<'_, D>) {
         let (model, fields) = (&simulation.model, &simulation.fields);
         for d in 0..D {
@@ -277,14 +281,15 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Add to x until ‖f − K x‖ is small, in any case where it is below `allowed`, which ‖f‖ may be in equilibrium (N).
-    /// Collective.
+    /// Improve x until ‖f − K x‖ is small. Always stop when it is below `allowed`, the norm ‖f‖ that is
+    /// accepted as equilibrium (N). Collective.
     fn solve(&mut self, simulation: &mut Simulation<'_, D>, allowed: f64) -> Linear {
         let first = self.residual_norm(simulation);
         let mut linear = Linear { first, last: first };
         let wanted = simulation.newton.forcing * first;
         let wanted = wanted.max(LINEAR_TOLERANCE_SHARE * allowed);
-        // Power of the residual along the last direction, and the length of the step along it.
+        // Inner product of residual and preconditioned residual at the last direction, and the step length
+        // along it.
         let (mut power, mut length) = (f64::NAN, 0.0);
         for number in 0..MAX_CG_ITERATIONS {
             if linear.last.is_nan() || linear.last <= wanted {
@@ -292,7 +297,7 @@ impl<const D: usize> Vectors<D> {
             }
             self.precondition(simulation);
             let own = dot(simulation, &self.residual, &self.preconditioned);
-            // The residual has changed by −`length` K times the last direction.
+            // The residual changed by −`length` · K · (last direction).
             let kept = if number == 0 {
                 0.0
             } else {
@@ -332,7 +337,7 @@ impl<const D: usize> Vectors<D> {
         reduce(simulation.comm, &mut { square })[0].sqrt()
     }
 
-    /// Find K times the direction. Collective.
+    /// Compute K times the search direction. Collective.
     fn multiply(&mut self, simulation: &mut Simulation<'_, D>) {
         let columns = self.direction.par_iter().flatten();
         let magnitude = columns.map(|component: &f64| component.abs());
@@ -378,11 +383,12 @@ impl<const D: usize> Vectors<D> {
         }
     }
 
-    /// Move the points along x to where its power is small, and find the residual there. Returns ‖f‖, N. Collective.
+    /// Line search: move the points along x until |x·f| is small, and compute the residual there. Returns
+    /// ‖f‖, N. Collective.
     fn search(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) -> f64 {
         let at_base = dot(simulation, &self.force, &self.correction);
         let mut length = 1.0;
-        // Lengths between which the power changes its sign, with the powers there.
+        // Step lengths that bracket the sign change of x·f, with the values of x·f.
         let (mut below, mut above) = ((0.0, at_base), None);
         for place in 1.. {
             move_from(simulation, &self.base, length, &self.correction);
@@ -415,7 +421,7 @@ impl<const D: usize> Vectors<D> {
         unreachable!("the loop returns")
     }
 
-    /// Power x·f of the present forces, J. Collective.
+    /// x·f of the present forces, J. Collective.
     fn power(&self, simulation: &Simulation<'_, D>) -> f64 {
         let (model, fields) = (&simulation.model, &simulation.fields);
         let power = sums(model, fields, |point, _| {
@@ -425,7 +431,7 @@ impl<const D: usize> Vectors<D> {
         reduce(simulation.comm, &mut { power })[0]
     }
 
-    /// Make the preconditioner for the bonds that are intact, if it is not that. Collective.
+    /// Recompute the preconditioner for the intact bonds, if bonds have broken since. Collective.
     fn refresh(&mut self, simulation: &mut Simulation<'_, D>) {
         if !std::mem::take(&mut self.is_stale) {
             return;
@@ -487,8 +493,8 @@ impl<const D: usize> Vectors<D> {
         });
     }
 
-    /// Find the mean diagonal of K over the fictitious density: with a vector s of random signs, s·K s is the trace of K
-    /// but for a small error (Hutchinson 1990). Collective.
+    /// Estimate the mean of the diagonal of K over the fictitious density: for a vector s of random signs,
+    /// s·K s approximates the trace of K (Hutchinson 1990). Collective.
     fn measure_diagonal(&mut self, simulation: &mut Simulation<'_, D>) {
         let owned = simulation.model.owned();
         for d in 0..D {
@@ -526,7 +532,7 @@ impl<const D: usize> Vectors<D> {
         simulation.evaluate_at_rest();
     }
 
-    /// Repeat the load step with half its size, or let it fail. Collective.
+    /// Repeat the load step with half its size, or mark it as failed. Collective.
     fn bisect_or_fail(&mut self, simulation: &mut Simulation<'_, D>, rule: &Static) {
         let can_be_halved = !simulation.load_step.has_broken
             && simulation.newton.halvings < rule.max_halvings
@@ -544,14 +550,15 @@ impl<const D: usize> Vectors<D> {
     }
 }
 
-/// ‖f − K x‖ before and after the linear problem has been solved, N.
+/// ‖f − K x‖ before and after the solution of the linear problem, N.
 struct Linear {
     first: f64,
     last: f64,
 }
 
 impl NewtonState {
-    /// Choose the next η by how much the forces, with the norm `force` (N), differ from those of the linear problem.
+    /// Choose the next η from the difference between the force norm `force` (N) and that of the linear
+    /// problem.
     fn adapt(&mut self, linear: Linear, force: f64) {
         let forcing = (force - linear.last).abs() / linear.first;
         if forcing.is_finite() {
@@ -561,7 +568,7 @@ impl NewtonState {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Go back to the last equilibrium, and halve the load step.
+    /// Return to the last equilibrium, and halve the load step.
     fn return_to_equilibrium(&mut self) {
         let fields = &mut self.fields;
         for (d, equilibrium) in fields.equilibrium_displacement.iter().flatten().enumerate() {
@@ -577,7 +584,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.newton.left *= 2;
     }
 
-    /// After a load step: if that was the last of the parts of a halved one, give the next one the whole size.
+    /// After a load step: if it was the last part of a halved one, restore the original size.
     fn end_halves(&mut self) {
         self.newton.left -= 1;
         if self.newton.left > 0 {
@@ -592,7 +599,7 @@ impl<const D: usize> Simulation<'_, D> {
     }
 }
 
-/// Move the points to the base plus so much of a direction.
+/// Move the points to the base plus a multiple of a direction.
 fn move_from<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     base: &[Vec<f64>; D],
@@ -609,7 +616,7 @@ fn move_from<const D: usize>(
     }
 }
 
-/// Add a multiple of a vector to another one.
+/// Add a multiple of a vector to another vector.
 fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; D]) {
     for (to, vector) in to.iter_mut().zip(vector) {
         let both = to.par_iter_mut().zip(vector).with_min_len(CHUNK);
@@ -617,7 +624,7 @@ fn add<const D: usize>(to: &mut [Vec<f64>; D], factor: f64, vector: &[Vec<f64>; 
     }
 }
 
-/// The scalar product of a force density and a displacement, weighted with the volume, J. Collective.
+/// Scalar product of a force density and a displacement, weighted by volume, J. Collective.
 fn dot<const D: usize>(
     simulation: &Simulation<'_, D>,
     a: &[Vec<f64>; D],
@@ -631,7 +638,7 @@ fn dot<const D: usize>(
     reduce(simulation.comm, &mut { sum })[0]
 }
 
-/// λ and G (Pa) of the classical solid that a body in so many dimensions is.
+/// λ and G (Pa) of the classical solid that represents a body in this dimension.
 fn moduli(elastic: Isotropic, dimension: Dimension) -> [f64; 2] {
     let (lambda, shear) = (elastic.lame_lambda(), elastic.shear_modulus());
     match dimension {

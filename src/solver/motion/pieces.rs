@@ -1,4 +1,4 @@
-//! Pieces of the bodies: points that intact bonds connect, and whether supports hold them.
+//! Pieces of the bodies: sets of points that intact bonds connect, and the check that supports hold them.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use crate::solver::Simulation;
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The share of the sum of the magnitudes of loads below which their sum is round-off.
+/// A sum of loads below this fraction of the sum of their magnitudes is round-off.
 const ROUND_OFF: f64 = 1e-9;
 
-/// What is known of the piece of each local point; the same at all points of a piece.
+/// Data of the piece of each local point; the same at all points of a piece.
 struct Pieces<const D: usize> {
     /// Smallest point id of the piece.
     first: Vec<f64>,
@@ -24,10 +24,10 @@ struct Pieces<const D: usize> {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Search for a piece that no support holds along an axis in which loads act on it. Collective.
+    /// Search for a piece that is loaded along an axis in which no support holds it. Collective.
     ///
     /// # Errors
-    /// Names the piece whose smallest point id is the smallest.
+    /// The message names the piece with the smallest point id.
     pub(in crate::solver) fn check_pieces_are_held(&mut self, failure: &str) -> Result<()> {
         let pieces = self.find_pieces();
         let mut suspects: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
@@ -72,8 +72,8 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// The first free component in which the loads on the points of a piece do not cancel, and their sum (N).
-    /// Collective.
+    /// Return the first free component in which the loads on a piece do not cancel, and the sum of these
+    /// loads (N). Collective.
     fn unbalanced_load(&self, pieces: &Pieces<D>, points: &[usize]) -> Option<(usize, f64)> {
         let mut is_held = [0.0; D];
         let mut sums = [const { ExactSum::ZERO }; 6];
@@ -101,7 +101,7 @@ impl<const D: usize> Simulation<'_, D> {
             is_free: self.conditions.free_components(local),
             is_unloaded: std::array::from_fn(|_| vec![1.0; local]),
         };
-        // A point without bonds in its reference family does not take part in a relaxation.
+        // A point without bonds in its reference family takes no part in a relaxation.
         let density = self.fields.fictitious_density.as_deref();
         if let (Some(force), Some(density)) = (&self.fields.external_force, density) {
             for (is_unloaded, force) in pieces.is_unloaded.iter_mut().zip(force) {

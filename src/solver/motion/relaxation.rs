@@ -1,9 +1,8 @@
 //! Adaptive dynamic relaxation: from one equilibrium to the next.
 //!
-//! A load step moves time, which is the load parameter, and with it loads and supports; the points go on as
-//! far as in the load step before. Then the motion
-//! ρ ü + c ρ u̇ = f of a fictitious density ρ is followed, in iterations of Δt = 1, until it has come to
-//! rest (Underwood 1983; Kilic & Madenci 2010):
+//! A load step advances the time, which is the load parameter, and with it loads and supports. The points
+//! first repeat their motion of the last load step. Then the motion ρ ü + c ρ u̇ = f with a fictitious
+//! density ρ is integrated with Δt = 1 until it comes to rest (Underwood 1983; Kilic & Madenci 2010):
 //!
 //! ```text
 //! u̇ ← ((2 − c) u̇ + 2 f/ρ)/(2 + c)        (f/(2ρ) from rest)
@@ -11,16 +10,16 @@
 //! c ← 2 √(u̇·¹K u̇ / u̇·ρ u̇),   ¹K u̇ = −(f_new − f_old)
 //! ```
 //!
-//! ρ is what the bound of [`super::stable_step`] makes of Δt = 1, the row sums of the stiffness; c damps
-//! the present motion critically: the Rayleigh quotient is taken along u̇, where the diagonal ¹K of the
-//! secants is known exactly, rather than along u. All sums are exact, so that neither ranks nor threads
-//! change a bit.
+//! ρ is the density for which the bound of [`super::stable_step`] gives Δt = 1; it follows from the row
+//! sums of the stiffness. c damps the present motion critically. Its Rayleigh quotient uses u̇ rather than
+//! u, because the diagonal ¹K of the secants is known exactly along u̇. All sums are exact, so the result
+//! is bitwise independent of ranks and threads.
 //!
-//! [`super::load_step`] says what an equilibrium is, and when bonds break.
+//! [`super::load_step`] defines an equilibrium, and when bonds break.
 //!
-//! Contact is a part of the equilibrium: its repulsion has a potential, and neither friction nor damping acts. What touches
-//! adds its stiffness to ρ as long as it touches; driven rigid bodies move with time, as supports do, and what they exert on
-//! the points counts as reactions.
+//! Contact is part of the equilibrium. Its repulsion has a potential; neither friction nor damping acts.
+//! Points in contact add the contact stiffness to ρ while they touch. Driven rigid bodies move with time,
+//! as supports do. Their forces on the points count as reactions.
 
 use std::time::Instant;
 
@@ -44,18 +43,18 @@ impl<const D: usize> Integrator<D> for DynamicRelaxation {
     }
 }
 
-/// The largest damping c; from 2 on the velocity would change its sign.
+/// Upper limit of the damping c; from c = 2 on, the velocity would change its sign.
 const MOST_DAMPING: f64 = 1.9;
 
-/// What is summed before the forces are found anew: u̇·f and u̇·ρ u̇, J.
+/// Sums before the forces are recomputed: u̇·f and u̇·ρ u̇, J.
 struct Before {
     power: ExactSum,
     inertia: ExactSum,
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Makes an iteration towards the equilibrium of this load step, or, if that is found, begins the next
-    /// one. Collective.
+    /// Make one iteration towards the equilibrium of this load step. If it has been found, begin the next
+    /// load step. Collective.
     fn relax(&mut self, rule: &Relaxation) {
         let (start, forces) = (Instant::now(), self.times.forces.whole());
         let before = if self.load_step.is_settled {
@@ -84,20 +83,20 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// Lets the points start from rest.
+    /// Restart the motion from rest.
     fn stop(&mut self) {
         self.load_step.damping = f64::NAN;
         let velocity = self.fields.relaxation_velocity.iter_mut().flatten();
         velocity.for_each(|component| component.fill(0.0));
     }
 
-    /// Moves the points by an iteration.
+    /// Move the points by one iteration.
     fn drift(&mut self) -> Before {
         self.load_step.iterations += 1;
         self.load_step.since_breaking += 1;
         let damping = self.load_step.damping;
         let (model, fields) = (&self.model, &mut self.fields);
-        // Taken out while it is written.
+        // The velocity is taken out of `fields` while it is written.
         let mut velocity = fields.relaxation_velocity.take();
         if let Some(velocity) = &mut velocity {
             for d in 0..D {
@@ -138,7 +137,7 @@ impl<const D: usize> Simulation<'_, D> {
         Before { power, inertia }
     }
 
-    /// Finds damping and residual from the forces at the new place.
+    /// Compute damping and residual from the forces at the new positions.
     fn look(&mut self, before: Option<Before>) {
         let (model, fields) = (&self.model, &self.fields);
         let [power, free, loads, reactions, stiffness] = sums(model, fields, |point, density| {

@@ -1,6 +1,6 @@
-//! The state of a run in the order of global ids: what a checkpoint holds.
+//! The state of a run, ordered by global ids, as a checkpoint stores it.
 //!
-//! It is the fields that are declared as state, and what is kept of the bonds.
+//! It consists of the fields that are declared as state, and the bond state.
 
 use crate::comm::{IdOrder, agree};
 use crate::error::{Error, Result};
@@ -13,43 +13,43 @@ use super::adaptive::StepControl;
 use super::load_step::LoadStep;
 use super::newton::NewtonState;
 
-/// The state of the points of this rank's block of ids.
+/// The state of the points in this rank's range of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Saved {
     /// The components of all fields that are state.
     pub columns: Vec<Vec<f64>>,
-    /// What is kept of the bonds.
+    /// State of the bonds.
     pub bonds: SavedBonds,
-    /// What the run has come to, but for its points: the same on all ranks.
+    /// Progress of the run, without point data; the same on all ranks.
     pub progress: Vec<u64>,
 }
 
-/// What is kept of the bonds of the points of this rank's block of ids.
+/// Bond state of the points in this rank's range of ids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedBonds {
-    /// Bytes of each point.
+    /// Number of bytes of each point.
     pub lengths: Vec<u32>,
-    /// Those of the points, one after the other.
+    /// Bytes of the points in order.
     pub bytes: Vec<u8>,
 }
 
-/// Words of the clock among those of the progress.
+/// Number of words of the clock in the progress.
 const CLOCK: usize = 5;
 
-/// Words of what an adaptive step follows.
+/// Number of words of the state of an adaptive step.
 const STEP_CONTROL: usize = 6;
 
-/// Words of a load step.
+/// Number of words of a load step.
 const LOAD_STEP: usize = 8;
 
-/// Words of what Newton's method remembers.
+/// Number of words of the state of Newton's method.
 const NEWTON: usize = 5;
 
-/// Words of what refinements have done.
+/// Number of words of the counters of refinement.
 const REFINED: usize = 2;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// What the run has come to, but for its points.
+    /// Encode the progress of the run, without point data.
     pub fn progress(&self) -> Vec<u64> {
         let clock = self.clock.words().into_iter();
         let stage = [self.stage as u64].into_iter();
@@ -67,7 +67,7 @@ impl<const D: usize> Simulation<'_, D> {
         progress.chain(contact).collect()
     }
 
-    /// Goes back to what [`Self::progress`] gave.
+    /// Restore the progress from [`Self::progress`].
     pub(in crate::solver) fn continue_from(&mut self, progress: &[u64]) {
         let (stage, rest) = progress.split_at(1);
         let (clock, rest) = rest.split_at(CLOCK);
@@ -98,12 +98,12 @@ impl<const D: usize> Simulation<'_, D> {
         fields.flat_map(|(_, columns)| columns)
     }
 
-    /// Numbers that are saved a point; the same on all ranks.
+    /// Number of saved values per point; the same on all ranks.
     pub fn saved_width(&self) -> usize {
         self.state().count()
     }
 
-    /// The present state, dealt out by id. Collective.
+    /// The present state, distributed to ranks by id. Collective.
     pub fn save(&self, order: &IdOrder) -> Saved {
         Saved {
             columns: self.saved_columns(order).collect(),
@@ -112,14 +112,14 @@ impl<const D: usize> Simulation<'_, D> {
         }
     }
 
-    /// The columns of the state one by one, each dealt out by id when it is asked for. Collective.
+    /// The columns of the state one by one. Each is distributed by id when it is requested. Collective.
     pub fn saved_columns(&self, order: &IdOrder) -> impl Iterator<Item = Vec<f64>> {
         let owned = self.model.owned();
         self.state()
             .map(move |column| order.collect(self.comm, &column[..owned], 1))
     }
 
-    /// What is kept of the bonds, dealt out by id. Collective.
+    /// The bond state, distributed by id. Collective.
     pub fn saved_bonds(&self, order: &IdOrder) -> SavedBonds {
         let own = self.forces.saved_lengths(self.model.owned());
         let bytes = self.forces.saved(&own);
@@ -128,10 +128,10 @@ impl<const D: usize> Simulation<'_, D> {
         SavedBonds { lengths, bytes }
     }
 
-    /// Goes back to a saved state. Collective.
+    /// Restore a saved state. Collective.
     ///
     /// # Errors
-    /// When the state is that of other points or bonds; the same on all ranks.
+    /// If the state belongs to other points or bonds; the error is the same on all ranks.
     pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
         let lengths = self.forces.saved_lengths(self.model.owned());
         let expected = order.collect(self.comm, &lengths, 1);

@@ -1,4 +1,4 @@
-//! The largest time step that is sure to be stable.
+//! The stable time step: the largest one for which stability is guaranteed.
 //!
 //! The energy of a bond is ½ C (n·(u_j − u_i))² ≤ C ((n·u_i)² + (n·u_j)²), so the whole strain energy
 //! is at most Σ V u·(D u) with D = Σ V C n⊗n, and every frequency obeys ω² ≤ 2 λ_max(D)/ρ. Verlet is
@@ -12,8 +12,8 @@ use crate::comm::{self, Communicator};
 
 use crate::solver::model::Model;
 
-/// The stable step (s) over all ranks; infinite where no point has a bond. `stiffness` holds D of
-/// each owned point (N/m⁴) as columns xx, yy, zz, xy, yz, xz.
+/// Stable step (s) over all ranks; infinite if no point has a bond. `stiffness` is D of each owned point
+/// (N/m⁴) as columns xx, yy, zz, xy, yz, xz.
 pub fn stable_step<const D: usize>(
     comm: &dyn Communicator,
     model: &Model<D>,
@@ -21,7 +21,8 @@ pub fn stable_step<const D: usize>(
 ) -> f64 {
     let own = (0..model.owned())
         .into_par_iter()
-        // Points inside a body have the same families, and so the same entries, as those before them.
+        // Inside a body, consecutive points usually have equal families and equal entries, so the last
+        // result is reused.
         .map_init(Default::default, |last: &mut ([f64; 6], f64), point| {
             let entries = stiffness.each_ref().map(|column| column[point]);
             if entries != last.0 {
@@ -48,7 +49,7 @@ mod tests {
 
     #[test]
     fn eigenvalues_of_a_known_matrix() {
-        // [[2, 1], [1, 2]] has 1 and 3.
+        // The eigenvalues of [[2, 1], [1, 2]] are 1 and 3.
         assert!((largest_eigenvalue(&[2.0, 2.0, 0.0, 1.0, 0.0, 0.0]) - 3.0).abs() < 1e-12);
         assert_eq!(largest_eigenvalue(&[0.0; 6]), 0.0);
     }

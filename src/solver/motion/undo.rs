@@ -1,4 +1,4 @@
-//! Undoing a step: the fields that say so, bonds and clock as they were before it.
+//! Rollback of a step: restore fields, bonds and clock to their values before it.
 
 use crate::solver::Simulation;
 use crate::solver::bonds::KeptBonds;
@@ -6,7 +6,7 @@ use crate::solver::contact::{Contact, ContactState};
 
 use super::Clock;
 
-/// What a run was at the end of a step. Takes memory only where a run asks for it.
+/// Copy of the state of a run at the end of a step. Memory is allocated only if a run needs it.
 #[derive(Debug, Default)]
 pub struct Kept {
     clock: Option<Clock>,
@@ -16,7 +16,7 @@ pub struct Kept {
 }
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Takes note of the present state. Memory that was taken for an earlier one is used again.
+    /// Copy the present state. Memory of an earlier copy is reused.
     pub fn keep(&self, kept: &mut Kept) {
         kept.clock = Some(self.clock);
         let columns = self.fields.each().filter(|(field, _)| field.undone);
@@ -33,7 +33,7 @@ impl<const D: usize> Simulation<'_, D> {
         kept.contact = self.contact.as_ref().map(Contact::state);
     }
 
-    /// Goes back to the state that was noted last; to make the same steps again gives the same bits.
+    /// Restore the copied state. Repeating the same steps gives bitwise the same results.
     pub fn undo(&mut self, kept: &Kept) {
         let Some(clock) = kept.clock else { return };
         self.clock = clock;
@@ -46,7 +46,7 @@ impl<const D: usize> Simulation<'_, D> {
         if let (Some(contact), Some(state)) = (&mut self.contact, &kept.contact) {
             contact.undo(state, &self.model, &self.forces);
         }
-        // Loads know their values at the present time.
+        // Recompute the loads at the present time.
         self.apply_loads(clock.time(), true);
     }
 }

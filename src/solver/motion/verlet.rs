@@ -1,8 +1,8 @@
-//! Velocity Verlet: half a kick, a drift, new forces, half a kick.
+//! Velocity Verlet: half a kick, a drift, a force evaluation, half a kick.
 //!
-//! Silling & Askari 2005; second order in the step, time-reversible, and velocities are known at full
-//! steps. With viscous damping at a rate r the equation of motion is ρ ü = f − r ρ u̇ (Emmrich & Weckner
-//! 2006, eq. 11).
+//! See Silling & Askari 2005. The method is second order in the step and time-reversible, and velocities
+//! are known at full steps. With viscous damping at a rate r, the equation of motion is ρ ü = f − r ρ u̇
+//! (Emmrich & Weckner 2006, eq. 11).
 
 use crate::solver::Simulation;
 use crate::solver::model::Model;
@@ -10,7 +10,7 @@ use crate::solver::model::Model;
 use super::integrator::Integrator;
 use super::walk::{Moving, Part};
 
-/// Steps of the size of the stage, or shorter ones where contact needs them.
+/// Verlet integrator with the step of the stage, or shorter steps if contact needs them.
 pub struct Verlet;
 
 impl<const D: usize> Integrator<D> for Verlet {
@@ -32,15 +32,15 @@ fn constants<const D: usize>(model: &Model<D>, block: u16) -> Constants {
     (model.density[block], model.damping[block])
 }
 
-/// The constants of the points, if all have the same: what is the same for all lets the compiler work on several at
-/// once.
+/// The constants, if all points of the part have the same ones. The compiler can then vectorize over
+/// points.
 fn same_constants<const D: usize>(part: &Part<'_, D>) -> Option<Constants> {
     let (first, others) = part.blocks().split_first()?;
     let is_same = others.iter().all(|block| block == first);
     is_same.then(|| constants(part.model, *first))
 }
 
-/// Half a kick with the forces at the old place, then the drift: u̇ += ½ Δt ü, u += Δt u̇. `step` in s.
+/// Half a kick with the forces at the old positions, then the drift: u̇ += ½ Δt ü, u += Δt u̇. `step` in s.
 pub fn half_kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) {
     for_each_component(part, |place, velocity, force, (density, damping)| {
         let mut total = force;
@@ -53,8 +53,8 @@ pub fn half_kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) {
     });
 }
 
-/// Half a kick with the forces at the new place, and with the damping at the velocity that comes out:
-/// u̇ ← (u̇ + ½ Δt f/ρ)/(1 + ½ r Δt). Returns whether all velocities are still finite. `step` in s.
+/// Half a kick with the forces at the new positions. Damping uses the final velocity: u̇ ← (u̇ + ½ Δt
+/// f/ρ)/(1 + ½ r Δt). Returns whether all velocities are finite. `step` in s.
 pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
     for_each_component(part, |_, velocity, force, (density, damping)| {
         *velocity += 0.5 * step * (force / density);
@@ -65,8 +65,8 @@ pub fn second_half_kick<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bo
     })
 }
 
-/// As [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next one, as long (s), where nothing lies
-/// between them and there is no damping: the same bits.
+/// Fuse [`second_half_kick`] of a step and [`half_kick_and_drift`] of the next step of the same length (s).
+/// Both are adjacent, and there is no damping. The results are bitwise the same.
 pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool {
     for_each_component(part, |place, velocity, force, (density, _)| {
         let half_kick = 0.5 * step * (force / density);
@@ -78,8 +78,8 @@ pub fn kick_and_drift<const D: usize>(part: &mut Part<'_, D>, step: f64) -> bool
     })
 }
 
-/// Calls `work` with a component of displacement (m), velocity (m/s) and force density (N/m³), each of them, of each
-/// point. Returns whether all calls did.
+/// Call `work` with displacement (m), velocity (m/s) and force density (N/m³) of each component of each
+/// point. Returns whether all calls returned true.
 fn for_each_component<const D: usize>(
     part: &mut Part<'_, D>,
     work: impl Fn(&mut f64, &mut f64, f64, Constants) -> bool,
@@ -106,7 +106,7 @@ fn for_each_point(
     let (places, velocities) = (&mut moving.displacement[..count], moving.velocity);
     let internal = &moving.force.internal[..count];
     let mut all = true;
-    // The same loop twice: what is asked once is not asked for each point.
+    // The loop exists twice, so that the check for external forces is outside of it.
     match moving.force.external {
         None => {
             for k in 0..count {

@@ -1,5 +1,5 @@
-//! One walk over the owned points by several threads, a part of them at a time, small enough that all steps of
-//! work on it find it in the cache.
+//! A loop over the owned points in parts, on several threads. A part is small enough to stay in the cache
+//! for all work on it.
 
 use rayon::iter::split;
 use rayon::prelude::*;
@@ -10,53 +10,53 @@ use crate::solver::model::Model;
 use super::Fields;
 use super::fields::Exerted;
 
-/// Points of a part; the last one may have less.
+/// Number of points of a part; the last part may have fewer.
 pub const PART: usize = 2048;
 
 /// A column of numbers of some points for each of `N` components.
 type Columns<'a, const N: usize> = [&'a mut [f64]; N];
 
-/// Some of the owned points with what moves them.
+/// A part of the owned points with their fields.
 pub struct Part<'a, const D: usize> {
     /// The points and their constants.
     pub model: &'a Model<D>,
-    /// Local index of the first one.
+    /// Local index of the first point.
     pub first: usize,
-    /// As [`Fields::displacement`].
+    /// Entries of [`Fields::displacement`].
     pub displacement: Columns<'a, D>,
-    /// As [`Fields::temperature`].
+    /// Entries of [`Fields::temperature`].
     pub temperature: Option<Columns<'a, 1>>,
-    /// As [`Fields::thermal_stretch`].
+    /// Entries of [`Fields::thermal_stretch`].
     pub thermal_stretch: Option<Columns<'a, 1>>,
-    /// As [`Fields::velocity`].
+    /// Entries of [`Fields::velocity`].
     pub velocity: Columns<'a, D>,
-    /// As [`Fields::internal_force`].
+    /// Entries of [`Fields::internal_force`].
     pub internal_force: Columns<'a, D>,
-    /// As [`Fields::external_force`].
+    /// Entries of [`Fields::external_force`].
     pub external_force: Option<Columns<'a, D>>,
-    /// As [`Fields::reaction`].
+    /// Entries of [`Fields::reaction`].
     pub reaction: Option<Columns<'a, D>>,
-    /// As [`Fields::external_work`].
+    /// Entries of [`Fields::external_work`].
     pub external_work: Option<Columns<'a, 1>>,
-    /// As [`Fields::damping_power`] and [`Fields::damped_energy`].
+    /// Entries of [`Fields::damping_power`] and [`Fields::damped_energy`].
     pub damping: Option<Columns<'a, 2>>,
     bond_inputs: BondInputs<'a, D>,
 }
 
-/// A component of the motion of some points, and what moves them.
+/// One component of the motion of some points, and of the forces on them.
 pub struct Moving<'a> {
     /// Displacements, m.
     pub displacement: &'a mut [f64],
     /// Velocities, m/s.
     pub velocity: &'a mut [f64],
-    /// Force densities.
+    /// Force densities, N/m³.
     pub force: Exerted<'a>,
     /// Reactions, N/m³, if there are any.
     pub reaction: Option<&'a mut [f64]>,
 }
 
 impl<'a, const D: usize> Part<'a, D> {
-    /// All owned points.
+    /// Create a part with all owned points.
     pub fn all(
         model: &'a Model<D>,
         fields: &'a mut Fields<D>,
@@ -94,12 +94,12 @@ impl<'a, const D: usize> Part<'a, D> {
         &self.model.block[self.first..self.first + self.count()]
     }
 
-    /// The entries of the points in a field of all owned points.
+    /// Entries of these points in a field of all owned points.
     pub fn of<'f>(&self, field: &'f [Vec<f64>; D]) -> [&'f [f64]; D] {
         (field.each_ref()).map(|column| &column[self.first..self.first + self.count()])
     }
 
-    /// A component of the motion.
+    /// One component of the motion.
     pub fn component(&mut self, d: usize) -> Moving<'_> {
         Moving {
             displacement: self.displacement[d],
@@ -112,8 +112,8 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Finds the power of damping at the present velocities, and adds the energy that it takes in a step
-    /// (s), by the trapezoid rule.
+    /// Compute the power of damping at the present velocities. Add the energy that damping dissipates in a
+    /// step (s), by the trapezoidal rule.
     pub fn add_damped_energy(&mut self, step: f64) {
         let (model, first) = (self.model, self.first);
         let Some([powers, energies]) = &mut self.damping else {
@@ -129,7 +129,8 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Write displacements and thermal stretches to where bonds read them, and zero the sums of their forces.
+    /// Write displacements and thermal stretches to the bond inputs, and zero the force sums of these
+    /// points.
     pub fn write_bond_inputs(&mut self) {
         let thermal_stretch = self.thermal_stretch.as_ref();
         self.bond_inputs.write_bond_inputs(
@@ -141,7 +142,7 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Takes out so many of the points, the first ones.
+    /// Split off the first `count` points.
     fn split_off_first(&mut self, count: usize) -> Self {
         let first = self.first;
         self.first += count;
@@ -165,7 +166,7 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 }
 
-/// Takes out the first entries of columns.
+/// Split off the first entries of columns.
 fn cut<'a, const N: usize>(columns: &mut Columns<'a, N>, count: usize) -> Columns<'a, N> {
     columns.each_mut().map(|column| {
         let (first, others) = std::mem::take(column).split_at_mut(count);
@@ -174,15 +175,15 @@ fn cut<'a, const N: usize>(columns: &mut Columns<'a, N>, count: usize) -> Column
     })
 }
 
-/// Number of parts that the owned points fall into.
+/// Number of parts of the owned points.
 pub fn parts(owned: usize) -> usize {
     owned.div_ceil(PART)
 }
 
-/// Some parts with what they have each.
+/// Several parts, and one entry of additional data per part.
 type Parts<'a, C, const D: usize> = (Part<'a, D>, &'a mut [C]);
 
-/// Parts in two halves; one cannot be halved.
+/// Split the parts into two halves, unless there is only one.
 fn halves<C, const D: usize>(
     (mut points, each): Parts<'_, C, D>,
 ) -> (Parts<'_, C, D>, Option<Parts<'_, C, D>>) {
@@ -194,11 +195,11 @@ fn halves<C, const D: usize>(
     ((points_of_first, first), Some((points, second)))
 }
 
-/// Calls `work` with each part of all points and what `each`, which has one entry a part, has for it. Returns whether
-/// all calls did.
+/// Call `work` with each part of all points and its entry of `each`. Returns whether all calls returned
+/// true.
 ///
 /// # Panics
-/// When `each` has not one entry a part.
+/// If `each` does not have one entry per part.
 pub fn walk<'a, C: Send, const D: usize>(
     all: Part<'a, D>,
     each: &'a mut [C],

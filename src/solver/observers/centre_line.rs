@@ -1,10 +1,10 @@
-//! The lines through the middle of damaged points that hang together: where a crack runs.
+//! Centre lines of connected damaged points: the path of a crack and its branches.
 //!
-//! Damage is spread over a band some spacings wide. The way to each point of the band from the crack's
-//! start, along the band, is found; the points are sorted into sections by this way, and the parts of a
-//! out_of_plane_measure that do not hang together lie on different branches. The middles of the parts, joined from
-//! out_of_plane_measure to out_of_plane_measure, are the lines (the level-set diagram of Lazarus & Verroust 1999). Where the band is
-//! wide or ragged, nothing but these middles moves a little.
+//! Damage is spread over a band some spacings wide. Dijkstra's method finds the shortest path along the
+//! band from the start of the crack to each point. The path length divides the points into sections. If a
+//! section consists of unconnected parts, the parts lie on different branches. The centre lines join the
+//! centroids of successive parts (the level-set diagram of Lazarus & Verroust 1999). A wide or ragged band
+//! shifts only these centroids slightly.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -16,49 +16,50 @@ use crate::points::distance_squared;
 
 type Vector = Vector3<f64>;
 
-/// Points as far as a distance count as within it, up to this share of it.
+/// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;
 
 /// A point of a crack's band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Damaged {
-    /// Where it is, m.
+    /// Position, m.
     pub place: [f64; 3],
-    /// How much it counts for the middle.
+    /// Weight of the point in the centroid of its part.
     pub weight: f64,
 }
 
-/// A place on a crack.
+/// A vertex of a crack's centre line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vertex {
-    /// Where it is, m.
+    /// Position, m.
     pub place: [f64; 3],
-    /// Length of the crack from its start to here, m.
+    /// Length of the crack from its start to this vertex, m.
     pub along: f64,
 }
 
-/// A branch: from where it leaves the crack, or from the start, to its tip.
+/// A branch: from the start of the crack, or from its parent branch, to its tip.
 pub type Branch = Vec<Vertex>;
 
-/// How far apart points of a crack are.
+/// Distances that define which points are connected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
-    /// Points up to this distance hang together, m.
+    /// Points up to this distance apart are connected, m.
     pub link: f64,
-    /// Length of a out_of_plane_measure, m, at least a link; a branch that is shorter does not count, and the crack
-    /// starts with the points up to this distance from its start.
-    pub out_of_plane_measure: f64,
+    /// Length of a section, m, at least `link`. Shorter branches are dropped. Points up to this distance
+    /// from the start of the crack begin a path.
+    pub section_length: f64,
 }
 
-/// The length of all branches together, m.
+/// Total length of all branches, m.
 pub fn length(branches: &[Branch]) -> f64 {
     let own = |branch: &Branch| branch[branch.len() - 1].along - branch[0].along;
-    // The sum of nothing would be -0.
+    // The sum of an empty iterator would be -0.
     branches.iter().map(own).fold(0.0, |sum, own| sum + own)
 }
 
-/// The branches of a crack that starts at `from` (m): first the one with the longest way to its tip.
-/// None if no point is near the start. Depends on nothing but the points and their order.
+/// Find the branches of a crack that starts at `from` (m). The first branch is the one with the longest
+/// path to its tip. The result is empty if no point is near the start. It depends only on the points and
+/// their order.
 pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch> {
     let places: Vec<[f64; 3]> = points.iter().map(|point| point.place).collect();
     let bins = Bins::new(&places, reach.link * (1.0 + TOLERANCE));
@@ -68,17 +69,17 @@ pub fn branches(from: [f64; 3], points: &[Damaged], reach: Reach) -> Vec<Branch>
     lines(from, points, &parts, reach)
 }
 
-/// The shortest ways from the start along the band.
+/// The shortest paths along the band from the start.
 struct Ways {
-    /// Of each point that is reached, m; infinite for others.
+    /// Path length of each reached point, m; infinite for other points.
     length: Vec<f64>,
-    /// The point before on the way; none for the first.
+    /// The preceding point on the path; none for the first point.
     before: Vec<Option<usize>>,
-    /// The points that are reached, by length and then by index.
+    /// The reached points, ordered by path length, then by index.
     order: Vec<usize>,
 }
 
-/// A point that may be the next to be reached; the largest has the shortest way, then the lowest index.
+/// A candidate for the next reached point. The greatest one has the shortest path, then the lowest index.
 #[derive(PartialEq)]
 struct Next {
     length: f64,
@@ -101,7 +102,7 @@ impl PartialOrd for Next {
 }
 
 impl Ways {
-    /// By Dijkstra's method, from all points within a out_of_plane_measure of the start.
+    /// Find the paths by Dijkstra's method, starting from all points within a section length of the start.
     fn new(from: [f64; 3], places: &[[f64; 3]], bins: &Bins, reach: Reach) -> Self {
         let mut ways = Self {
             length: vec![f64::INFINITY; places.len()],
@@ -111,7 +112,7 @@ impl Ways {
         let mut open = BinaryHeap::new();
         for (point, place) in places.iter().enumerate() {
             let length = distance_squared(from, *place).sqrt();
-            if length <= reach.out_of_plane_measure * (1.0 + TOLERANCE) {
+            if length <= reach.section_length * (1.0 + TOLERANCE) {
                 ways.length[point] = length;
                 open.push(Next { length, point });
             }
@@ -142,27 +143,27 @@ impl Ways {
     }
 }
 
-/// Points of one out_of_plane_measure that hang together.
+/// Connected points of one section.
 struct Part {
-    /// The part before, towards the start.
+    /// The preceding part, towards the start.
     parent: Option<usize>,
     members: Vec<usize>,
-    /// Length of the longest way to a point of it or of a part behind it, m.
+    /// Largest path length of the points of this part and of its descendants, m.
     farthest: f64,
     children: Vec<usize>,
 }
 
-/// The parts, each behind its parent.
+/// Divide the points into parts. Each part comes after its parent.
 fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part> {
-    let out_of_plane_measure =
-        |point: usize| (ways.length[point] / reach.out_of_plane_measure) as usize;
+    let section = |point: usize| (ways.length[point] / reach.section_length) as usize;
     let mut part_of: Vec<Option<usize>> = vec![None; points.len()];
     let mut parts: Vec<Part> = Vec::new();
     for first in &ways.order {
         if part_of[*first].is_some() {
             continue;
         }
-        // The nearest point of a part has its way through an earlier out_of_plane_measure, or none.
+        // The point of a part with the shortest path has its predecessor in an earlier section, or has no
+        // predecessor.
         let parent = ways.before[*first].and_then(|before| part_of[before]);
         let number = parts.len();
         part_of[*first] = Some(number);
@@ -173,7 +174,7 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
             bins.within(points[point].place, |other, _| {
                 let other = other as usize;
                 let is_free = part_of[other].is_none() && ways.length[other].is_finite();
-                if is_free && out_of_plane_measure(other) == out_of_plane_measure(point) {
+                if is_free && section(other) == section(point) {
                     part_of[other] = Some(number);
                     members.push(other);
                 }
@@ -197,8 +198,8 @@ fn parts(points: &[Damaged], bins: &Bins, ways: &Ways, reach: Reach) -> Vec<Part
     parts
 }
 
-/// Where a crack forks, parts with nothing behind them are no branches: of several such ones one is made,
-/// beside longer ones they are dropped.
+/// Handle parts without children (stubs) at forks. If all parts at a fork are stubs, merge them into one;
+/// otherwise, drop the stubs.
 fn drop_stubs(parts: &mut [Part]) {
     for number in 0..parts.len() {
         let children = std::mem::take(&mut parts[number].children);
@@ -214,7 +215,7 @@ fn drop_stubs(parts: &mut [Part]) {
             parts[*last].members.sort_unstable();
             kept.push(*last);
         }
-        // The longest first; of equally long ones the first that was reached.
+        // Sort by path length, longest first; among equal ones, the part reached first comes first.
         kept.sort_by(|a, b| {
             let order = parts[*b].farthest.total_cmp(&parts[*a].farthest);
             order.then(a.cmp(b))
@@ -223,9 +224,10 @@ fn drop_stubs(parts: &mut [Part]) {
     }
 }
 
-/// Joins the middles of the parts.
+/// Join the centroids of successive parts to branches.
 fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Vec<Branch> {
-    // The middle of a part; where nothing is behind it, as far towards the middle as its points reach.
+    // Vertex of a part: its centroid. For a part without children, the vertex is moved along the line as
+    // far as the points of the part extend.
     let place = |part: &Part, before: Vector| {
         let members = || part.members.iter().map(|member| &points[*member]);
         let (mut sum, mut weight) = (Vector::zeros(), 0.0);
@@ -246,7 +248,8 @@ fn lines(from: [f64; 3], points: &[Damaged], parts: &[Part], reach: Reach) -> Ve
         place: from,
         along: 0.0,
     };
-    // The start has the parts without parents behind it, of which the one that reaches farthest counts.
+    // The parts without parents are the candidates for the first part. Only the one that extends farthest
+    // is used.
     let roots = (0..parts.len()).filter(|number| parts[*number].parent.is_none());
     let farther = |a: &usize, b: &usize| {
         let order = parts[*a].farthest.total_cmp(&parts[*b].farthest);
@@ -288,7 +291,7 @@ mod tests {
 
     const REACH: Reach = Reach {
         link: 2.0,
-        out_of_plane_measure: 3.0,
+        section_length: 3.0,
     };
 
     /// Two rows of points of unit spacing along a straight line.
@@ -333,7 +336,7 @@ mod tests {
         let [upper, lower] = [&found[0], &found[1]];
         assert_eq!(upper[0].along, 0.0);
         assert!(lower[0].place[1].abs() < 1e-9);
-        // The lower one leaves the crack near the fork.
+        // The lower branch starts near the fork.
         assert!((18.0..24.0).contains(&lower[0].along), "{lower:?}");
         let tip = |branch: &Branch| branch[branch.len() - 1].place;
         assert!((tip(upper)[0] - 40.0).abs() < 0.5 && (tip(upper)[1] - 20.0).abs() < 0.5);

@@ -1,4 +1,4 @@
-//! The columns of the history: each with its name, its unit and what its value is, in one place.
+//! The columns of the history, with name, unit and value of each in one place.
 
 use crate::component::AXES;
 use crate::solver::contact::ContactNow;
@@ -11,39 +11,41 @@ use super::tip::TipNow;
 
 /// Global quantities of one row of the history; the same on all ranks.
 pub struct GlobalState {
-    /// Time and step.
+    /// Time and step of the run.
     pub clock: Clock,
     /// Energies of the whole body.
     pub energies: Energies,
-    /// By component, kg m/s.
+    /// Momentum by component, kg m/s.
     pub momentum: Vec<f64>,
-    /// About the origin, kg m²/s: z in plane problems, x, y and z of solids, where the history has it.
+    /// Angular momentum about the origin, kg m²/s: z in plane problems; x, y and z in 3D. Empty if the
+    /// history does not contain it.
     pub angular_momentum: Vec<f64>,
-    /// Bonds broken since the start.
+    /// Number of bonds broken since the start.
     pub broken: u64,
-    /// Points above the threshold of damage, and the corners (m) of the box around them.
+    /// Number of points above the damage threshold, and the corners (m) of their bounding box.
     pub cracked_points: u64,
-    /// See `cracked_points`.
+    /// Corners of the bounding box of the cracked points, m.
     pub cracked_extent: [[f64; 3]; 2],
-    /// Points whose bonds left are too few for their law.
+    /// Number of points whose intact bonds are too few for their law.
     pub singular_points: u64,
     /// State of the present load step.
     pub load_step: LoadStep,
-    /// Force evaluations of the present load step.
+    /// Number of force evaluations of the present load step.
     pub force_evaluations: u64,
-    /// Steps undone so far, and the largest number of bonds of a point that a step has broken since the last row.
+    /// Number of steps rolled back so far, and the largest number of bonds of a point that broke in one
+    /// step since the last row.
     pub undone_steps: u64,
     /// See `undone_steps`.
     pub most_broken: u64,
-    /// What changes of the density scale have added, J.
+    /// Energy that changes of the density scale have added, J.
     pub density_scale_energy: f64,
     /// Number of points.
     pub points: u64,
-    /// What refinements have added, J.
+    /// Energy that refinements have added, J.
     pub refinement_energy: f64,
-    /// Forces of supports on each set by component, N.
+    /// Force of the supports on each set by component, N.
     pub reactions: Vec<Vec<f64>>,
-    /// Forces of supports in a direction, N.
+    /// Force of the supports in a given direction, N.
     pub support_forces: Vec<f64>,
     /// Values of the columns of each probe.
     pub probes: Vec<Vec<f64>>,
@@ -53,18 +55,18 @@ pub struct GlobalState {
     pub fronts: Vec<f64>,
     /// Length (m) and number of branches of each crack.
     pub cracks: Vec<(f64, usize)>,
-    /// Of each crack tip.
+    /// State of each crack tip.
     pub tips: Vec<TipNow>,
-    /// Contact.
+    /// Quantities of contact.
     pub contact: ContactNow,
-    /// Fragments, where the history has them.
+    /// Fragments, if the history contains them.
     pub fragments: Fragments,
 }
 
-/// The value of a column.
+/// Function that computes the value of a column.
 type Value = Box<dyn Fn(&GlobalState) -> f64>;
 
-/// The columns in their order.
+/// The columns in order.
 pub struct Columns {
     dimension: usize,
     names: Vec<(String, &'static str)>,
@@ -72,7 +74,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// None yet, of a history in so many dimensions.
+    /// Create an empty list of columns for this dimension.
     pub fn new(dimension: usize) -> Self {
         Self {
             dimension,
@@ -81,7 +83,7 @@ impl Columns {
         }
     }
 
-    /// Adds a column.
+    /// Add a column.
     pub fn add(
         &mut self,
         name: impl Into<String>,
@@ -92,7 +94,7 @@ impl Columns {
         self.values.push(Box::new(value));
     }
 
-    /// Adds a column for each component.
+    /// Add a column for each component.
     pub fn add_vector(
         &mut self,
         name: &str,
@@ -104,18 +106,18 @@ impl Columns {
         }
     }
 
-    /// Name and unit of each.
+    /// Name and unit of each column.
     pub fn names(&self) -> &[(String, &'static str)] {
         &self.names
     }
 
-    /// The value of a column in a row.
+    /// Value of a column in a row.
     pub fn value(&self, row: &[f64], name: &str) -> Option<f64> {
         let place = self.names.iter().position(|(own, _)| own == name);
         place.map(|place| row[place])
     }
 
-    /// The values now.
+    /// Compute the present row.
     pub fn row(&self, now: &GlobalState) -> Vec<f64> {
         self.values.iter().map(|value| value(now)).collect()
     }

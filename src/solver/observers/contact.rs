@@ -14,7 +14,7 @@ use crate::points::distance_squared;
 use crate::solver::Simulation;
 use crate::solver::model::Model;
 
-/// Edge of a cell in largest distances: few points are near a border then.
+/// Edge of a cell, in units of the largest distance. With large cells, few points are near a cell border.
 const CELL: f64 = 8.0;
 
 /// Points that start nearer than their spacing count only below this fraction of their initial distance.
@@ -29,11 +29,11 @@ const CHUNK: usize = 1 << 15;
 /// Two points of different bodies that are nearer than bodies that touch can be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// Their bodies, the lower index first.
+    /// Bodies of the points, the lower index first.
     pub bodies: [usize; 2],
-    /// Their ids.
+    /// Ids of the points.
     pub ids: [u64; 2],
-    /// The middle between them, m.
+    /// Midpoint of the points, m.
     pub place: [f64; 3],
     /// Their distance, m.
     pub distance: f64,
@@ -41,7 +41,7 @@ pub struct Contact {
     pub were_bonded: bool,
 }
 
-/// The bodies that may come into contact.
+/// Pairs of bodies that may come into contact.
 pub struct ContactWatch {
     /// Pairs of bodies that no bond joins, or whose bonds can break.
     pairs: Vec<Pair>,
@@ -64,16 +64,16 @@ struct Meeting {
     pair: Pair,
     /// The largest distance that counts, m.
     radius: f64,
-    /// Where points of both can be, m.
+    /// Corners of the region in which points of both bodies can be, m.
     lower: [f64; 3],
     upper: [f64; 3],
 }
 
-/// A point on its way to the ranks that compare it.
+/// A point as sent to the ranks that compare it.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Candidate {
-    /// Number of the meeting, twice, and 1 more for the second body.
+    /// Twice the index of the meeting, plus 1 for the second body.
     side: u64,
     id: u64,
     place: [f64; 3],
@@ -82,7 +82,7 @@ struct Candidate {
 }
 
 impl ContactWatch {
-    /// For the bodies of a run. Collective.
+    /// Find the pairs of bodies to check. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (comm, model) = (simulation.comm, &simulation.model);
         let bodies = simulation.problem.bodies.len();
@@ -144,12 +144,12 @@ impl ContactWatch {
         agree_on_nearest(comm, nearest)
     }
 
-    /// The pairs whose boxes are nearer than their points may be.
+    /// The pairs of bodies whose bounding boxes are nearer than their points may be.
     fn meetings<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<Meeting> {
         if self.pairs.is_empty() {
             return Vec::new();
         }
-        // Lower corners and, with the sign turned, upper ones.
+        // Lower corners, and upper corners with the sign changed.
         let (model, displacement) = (&simulation.model, &simulation.fields.displacement);
         let none = || vec![f64::INFINITY; 6 * self.spacing.len()];
         let include = |mut corners: Vec<f64>, point: usize| {
@@ -190,7 +190,7 @@ impl ContactWatch {
     }
 }
 
-/// Present place of an owned point, m.
+/// Present position of an owned point, m.
 fn place_of<const D: usize>(
     model: &Model<D>,
     displacement: &[Vec<f64>; D],
@@ -203,7 +203,7 @@ fn place_of<const D: usize>(
     place
 }
 
-/// The own points where bodies meet, packed for each rank.
+/// The owned points in the regions where bodies may meet, packed for each rank.
 fn candidates<const D: usize>(
     simulation: &Simulation<'_, D>,
     meetings: &[Meeting],
@@ -248,7 +248,7 @@ fn candidates<const D: usize>(
     outgoing
 }
 
-/// The ranks that compare the points in the cells within reach of a place.
+/// The ranks that compare the points in the cells within `reach` of a position.
 fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -> Vec<usize> {
     let mut homes = Vec::with_capacity(1);
     for corner in 0..1_u32 << D {
@@ -266,7 +266,7 @@ fn homes<const D: usize>(place: [f64; 3], reach: f64, edge: f64, ranks: usize) -
     homes
 }
 
-/// The nearest points of two bodies that have come nearer than their spacing, of those given.
+/// Find the nearest of the given points of two bodies whose distance is below their spacing.
 fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<Contact> {
     if first.is_empty() || second.is_empty() {
         return None;
@@ -303,7 +303,7 @@ fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<C
     nearest
 }
 
-/// The nearest of what the ranks have found, by distance and then by ids. Collective.
+/// Select the nearest pair over all ranks, by distance, then by ids. Collective.
 fn agree_on_nearest(comm: &dyn Communicator, own: Option<Contact>) -> Option<Contact> {
     let found = own.map(|contact| {
         let ([a, b], [x, y, z]) = (contact.bodies, contact.place);

@@ -1,4 +1,4 @@
-//! Crack paths: the lines along which damage runs from a place on, and their length.
+//! Crack paths: centre lines of the damage that starts at a given position, and their length.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -10,21 +10,21 @@ use crate::solver::conditions::{members, not_empty};
 
 use super::centre_line::{Branch, Damaged, Reach, branches};
 
-/// The share of the horizon over which damaged points hang together: a gap of one point in a row is
-/// bridged, while branches come apart soon.
+/// Distance, in horizons, up to which damaged points are connected. It bridges a gap of one point in a row,
+/// and branches still separate soon.
 const LINK: f64 = 2.0 / 3.0;
 
-/// Diagonal neighbours hang together, however small the horizon is.
+/// Minimum of the same distance in spacings, so that diagonal neighbours are connected for any horizon.
 const DIAGONAL: f64 = 1.5;
 
-/// A crack whose path is found.
+/// A crack whose path is tracked.
 pub struct CrackPath {
     rule: problem::CrackPath,
     points: Vec<u32>,
     reach: Reach,
 }
 
-/// A point above the threshold on its way to all ranks.
+/// A point above the damage threshold, as sent to all ranks.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Found {
@@ -34,10 +34,10 @@ struct Found {
 }
 
 impl CrackPath {
-    /// Finds the points that are looked at. Collective.
+    /// Find the points of the set in which the crack is tracked. Collective.
     ///
     /// # Errors
-    /// When the set is empty; the same on all ranks.
+    /// If the set is empty; the error is the same on all ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::CrackPath,
@@ -53,7 +53,7 @@ impl CrackPath {
         let link = (LINK * problem.horizon).max(DIAGONAL * spacing);
         let reach = Reach {
             link,
-            out_of_plane_measure: problem.horizon.max(link),
+            section_length: problem.horizon.max(link),
         };
         Ok(Self {
             rule: rule.clone(),
@@ -62,13 +62,13 @@ impl CrackPath {
         })
     }
 
-    /// Its name.
+    /// Name of the crack.
     pub fn name(&self) -> &str {
         &self.rule.name
     }
 
-    /// Its branches at a damage of the owned points; the same on all ranks, and to the bit on any number
-    /// of them. Collective.
+    /// Find the branches for the given damage of the owned points. The result is bitwise the same on all
+    /// ranks and for any number of ranks. Collective.
     pub fn branches<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

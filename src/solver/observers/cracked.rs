@@ -1,20 +1,20 @@
-//! The part of the body that counts as cracked.
+//! Number and bounding box of the cracked points.
 
 use crate::comm::{self, Communicator};
 use crate::solver::Simulation;
 
 use super::snapshot::Snapshot;
 
-/// The points of a rank that count as cracked.
+/// The cracked points of a rank.
 pub struct Cracked {
-    /// How many there are.
+    /// Number of cracked points.
     pub points: u64,
     lower: [f64; 3],
     upper: [f64; 3],
 }
 
 impl Cracked {
-    /// At this moment.
+    /// Find the cracked points at the time of the snapshot.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>, snapshot: &Snapshot) -> Self {
         let mut cracked = Self {
             points: 0,
@@ -35,7 +35,7 @@ impl Cracked {
         cracked
     }
 
-    /// Corners (m) of the box around the cracked points of all ranks; NaN if there is none.
+    /// Corners (m) of the bounding box of the cracked points of all ranks; NaN if there is none.
     pub fn extent(mut self, comm: &dyn Communicator) -> ([f64; 3], [f64; 3]) {
         comm::min(comm, &mut self.lower);
         comm.max(&mut self.upper);

@@ -1,4 +1,4 @@
-//! Fragments: the pieces of the bodies that intact bonds hold together.
+//! Fragments: sets of points that intact bonds connect.
 
 use std::collections::BTreeMap;
 
@@ -8,20 +8,21 @@ use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{Found, least};
 use crate::solver::Simulation;
 
-/// The fragments at one moment; the same on all ranks.
+/// The present fragments; the same on all ranks.
 #[derive(Debug, Clone, Default)]
 pub struct Fragments {
-    /// Number of those with two or more points.
+    /// Number of fragments with two or more points.
     pub count: u64,
     /// Number of points without intact bonds.
     pub loose: u64,
-    /// Mass of the one with the most points, kg; of those with as many, the one with the smallest id.
+    /// Mass of the fragment with the most points, kg. Among equally large ones, it is the fragment with the
+    /// smallest id.
     pub largest_mass: f64,
-    /// Its momentum by component, kg m/s.
+    /// Momentum of this fragment by component, kg m/s.
     pub largest_momentum: Vec<f64>,
 }
 
-/// How many points of a rank are in a fragment.
+/// Number of points of a rank in a fragment.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Share {
@@ -30,7 +31,7 @@ struct Share {
 }
 
 impl Fragments {
-    /// Those of a simulation. Collective.
+    /// Find the present fragments of a simulation. Collective.
     pub fn now<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let ids = simulation.fragment_ids();
         let (comm, model) = (simulation.comm, &simulation.model);
@@ -38,7 +39,7 @@ impl Fragments {
         for id in &ids {
             *own.entry(*id as u64).or_default() += 1;
         }
-        // Each fragment has a rank that counts its points.
+        // Each fragment is assigned to a rank, which counts its points.
         let mut outgoing = vec![Vec::new(); comm.size()];
         for (fragment, points) in own {
             let home = (fragment % comm.size() as u64) as usize;
@@ -60,7 +61,7 @@ impl Fragments {
         });
         let largest = largest.min_by(|a, b| a.key.total_cmp(&b.key).then(a.ids.cmp(&b.ids)));
         let largest = least(comm, largest).map(|found| found.ids[0] as f64);
-        // Mass, then momentum.
+        // The first sum is the mass; the others are the momentum.
         let mut sums = vec![ExactSum::ZERO; 1 + D];
         let members = ids
             .iter()

@@ -1,4 +1,4 @@
-//! Fronts: how far a field has come along a line.
+//! Fronts: the farthest position along a line at which a field exceeds a threshold.
 
 use crate::error::{Error, Result};
 use crate::problem;
@@ -7,17 +7,17 @@ use super::reach::Course;
 use super::row_fields::RowFields;
 use crate::solver::Simulation;
 
-/// A front that is followed.
+/// A front that is tracked.
 pub struct Front {
     rule: problem::Front,
     course: Course,
 }
 
 impl Front {
-    /// Finds the points along the line. Collective.
+    /// Find the points along the line. Collective.
     ///
     /// # Errors
-    /// When there is none; the same on all ranks.
+    /// If there is no such point; the error is the same on all ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::Front,
@@ -37,8 +37,8 @@ impl Front {
         })
     }
 
-    /// How far along the line (m) the size of the field is above the threshold; NaN where it is nowhere.
-    /// Collective.
+    /// Position along the line (m) up to which the magnitude of the field exceeds the threshold; NaN if it
+    /// exceeds it nowhere. Collective.
     pub fn position<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

@@ -25,46 +25,47 @@ use super::tip::Tip;
 /// Points summed by one task.
 const CHUNK: usize = 4096;
 
-/// A point that is followed.
+/// A point whose values the history contains.
 struct Probe {
-    /// Local index, on the rank that owns it.
+    /// Local index on the rank that owns the point.
     point: Option<usize>,
-    /// Fields beside displacement and velocity.
+    /// Requested fields other than displacement and velocity.
     fields: Vec<Field>,
 }
 
-/// The columns of the history and what they need.
+/// The columns of the history, and the data for computing them.
 pub struct HistoryObserver {
     columns: Columns,
     reactions: Vec<Vec<u32>>,
-    /// Points, and the direction in which the force on them counts.
+    /// Points of each support force, and the direction of the force component.
     support_forces: Vec<(Vec<u32>, [f64; 3])>,
     statistics: Vec<FieldStatistics>,
     probes: Vec<Probe>,
     fronts: Vec<Front>,
     cracks: Vec<CrackPath>,
     tips: Vec<Tip>,
-    /// Energy (J) in the first row, and intact bonds before.
+    /// Energy (J) in the first row, and number of bonds that were intact before any could break.
     start: Option<(f64, u64)>,
 }
 
-/// Energies of the whole body at one moment, J.
+/// Energies of the whole body, J.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Energies {
     /// ½ Σ ρ V u̇² of the points.
     pub kinetic: f64,
     /// Σ W V.
     pub strain: f64,
-    /// Set free by bonds that broke.
+    /// Energy released by broken bonds.
     pub fracture: f64,
-    /// How much of that bonds held above their criterion when they were seen to break.
+    /// Part of the fracture energy above the criterion of the bonds when they broke.
     pub overshoot: f64,
     /// Work done by loads and supports.
     pub work: f64,
-    /// Taken by viscous damping, bonds that yield, friction and contact damping.
+    /// Energy dissipated by viscous damping, bonds that yield, friction and contact damping.
     pub dissipated: f64,
-    /// Kinetic (that of rigid bodies included) + strain + contact + fracture + dissipated − work, less its value at the start and what refinements
-    /// and changes of the density scale have added: 0 for an exact integrator.
+    /// Error of the energy balance: kinetic (including rigid bodies) + strain + contact + fracture +
+    /// dissipated − work, minus its value at the start and minus the energy that refinements and changes of
+    /// the density scale have added. It is 0 for an exact integrator.
     pub error: f64,
 }
 
@@ -73,23 +74,23 @@ pub struct Energies {
 pub struct HistoryRow {
     /// Values in the order of the columns; the same on all ranks.
     pub values: Vec<f64>,
-    /// Number of the step that it is of.
+    /// Step number of the row.
     pub number: u64,
-    /// The energies among them.
+    /// Energies of the row.
     pub energies: Energies,
-    /// Energy at the start, which the error of the balance refers to, J.
+    /// Energy at the start, J; the error of the energy balance is relative to it.
     pub first_energy: f64,
-    /// Kinetic energy, J, that loads and prescribed motions can give within a step before they do work.
+    /// Kinetic energy, J, that loads and prescribed motions can add in a step before they do work.
     pub step_energy: f64,
-    /// Bonds broken since the start.
+    /// Number of bonds broken since the start.
     pub broken: u64,
 }
 
 impl HistoryObserver {
-    /// Finds the sets, probes, lines and tips.
+    /// Find the sets, probes, lines and tips.
     ///
     /// # Errors
-    /// On an empty set and on a line without points; the same on all ranks.
+    /// If a set is empty or a line has no points; the error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let mut columns = Columns::new(D);
@@ -272,10 +273,10 @@ impl HistoryObserver {
         })
     }
 
-    /// Finds sets, probes, lines and tips anew, after points have changed their ranks. Collective.
+    /// Find the sets, probes, lines and tips again after points have migrated. Collective.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// Same as for [`Self::new`].
     pub fn follow<const D: usize>(&mut self, simulation: &Simulation<'_, D>) -> Result<()> {
         let mut new = Self::new(simulation)?;
         new.start = self.start;
@@ -291,18 +292,18 @@ impl HistoryObserver {
         self.columns.names()
     }
 
-    /// Energy (J) in the first row and bonds that were intact before any could break, which later rows
-    /// refer to.
+    /// Reference values of later rows: the energy (J) in the first row, and the number of bonds that were
+    /// intact before any could break.
     pub fn start(&self) -> Option<(f64, u64)> {
         self.start
     }
 
-    /// Goes on with a history that [started](Self::start) so.
+    /// Continue a history with these [reference values](Self::start).
     pub fn continue_from(&mut self, start: (f64, u64)) {
         self.start = Some(start);
     }
 
-    /// Takes note of rows of the past, as [`Self::row`] gave them.
+    /// Read earlier rows, as returned by [`Self::row`].
     pub fn recall(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
@@ -314,8 +315,7 @@ impl HistoryObserver {
         }
     }
 
-    /// The name of each crack whose path is found, and its branches now; the same on all ranks.
-    /// Collective.
+    /// Name and present branches of each tracked crack path; the same on all ranks. Collective.
     pub fn crack_paths<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
@@ -328,7 +328,7 @@ impl HistoryObserver {
             .collect()
     }
 
-    /// The present row; collective.
+    /// Compute the present row. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -397,7 +397,7 @@ impl HistoryObserver {
                 - simulation.refined.energy
                 - simulation.density_scale_energy,
         };
-        // Refinements add intact bonds, and take some away where horizons become shorter.
+        // Refinements add intact bonds, and remove some if horizons become shorter.
         let there_were = first_intact as i64 + simulation.refined.bonds;
         let broken = (there_were - intact as i64) as u64 / 2;
         let most_broken = std::mem::take(&mut simulation.step_control.most_broken);
@@ -459,7 +459,7 @@ impl HistoryObserver {
         }
     }
 
-    /// Values of the probes, from the ranks that own their points to all. Collective.
+    /// Distribute the probe values from the owners of the points to all ranks. Collective.
     fn probe_values<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -476,7 +476,7 @@ impl HistoryObserver {
             }
             for field in &probe.fields {
                 let width = field.components();
-                // Computed by all ranks together.
+                // All ranks compute the field together.
                 let values = fields.get(simulation, *field);
                 bits.extend(entries(width, D).map(|(entry, _)| {
                     let bits_of = |point: usize| values[width * point + entry].to_bits();
@@ -485,7 +485,7 @@ impl HistoryObserver {
             }
             counts.push(bits.len() - before);
         }
-        // One rank has the bits, the others add nothing.
+        // Only the owner contributes nonzero bits to the sum.
         simulation.comm.sum(&mut bits);
         let mut values = bits.into_iter().map(f64::from_bits);
         let of_probe = |count: usize| values.by_ref().take(count).collect();
@@ -493,7 +493,7 @@ impl HistoryObserver {
     }
 }
 
-/// The column with the length of a tip, from which its speed follows.
+/// Name of the column with the length of a tip; the speed is computed from it.
 fn length_of(tip: &str) -> String {
     format!("tip_{tip}_length")
 }
@@ -527,7 +527,7 @@ pub(in crate::solver) fn point_sums<const D: usize>(
     sums_over(model.owned(), 3 + D, add)
 }
 
-/// The axes about which bodies turn: z in plane problems, all in 3-D, none in 1-D.
+/// Rotation axes of bodies: z in plane problems, all in 3D, none in 1D.
 fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
     match dimension {
         1 => 0..0,
@@ -551,7 +551,7 @@ fn angular_momentum<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Exact
     })
 }
 
-/// So many sums over the points below `count`.
+/// Compute several sums over the points below `count`.
 fn sums_over(
     count: usize,
     width: usize,

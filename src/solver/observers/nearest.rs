@@ -1,23 +1,24 @@
-//! The point nearest to a place.
+//! Search of the point nearest to a position.
 
 use crate::comm::{Found, least};
 use crate::points::distance_squared;
 use crate::solver::Simulation;
 
-/// The point of all ranks that is nearest to a place.
+/// The point nearest to a position, over all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
     /// Global id.
     pub id: u64,
     /// Reference position, m.
     pub position: [f64; 3],
-    /// Distance from the place, m.
+    /// Distance from the given position, m.
     pub distance: f64,
-    /// Local index, on the rank that owns it.
+    /// Local index on the rank that owns the point.
     pub own: Option<usize>,
 }
 
-/// The point nearest to a place (m); of several, the one with the smallest id. Collective.
+/// Find the point nearest to a position (m); among equally near points, the one with the smallest id.
+/// Collective.
 pub fn nearest<const D: usize>(simulation: &Simulation<'_, D>, place: [f64; 3]) -> Nearest {
     let (model, comm) = (&simulation.model, simulation.comm);
     let own = (0..model.owned())

@@ -1,5 +1,4 @@
-//! How far something has come in one direction: the farthest of some points above a threshold, and from
-//! there to where the threshold is crossed.
+//! The farthest position along a line at which values exceed a threshold, interpolated to the threshold.
 
 use nalgebra::Vector3;
 
@@ -9,27 +8,28 @@ use crate::problem::Line;
 
 use crate::solver::Simulation;
 
-/// Points count as equally far, and as within a distance, up to this share of the horizon.
+/// Relative tolerance of distances, in horizons: points within it count as equally far, and as within a
+/// limit.
 const TOLERANCE: f64 = 1e-9;
 
-/// This rank's points along a line, and how far along (m) each of them is.
+/// This rank's points along a line, and the coordinate (m) of each along the line.
 pub struct Course {
     line: Line,
     points: Vec<(u32, f64)>,
 }
 
-/// The place that something has reached.
+/// The farthest position above the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reached {
-    /// How far from the start of the line, m.
+    /// Distance from the start of the line, m.
     pub along: f64,
-    /// Where, m; beside the line by as much as the farthest point.
+    /// Position, m. Its distance from the line is that of the farthest point.
     pub position: [f64; 3],
 }
 
 impl Course {
-    /// The points of `among` (local indices) that lie between the start and the end (m along the line)
-    /// and up to `radius` (m) beside the line.
+    /// Find the points of `among` (local indices) between the start and the end (m along the line) and
+    /// within `radius` (m) of the line.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         line: Line,
@@ -54,18 +54,19 @@ impl Course {
         }
     }
 
-    /// Whether no rank has a point. Collective.
+    /// Whether no rank has such a point. Collective.
     pub fn is_empty(&self, comm: &dyn Communicator) -> bool {
         total(comm, self.points.len() as u64) == 0
     }
 
-    /// How far the points with a `value` (of a local index) above the threshold reach; `None` where no
-    /// point is above. Collective; equal to the bit on any number of ranks.
+    /// Find how far the points with a `value` (by local index) above the threshold extend; `None` if no
+    /// point is above. The result is bitwise the same for any number of ranks. Collective.
     ///
-    /// From the farthest of these points (of equally far ones that with the smallest id), the nearest
-    /// points ahead that are within a horizon of it are looked at: between both, the values are taken to
-    /// change linearly, the largest one counting where several points are equally far. What is reached
-    /// grows without a jump when values grow, also where the next point comes above the threshold.
+    /// The search starts at the farthest of these points (among equally far ones, that with the smallest
+    /// id). The next points are the nearest ones ahead of it within one horizon. Between both, the value is
+    /// interpolated linearly to the threshold. If several next points are equally far, the largest value is
+    /// used. When values grow, the position grows without jumps, even when the next point exceeds the
+    /// threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
@@ -125,7 +126,7 @@ impl Course {
     }
 }
 
-/// The largest of some values; of none, the smallest number there is.
+/// The largest of some values; −∞ or the smallest number if there are none.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(f64::MIN, f64::max)
 }

@@ -1,18 +1,18 @@
-//! The fields that a row of the history reads.
+//! Fields for a row of the history.
 
 use crate::problem::Field;
 use crate::solver::Simulation;
 
 use super::snapshot::Snapshot;
 
-/// Fields at the moment of a snapshot; each is computed once.
+/// Fields at the time of a snapshot; each is computed only once.
 pub struct RowFields<'s> {
     snapshot: &'s Snapshot,
     computed: Vec<(Field, Vec<f64>)>,
 }
 
 impl<'s> RowFields<'s> {
-    /// None yet.
+    /// Create an empty cache.
     pub fn new(snapshot: &'s Snapshot) -> Self {
         Self {
             snapshot,
@@ -20,7 +20,7 @@ impl<'s> RowFields<'s> {
         }
     }
 
-    /// A field over the owned points, as [`Snapshot::field`] has it.
+    /// Get a field over the owned points in the layout of [`Snapshot::field`].
     pub fn get<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,

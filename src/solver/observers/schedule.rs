@@ -1,18 +1,18 @@
-//! At which steps something is written.
+//! Schedule of the steps at which output is written.
 
 use crate::problem::{Interval, Output};
 use crate::solver::motion::Clock;
 
-/// When something is due: at the start, after intervals, at given times, and at the end.
+/// Schedule of output: at the start, after intervals, at given times, and at the end.
 #[derive(Debug, Clone)]
 pub struct Schedule {
     interval: Option<Interval>,
-    /// In ascending order, s.
+    /// Given times in ascending order, s.
     times: Vec<f64>,
 }
 
 impl Schedule {
-    /// After intervals.
+    /// Create a schedule with intervals.
     pub fn every(interval: Interval) -> Self {
         Self {
             interval: Some(interval),
@@ -20,7 +20,7 @@ impl Schedule {
         }
     }
 
-    /// Of the outputs of a result.
+    /// Create the schedule of the outputs of a result.
     pub fn of_outputs(output: &Output) -> Self {
         Self {
             interval: output.every,
@@ -28,8 +28,8 @@ impl Schedule {
         }
     }
 
-    /// Whether something is due now: after the first step that reaches a multiple of the interval or a given time, up
-    /// to rounding.
+    /// Whether output is due: in the first step that reaches a multiple of the interval or a given time, up
+    /// to round-off.
     pub fn is_due(&self, clock: &Clock) -> bool {
         if clock.number() == 0 || clock.is_over() {
             return true;
@@ -38,7 +38,7 @@ impl Schedule {
         self.reached(time) > self.reached(before) || self.is_interval_over(clock, before)
     }
 
-    /// Whether the last step, since the time `before` (s), reached a multiple of the interval.
+    /// Whether the last step, which began at the time `before` (s), reached a multiple of the interval.
     fn is_interval_over(&self, clock: &Clock, before: f64) -> bool {
         let passed =
             |seconds, before| multiples(clock.time(), seconds) > multiples(before, seconds);
@@ -47,20 +47,20 @@ impl Schedule {
             Some(Interval::Steps(steps)) => clock.number().is_multiple_of(steps),
             Some(Interval::Seconds(seconds)) => passed(seconds, before),
             Some(Interval::SecondsAtSteps { seconds, steps }) => {
-                // Where steps change, as long before as it would be with the present one.
+                // If steps change, the interval in time is that of the present step.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
             }
         }
     }
 
-    /// How many of the given times have been reached at a time (s), up to rounding.
+    /// Number of given times that have been reached at a time (s), up to round-off.
     fn reached(&self, time: f64) -> usize {
         self.times
             .partition_point(|given| given * (1.0 - ROUNDING) <= time)
     }
 
-    /// How many times something is due in the whole run, if the step keeps its size.
+    /// Number of outputs of the whole run, if the step does not change.
     pub fn count(&self, clock: &Clock) -> u64 {
         let (last, step) = (clock.last(), clock.step());
         let multiples = |number: u64| match self.interval {
@@ -73,10 +73,10 @@ impl Schedule {
             }
         };
         let [whole, before] = [last, last - 1].map(multiples);
-        // At the end as well, which may be a multiple itself.
+        // The end counts once, even if it is a multiple of the interval.
         let intervals = 1 + (whole as u64).min(last) + u64::from(whole == before);
         let steps = self.times.iter().map(|given| {
-            // The first step at or after the time, up to rounding.
+            // The first step at or after the time, up to round-off.
             let steps = (given * (1.0 - ROUNDING) / step).ceil();
             steps as u64
         });
@@ -89,10 +89,10 @@ impl Schedule {
     }
 }
 
-/// A time of the clock may fall short of a given time by this share, its round-off.
+/// Relative round-off of the clock: by this fraction, a time may fall short of a given time.
 const ROUNDING: f64 = 1e-12;
 
-/// How many times an interval (s) has passed at a time (s), up to rounding.
+/// Number of intervals (s) that have passed at a time (s), up to round-off.
 fn multiples(time: f64, seconds: f64) -> f64 {
     (time / seconds + 1e-9).floor()
 }
@@ -131,14 +131,14 @@ mod tests {
 
     #[test]
     fn given_times() {
-        // The first step at or after each, once.
+        // The first step at or after each given time; each step counts once.
         assert_eq!(
             due(None, &[0.3, 0.55, 0.58, 0.7], 0.1, 10),
             [0, 3, 6, 7, 10]
         );
         assert_eq!(due(None, &[0.0, 1.0], 0.1, 10), [0, 10]);
         assert_eq!(due(None, &[0.93], 0.1, 10), [0, 10]);
-        // Beside an interval.
+        // Given times combined with an interval.
         let every = |steps| Some(Interval::Steps(steps));
         assert_eq!(due(every(4), &[0.35, 0.72], 0.1, 10), [0, 4, 8, 10]);
         assert_eq!(due(every(4), &[0.1, 0.45], 0.1, 10), [0, 1, 4, 5, 8, 10]);

@@ -1,4 +1,4 @@
-//! A run at one moment: fields for the result, found when they are asked for.
+//! Snapshot of a run at one time. Fields for the result are computed on request.
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -12,14 +12,14 @@ use crate::solver::bonds::Stored;
 use crate::solver::motion::Fields;
 use crate::solver::palette_column::PaletteColumn;
 
-/// What the bonds hold at one moment; found once, used by fields and history.
+/// Bond quantities at one time. They are computed once, and fields and history use them.
 pub struct Snapshot {
-    /// Of the owned points.
+    /// Bond quantities of the owned points.
     pub stored: Stored,
 }
 
 impl Snapshot {
-    /// Looks at a run, whose forces are those of the present place.
+    /// Take a snapshot of a run. The forces must be those of the present positions.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.stored(&simulation.model);
         stored.softened = simulation.forces.softened(&simulation.model);
@@ -32,16 +32,17 @@ impl Snapshot {
         Self { stored }
     }
 
-    /// Without energies: neither for a row of the history nor for [`Field::StrainEnergyDensity`].
+    /// Take a snapshot without energies. It can be used neither for a row of the history nor for
+    /// [`Field::StrainEnergyDensity`].
     pub fn without_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let mut stored = simulation.forces.intact_families(&simulation.model);
         stored.softened = simulation.forces.softened(&simulation.model);
         Self { stored }
     }
 
-    /// Damage φ of an owned point: the share of its family's volume that is cut off (Dipasquale et
-    /// al. 2014, eq. 7). The volume at a bond that softens counts as cut off to the share of its stiffness that it has
-    /// lost. A point without family has 0.
+    /// Damage φ of an owned point: the fraction of its family's volume with broken bonds (Dipasquale et al.
+    /// 2014, eq. 7). A bond that softens contributes V_j times the fraction of its stiffness that it has
+    /// lost. Damage is 0 for a point without a family.
     pub fn damage(&self, family_volume: &PaletteColumn, point: usize) -> f64 {
         let softened = self.stored.softened.get(point).copied().unwrap_or(0.0);
         match family_volume[point] {
@@ -50,14 +51,15 @@ impl Snapshot {
         }
     }
 
-    /// Number of intact bonds of the owned points; summed over the ranks each counts from both ends.
+    /// Number of intact bonds of the owned points. In a sum over ranks, each bond counts once from each
+    /// end.
     pub fn intact(&self) -> u64 {
         let counts = self.stored.neighbours.iter();
         counts.map(|count| *count as u64).sum()
     }
 
-    /// A field over the owned points, row-major with [`Field::components`] entries a point; of the
-    /// moment of the snapshot.
+    /// Compute a field over the owned points at the time of the snapshot. The values are row-major with
+    /// [`Field::components`] entries per point.
     pub fn field<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -125,14 +127,14 @@ impl Snapshot {
             }
             Field::Strain => strain(simulation),
             Field::Singular => simulation.forces.singular(model),
-            // Where none is prescribed.
+            // No temperature is prescribed.
             Field::Temperature => {
                 let point = |point| model.expansion_of(point).reference_temperature;
                 (0..count).map(point).collect()
             }
             Field::Fragment => simulation.fragment_ids(),
             Field::Rank => vec![simulation.comm.rank() as f64; count],
-            // Where nothing touches, no bonds can break, and no points flow.
+            // Fields of runs without contact, damage or plasticity.
             Field::ContactForceDensity => vec![0.0; 3 * count],
             Field::BrokenBonds | Field::NewlyBrokenBonds | Field::PlasticStrainEquivalent => {
                 vec![0.0; count]
@@ -144,9 +146,9 @@ impl Snapshot {
     }
 }
 
-/// Cauchy's stress from Kirchhoff's, row by row: over the volume that the deformed body has for one of
-/// the undeformed. In plane stress the plate thins by its law; by default as Hooke's law has it,
-/// ε_zz = −ν/(1 − ν) (ε_xx + ε_yy) with logarithmic strains. Under uniaxial stress a bar has ε_yy = ε_zz = −ν ε_xx.
+/// Convert Kirchhoff stress to Cauchy stress, row by row: divide by the ratio of deformed to undeformed
+/// volume. In plane stress, the law gives the out-of-plane stretch. By default, Hooke's law with
+/// logarithmic strains gives ε_zz = −ν/(1 − ν) (ε_xx + ε_yy). Under uniaxial stress, ε_yy = ε_zz = −ν ε_xx.
 fn cauchy_stress<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     mut kirchhoff: Vec<f64>,
@@ -154,7 +156,7 @@ fn cauchy_stress<const D: usize>(
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     for (point, (stress, gradient)) in kirchhoff.chunks_exact_mut(6).zip(&gradients).enumerate() {
         let ratio = elastic(simulation, point).poisson_ratio;
-        // Expansion by temperature is the same in all directions.
+        // Thermal expansion is isotropic.
         let thermal = 1.0 + free_stretch(simulation, point);
         let gradient = gradient / thermal;
         let in_plane = determinant(&gradient);
@@ -174,20 +176,20 @@ fn cauchy_stress<const D: usize>(
             _ => in_plane,
         };
         let growth = growth * thermal.powi(3);
-        // A body turned inside out has no volume to speak of.
+        // The volume ratio of an inverted body is not meaningful, so 1 is used.
         let growth = if growth > 0.0 { growth } else { 1.0 };
         stress.iter_mut().for_each(|entry| *entry /= growth);
     }
     kirchhoff
 }
 
-/// Green–Lagrange strain ½(FᵀF − I) of the body in space, row by row: xx, yy, zz, xy, yz, xz.
+/// Green–Lagrange strain ½(FᵀF − I) in 3D, row by row: xx, yy, zz, xy, yz, xz.
 fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     let mut rows = Vec::with_capacity(6 * gradients.len());
     for (point, gradient) in gradients.iter().enumerate() {
         let across = stretch_across(simulation, point, gradient);
-        // Of F − I, so that small strains lose no digits.
+        // It is computed from F − I, so that small strains lose no digits.
         let mut change = Matrix3::identity() * (across - 1.0);
         change
             .view_mut((0, 0), (D, D))
@@ -202,8 +204,8 @@ fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     rows
 }
 
-/// The stretch of an owned point across the directions of the setting at this deformation gradient: 1 without strain
-/// there.
+/// Stretch of an owned point perpendicular to the directions of the setting, for this deformation gradient.
+/// It is 1 if the setting has no such strain.
 fn stretch_across<const D: usize>(
     simulation: &Simulation<'_, D>,
     point: usize,
@@ -212,7 +214,7 @@ fn stretch_across<const D: usize>(
     let thermal = 1.0 + free_stretch(simulation, point);
     let elastic_gradient = gradient / thermal;
     let in_setting = determinant(&elastic_gradient);
-    // A body turned inside out has no volume to speak of.
+    // The area ratio of an inverted body is not meaningful, so 1 is used.
     let in_setting = if in_setting > 0.0 { in_setting } else { 1.0 };
     let ratio = || elastic(simulation, point).poisson_ratio;
     let across = match simulation.problem.dimension {
@@ -231,14 +233,15 @@ fn stretch_across<const D: usize>(
     across * thermal
 }
 
-/// The elastic constants of an owned point's body.
+/// Elastic constants of the body of an owned point.
 fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isotropic {
     let block = usize::from(simulation.model.block[point]);
     simulation.problem.block(block).body.material.elastic
 }
 
-/// The trace of the strain in space of an owned point from that in the setting's directions: without stress across a
-/// plate, it thins by ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar by ε_yy = ε_zz = −ν ε_xx, beside what temperature does.
+/// Trace of the 3D strain of an owned point, from the strain in the directions of the setting. Without
+/// out-of-plane stress, a plate has ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar has ε_yy = ε_zz = −ν ε_xx.
+/// Thermal strain is added.
 fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_setting: f64) -> f64 {
     let share = match simulation.problem.dimension {
         Dimension::PlaneStress { .. } => {
@@ -257,8 +260,8 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_settin
     share * (in_setting - D as f64 * free) + 3.0 * free
 }
 
-/// The stretch of an owned point by temperature in settings that leave it free across their directions, else 0: there, the
-/// determinant of F is that of space.
+/// Thermal stretch of an owned point, if the setting allows it to expand perpendicular to its directions.
+/// Otherwise 0, because the determinant of F is then that of the 3D deformation.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],
@@ -266,7 +269,7 @@ fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) ->
     }
 }
 
-/// The stress −E α (T − T₀) of an owned point whose strain across the setting is 0, Pa.
+/// Thermal stress −E α (T − T₀) of an owned point whose strain perpendicular to the setting is 0, Pa.
 fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     let Some(temperature) = &simulation.fields.temperature else {
         return 0.0;
@@ -277,7 +280,7 @@ fn thermal_stress<const D: usize>(simulation: &Simulation<'_, D>, point: usize) 
     -material.elastic.youngs_modulus * material.expansion.coefficient * change
 }
 
-/// The plastic strain of an owned point; 0 where no points flow.
+/// Plastic strain of an owned point; 0 without plasticity.
 fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticState {
     let strain = fields.plastic_strain.as_ref();
     PlasticState {
@@ -288,8 +291,9 @@ fn plastic_state<const D: usize>(fields: &Fields<D>, point: usize) -> PlasticSta
     }
 }
 
-/// Find the stress across the directions of the setting where there is no strain: zz by the law in plane strain,
-/// ν (xx + yy) by default; yy = zz = ν/(1 − ν) xx under uniaxial strain. Temperature adds −E α ΔT, and −E α ΔT/(1 − ν).
+/// Compute the stress perpendicular to the directions of the setting, if the strain there is 0. In plane
+/// strain, the law gives zz; the default is ν (xx + yy). Under uniaxial strain, yy = zz = ν/(1 − ν) xx.
+/// Temperature adds −E α ΔT and −E α ΔT/(1 − ν), respectively.
 fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<f64>; 6]) {
     let [xx, yy, zz, ..] = stress;
     let by_law = match simulation.problem.dimension {
@@ -320,7 +324,7 @@ fn across<const D: usize>(simulation: &mut Simulation<'_, D>, stress: &mut [Vec<
     }
 }
 
-/// Rows of so many components, 0 where there is no column.
+/// Convert columns to rows with this number of components; missing columns are 0.
 fn rows(columns: &[Vec<f64>], count: usize, components: usize) -> Vec<f64> {
     let mut values = vec![0.0; components * count];
     for (d, column) in columns.iter().enumerate() {

@@ -92,7 +92,7 @@ impl FieldStatistics {
             .map(move |of| (format!("field_{name}_{}", of.name()), of.unit(*field)))
     }
 
-    /// The totals of this rank.
+    /// Totals over this rank's points.
     fn totals<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,
@@ -115,8 +115,8 @@ impl FieldStatistics {
         chunks.reduce(|| Totals::EMPTY, |a, b| a.merge(&b))
     }
 
-    /// The values of all columns of some statistics, one list each; bit-identical on any number of ranks and threads.
-    /// Collective.
+    /// Compute the values of all columns of several statistics, one list for each. They are bitwise the
+    /// same for any number of ranks and threads. Collective.
     pub fn values<const D: usize>(
         all: &[Self],
         simulation: &mut Simulation<'_, D>,
@@ -141,7 +141,7 @@ impl FieldStatistics {
                 Statistic::Sum => sum,
                 Statistic::Integral => integral,
                 Statistic::Mean => integral / statistics.volume,
-                // Which of -0 and 0 is the smaller one depends on the order; 0 is written for both.
+                // The minimum of -0 and 0 depends on the order, so 0 is written for both.
                 Statistic::Minimum => smallest[k] + 0.0,
                 Statistic::Maximum => largest[k] + 0.0,
             };

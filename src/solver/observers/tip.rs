@@ -1,4 +1,4 @@
-//! Crack tips: where the damage ends in one direction, and how fast that moves.
+//! Crack tips: position and speed of the end of the damage in one direction.
 
 use crate::error::{Error, Result};
 use crate::problem;
@@ -7,7 +7,7 @@ use super::reach::{Course, Reached};
 use crate::solver::Simulation;
 use crate::solver::conditions::{members, not_empty};
 
-/// A crack tip that is followed.
+/// A crack tip that is tracked.
 pub struct Tip {
     name: String,
     threshold: f64,
@@ -15,22 +15,22 @@ pub struct Tip {
     growth: Growth,
 }
 
-/// A crack tip now; NaN where no point is above its threshold.
+/// The present state of a crack tip; NaN if no point is above its threshold.
 #[derive(Debug, Clone, Copy)]
 pub struct TipNow {
-    /// Where it is, m.
+    /// Position, m.
     pub position: [f64; 3],
     /// Length of the crack, m.
     pub length: f64,
-    /// m/s.
+    /// Speed, m/s.
     pub speed: f64,
 }
 
 impl Tip {
-    /// Finds the points that are looked at. Collective.
+    /// Find the points of the set in which the tip is tracked. Collective.
     ///
     /// # Errors
-    /// When the set is empty or lies behind the start; the same on all ranks.
+    /// If the set is empty or lies behind the start; the error is the same on all ranks.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         rule: &problem::Tip,
@@ -57,12 +57,12 @@ impl Tip {
         })
     }
 
-    /// Its name.
+    /// Name of the tip.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Where it is at a damage of the owned points. Collective.
+    /// State of the tip for the given damage of the owned points. Collective.
     pub fn row<const D: usize>(
         &mut self,
         simulation: &Simulation<'_, D>,
@@ -80,24 +80,25 @@ impl Tip {
         }
     }
 
-    /// Takes over what an earlier observer of the same tip knows of the past.
+    /// Move the past lengths of an earlier observer of the same tip to this one.
     pub fn take_past(&mut self, earlier: &mut Self) {
         std::mem::swap(&mut self.growth, &mut earlier.growth);
     }
 
-    /// Takes note of a length (m) at a time (s) of the past.
+    /// Add a past length (m) at a time (s).
     pub fn recall(&mut self, time: f64, length: f64) {
         self.growth.speed(time, length);
     }
 }
 
-/// The length of a crack over time.
+/// The length of a crack over time, for its speed.
 ///
-/// Its speed is the mean over the last horizon of growth: since the latest row in which it was at least
-/// one horizon shorter, or, before it has grown by as much, since the latest one in which it had its
-/// first length. Over a shorter way the steps of the lattice would be seen, over a fixed time the speed
-/// would depend on how often rows are written. A crack at rest from the start has speed 0; that of one
-/// that stops falls as one horizon over the time since then.
+/// The speed is the mean over the last horizon of growth. The interval begins at the latest row in which
+/// the crack was at least one horizon shorter. Before it has grown that far, it begins at the latest row
+/// with the initial length. Over a shorter distance, the steps of the lattice would be visible. Over a
+/// fixed time, the speed would depend on how often rows are written. A crack at rest from the start has
+/// speed 0. If a crack stops, its speed falls as one horizon divided by the time since the beginning of the
+/// interval.
 struct Growth {
     horizon: f64,
     /// Time (s) and length (m) of each row with a tip.
@@ -112,7 +113,7 @@ impl Growth {
         }
     }
 
-    /// The speed (m/s) when the next length (m) is seen at a time (s); NaN at the first.
+    /// Speed (m/s) when the length is `length` (m) at a time (s); NaN at the first length.
     fn speed(&mut self, time: f64, length: f64) -> f64 {
         if length.is_nan() {
             return f64::NAN;
@@ -136,7 +137,7 @@ mod tests {
         assert!(growth.speed(0.0, f64::NAN).is_nan());
         assert!(growth.speed(1.0, 10.0).is_nan());
         assert_eq!(growth.speed(2.0, 10.0), 0.0);
-        // Steps of one spacing, every other row.
+        // The length grows by one spacing every second row.
         assert_eq!(growth.speed(3.0, 11.0), 1.0);
         assert_eq!(growth.speed(4.0, 11.0), 0.5);
         assert_eq!(growth.speed(5.0, 12.0), 2.0 / 3.0);
@@ -145,7 +146,7 @@ mod tests {
         assert_eq!(growth.speed(8.0, 13.0), 0.5);
         assert_eq!(growth.speed(9.0, 14.0), 0.6);
         assert_eq!(growth.speed(10.0, 14.0), 0.5);
-        // At rest.
+        // The crack is at rest.
         assert_eq!(growth.speed(304.0, 14.0), 0.01);
     }
 

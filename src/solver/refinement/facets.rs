@@ -1,22 +1,22 @@
-//! The faces along which cracks have parted the points of a grid.
+//! Facets: faces between lattice points that a crack separates.
 
 use crate::comm::all_gather_many;
 use crate::points::bins::Bins;
 use crate::solver::Simulation;
 use crate::solver::assign::cutoffs;
 
-/// How much larger than a cell's side a face is, so that rounding opens no gap.
+/// Ratio of a facet's side to a cell's side, so that rounding opens no gap.
 const OVERLAP: f64 = 1.0 + 1e-6;
 
-/// The faces between points next to one another whose bond is broken, or was when the grid there was refined, of
-/// all ranks.
+/// The facets of all ranks. A facet lies between adjacent points whose bond is broken now, or was broken
+/// when the grid there was refined.
 pub struct Facets {
     all: Vec<Facet>,
     bins: Bins,
 }
 
 impl Facets {
-    /// Of the present bonds. Collective.
+    /// Find the facets of the present bonds. Collective.
     pub fn new<const D: usize>(simulation: &mut Simulation<'_, D>) -> Self {
         let (problem, comm) = (simulation.problem, simulation.comm);
         let model = &simulation.model;
@@ -48,7 +48,8 @@ impl Facets {
             }
         });
         let mut all = all_gather_many(comm, &own);
-        // Of those that were parted on a coarser grid bonds may be too short to tell.
+        // On a refined grid, bonds may be too short to detect faces from a coarser grid, so these are
+        // stored.
         let faces = simulation.grids.suppressed_faces().into_iter();
         all.extend(faces.map(|(centre, edges, axis)| Facet {
             centre,
@@ -65,33 +66,33 @@ impl Facets {
         }
     }
 
-    /// Whether there is none; the same on all ranks.
+    /// Whether there are no facets; the same on all ranks.
     pub fn are_none(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// Those that a bond of a point at a position (m) may cross, by index.
+    /// Indices of the facets that a bond of a point at a position (m) may cross.
     pub fn near(&self, position: [f64; 3]) -> Vec<u32> {
         let mut near = Vec::new();
         self.bins.within(position, |facet, _| near.push(facet));
         near
     }
 
-    /// Whether there are any that a bond of a point at a position (m) may cross.
+    /// Whether a bond of a point at a position (m) may cross any facet.
     pub fn are_near(&self, position: [f64; 3]) -> bool {
         let mut any = false;
         self.bins.within(position, |_, _| any = true);
         any
     }
 
-    /// Whether one of those `near` an end lies between the ends (m).
+    /// Whether one of the facets `near` an end lies between the ends (m).
     pub fn lie_between(&self, near: &[u32], from: [f64; 3], to: [f64; 3]) -> bool {
         let mut facets = near.iter().map(|facet| &self.all[*facet as usize]);
         facets.any(|facet| facet.is_crossed(from, to))
     }
 }
 
-/// A face between two points next to one another, across an axis.
+/// A face between two adjacent points, perpendicular to an axis.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Facet {
@@ -101,7 +102,7 @@ struct Facet {
 }
 
 impl Facet {
-    /// Whether a line crosses it. Faces side by side leave no gap.
+    /// Whether a line crosses the facet. Adjacent facets leave no gap.
     fn is_crossed(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let axis = self.axis as usize;
         let [before, after] = [from, to].map(|place| place[axis] - self.centre[axis]);

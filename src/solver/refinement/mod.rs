@@ -1,10 +1,11 @@
-//! Refinement during a run: which points are refined, what the new ones begin with, and which leave.
+//! Refinement during a run: which points are refined, the state of new points, and which points are
+//! removed.
 //!
-//! Points with much strain energy or damage are triggers, and all points within a horizon of one are refined
-//! (Dipasquale et al. 2014, §2.1). A new point has the mean of what the points that it lies between have;
-//! as it takes its volume in equal parts from them, mass and momentum stay. Bonds between points that were
-//! there stay as they are; a new bond is broken if it crosses a pre-crack or a face along which points
-//! are parted, and between points that are parted none is born.
+//! Points with much strain energy or damage are triggers. All points within a horizon of a trigger are
+//! refined (Dipasquale et al. 2014, §2.1). A new point gets the mean state of its parents. It takes its
+//! volume from them in equal parts, so mass and momentum are conserved. Bonds between existing points do
+//! not change. A new bond starts broken if it crosses a pre-crack or a face along which a crack separates
+//! points. No point is created between points that a crack separates.
 
 use std::cell::OnceCell;
 use std::time::Instant;
@@ -30,31 +31,31 @@ use facets::Facets;
 use past::{NOWHERE, Past};
 pub use trigger::{is_possible, may_coarsen};
 
-/// Points that came and went at once, over all ranks.
+/// Number of points created and removed at once, over all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Regridded {
-    /// Number of points that were born.
+    /// Number of points that were created.
     pub born: u64,
-    /// Number of points that left.
+    /// Number of points that were removed.
     pub left: u64,
 }
 
-/// What refinements have done since the start; the same on all ranks.
+/// Totals of all refinements since the start; the same on all ranks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Refined {
-    /// Kinetic and strain energy that they added, J; less than 0 if they took some.
+    /// Kinetic and strain energy that they added, J; negative if they removed energy.
     pub energy: f64,
-    /// Intact bonds that they added, less those that went, each counted from both ends.
+    /// Number of intact bonds that they added minus those removed; each bond counts once from each end.
     pub bonds: i64,
 }
 
 impl Refined {
-    /// As a checkpoint holds it.
+    /// Encode the totals for a checkpoint.
     pub fn words(self) -> [u64; 2] {
         [self.energy.to_bits(), self.bonds as u64]
     }
 
-    /// What [`Self::words`] gave.
+    /// Decode the words of [`Self::words`].
     pub fn of_words([energy, bonds]: [u64; 2]) -> Self {
         Self {
             energy: f64::from_bits(energy),
@@ -63,23 +64,23 @@ impl Refined {
     }
 }
 
-/// What the points of other grids begin with, in the order of ids.
+/// State of the points before a change of grids, in the order of ids.
 struct Kept {
-    /// The numbers of their state, and at last the block that they had.
+    /// State of the points by row; the last number of a row is the previous block.
     rows: Vec<f64>,
-    /// Numbers of a row.
+    /// Length of a row.
     width: usize,
-    /// How many of their bonds are broken.
+    /// Number of broken bonds of each point.
     lengths: Vec<u32>,
-    /// The ids of the other ends of these, ascending for each point.
+    /// Ids of the neighbours j of the broken bonds, ascending for each point.
     broken: Vec<u64>,
 }
 
 impl<'a, const D: usize> Simulation<'a, D> {
-    /// Whether bonds can be given to new points.
+    /// Check whether new points can get bonds.
     ///
     /// # Errors
-    /// When bonds remember what they went through; the same on all ranks.
+    /// If bonds have a history; the error is the same on all ranks.
     pub(super) fn can_bond_new_points(&self) -> Result<()> {
         let message = "[refinement.trigger]: bonds here remember what they went through, which new ones \
                        have not; refine `[refinement.region]` from the start";
@@ -89,19 +90,19 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Whether it is time to look for points to be refined.
+    /// Whether a check for points to refine is due.
     pub fn is_refinement_due(&self) -> bool {
         self.trigger().is_some_and(|trigger| {
-            // The step that a stage begins with is not that of the one before.
+            // The first step of a stage can differ from the last one of the stage before.
             self.clock.number().is_multiple_of(trigger.every_steps) && !self.is_stage_over()
         })
     }
 
-    /// Refines what the triggers of the problem want, and makes coarse what they have not seen for long enough.
-    /// Returns what came of it if the points were dealt out anew. Collective.
+    /// Refine and coarsen as the triggers of the problem request. A point is coarsened if no trigger has
+    /// been near it for long enough. If the points changed, return their numbers. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks. The points are gone then.
+    /// If METIS fails; the error is the same on all ranks. The points are lost then.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
@@ -140,20 +141,20 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }))
     }
 
-    /// Kinetic and strain energy (J) together, and intact bonds from both ends, over all ranks.
+    /// Sum of kinetic and strain energy (J), and number of intact bonds from both ends, over all ranks.
     fn held(&self, snapshot: &Snapshot) -> (f64, u64) {
         let sums = point_sums(self, snapshot);
-        // Both in one sum, which is rounded once.
+        // Both energies are in one sum, which is rounded once.
         let mut energy = [sums[0].clone()];
         energy[0].merge(&sums[1]);
         let energy = reduce(self.comm, &mut energy)[0];
         (energy, comm::total(self.comm, snapshot.intact()))
     }
 
-    /// Puts the run on other grids, with everything that points and bonds have. Collective.
+    /// Move the run to other grids, with the state of all points and bonds. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks. The points are gone then.
+    /// If METIS fails; the error is the same on all ranks. The points are lost then.
     fn regrid(&mut self, grids: Grids<'a>, left: &[NodeKey], facets: &Facets) -> Result<()> {
         let comm = self.comm;
         let pieces = self.pieces_on(&grids);
@@ -188,24 +189,24 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// The points of other grids in the cells of this rank's points of level 0.
+    /// The points of other grids in the level-0 cells of this rank.
     fn pieces_on(&self, grids: &Grids<'a>) -> Vec<Point> {
         let coarse = self.pieces().into_iter();
         let coarse = coarse.filter(|point| point.id < grids.coarsest());
         grids.points(grids.unrefined(coarse))
     }
 
-    /// The run at time 0 on other grids.
+    /// Create the run at time 0 on other grids.
     fn on(&self, grids: Grids<'a>, pieces: Vec<Point>) -> Result<Self> {
         Self::of_points(self.problem, self.comm, (pieces, grids), None, &mut || {
             Ok(())
         })
     }
 
-    /// Goes back to the grids that an earlier part of the run had refined so, at time 0. Collective.
+    /// Restore the grids of an earlier part of the run, at time 0. Collective.
     ///
     /// # Errors
-    /// When METIS fails; the same on all ranks.
+    /// If METIS fails; the error is the same on all ranks. The points are lost then.
     pub fn refine_to(&mut self, state: &[Vec<NodeKey>; 2]) -> Result<()> {
         let mut grids = self.grids.clone();
         if grids.refine_to(state) {
@@ -217,7 +218,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Ok(())
     }
 
-    /// What the points of other grids, of which this rank makes these `pieces`, begin with. Collective.
+    /// State of the points of other grids. This rank creates the given `pieces` of these points.
+    /// Collective.
     fn kept(&mut self, grids: &Grids<'_>, left: &[NodeKey], pieces: &[Point]) -> Kept {
         let comm = self.comm;
         let past = Past::new(self, grids, left);
@@ -240,7 +242,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         }
     }
 
-    /// For each owned point the ids of those to which its bond is broken, ascending.
+    /// For each owned point, the ids of the neighbours to which its bond is broken, ascending.
     fn broken(&self) -> Vec<Vec<u64>> {
         let mut broken = vec![Vec::new(); self.model.owned()];
         self.forces
@@ -249,8 +251,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         broken
     }
 
-    /// Breaks the bonds that were broken, and those of new points that cross facets. The last number of a
-    /// row is the block that the point had.
+    /// Break the bonds that were broken before, and bonds of new points that cross facets. The last number
+    /// of a row is the previous block of the point.
     fn inherit(
         &mut self,
         rows: &[f64],
@@ -294,7 +296,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             own.binary_search(&model.ids[there]).is_ok()
         };
         let cut = |here: usize, there: usize| {
-            // Between such ends there was the same bond.
+            // This bond already existed between these ends.
             if same[here] == 1.0 && same[there] == 1.0 {
                 return was_broken(here, there);
             }
@@ -316,7 +318,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         self.forces.cut(|point| concerned[point], cut);
     }
 
-    /// Takes the state of the owned points from rows, of which the last number is none of it.
+    /// Set the state of the owned points from rows. The last number of a row is not part of the state.
     fn take_rows(&mut self, rows: &[f64], width: usize) {
         let volume = &self.model.volume;
         let fields = self.fields.each_mut().filter(|(field, _)| field.state);

@@ -1,4 +1,4 @@
-//! What points have before a refinement, and what new ones begin with.
+//! State of points before a refinement, and initial state of new points.
 
 use rustc_hash::FxHashMap;
 
@@ -7,24 +7,25 @@ use crate::refine::{GridIndex, Grids, NodeKey};
 use crate::solver::Simulation;
 use crate::solver::motion::fields::Birth;
 
-/// Instead of a block, of a point that was not there before a refinement.
+/// Value in place of a block, for a point that did not exist before a refinement.
 pub const NOWHERE: f64 = -1.0;
 
-/// What local points, ghosts included, have before a refinement: the numbers of their state, energies as
-/// densities, and at last their block.
+/// State of the local points, including ghosts, before a refinement. The columns are their state, with
+/// energies as densities, and their block as the last column.
 pub struct Past {
     pub columns: Vec<Vec<f64>>,
-    /// What new points have of each.
+    /// How new points get each column.
     births: Vec<Birth>,
-    /// Local index by body and place, in steps of the finest level, of points where a grid is refined.
+    /// Local index by body and grid index, in steps of the finest level, of points where a grid is refined.
     at: FxHashMap<(usize, GridIndex), usize>,
-    /// Which local points leave.
+    /// Which local points are removed.
     leaves: Vec<bool>,
 }
 
 impl Past {
-    /// Before the nodes `left` leave, each with its body, the level of its birth and its place in steps of the
-    /// finest level, the finest level first, the same on all ranks. Collective.
+    /// Collect the state before the nodes `left` are removed. Each node has its body, its canonical level,
+    /// and its grid index in steps of the finest level. The finest level comes first, and all ranks have
+    /// the same nodes. Collective.
     pub fn new<const D: usize>(
         simulation: &mut Simulation<'_, D>,
         grids: &Grids<'_>,
@@ -52,7 +53,7 @@ impl Past {
             column.resize(local, 0.0);
             simulation.forces.bring(comm, column);
         }
-        // New points and those that leave lie between points where one of the grids is refined.
+        // New and removed points have their parents where one of the grids is refined.
         let bodies = 0..problem.bodies.len();
         let changed =
             bodies.map(|body| [grids, &simulation.grids].map(|grids| grids.changed(body)));
@@ -79,8 +80,8 @@ impl Past {
         past
     }
 
-    /// Lets those that points which leave lie between have what these have, so that volume, mass, momentum and
-    /// energies stay. Collective.
+    /// Return the values of removed points to their parents, so that volume, mass, momentum and energies
+    /// are conserved. Collective.
     fn leave<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
@@ -134,12 +135,12 @@ impl Past {
         }
     }
 
-    /// The owned points that stay.
+    /// The owned points that are not removed.
     pub fn staying(&self, owned: usize) -> impl Iterator<Item = usize> {
         (0..owned).filter(|point| !self.leaves[*point])
     }
 
-    /// A node and those that it lies between, if this rank has all of them.
+    /// A node and its parents, if this rank has all of them.
     fn with_parents(
         &self,
         grids: &Grids<'_>,
@@ -151,7 +152,7 @@ impl Past {
         Some((at(place)?, parents.collect::<Option<_>>()?))
     }
 
-    /// Ids and rows of the owned points that stay and of those that are born in this rank's `pieces`.
+    /// Ids and rows of the owned points that stay, and of the new points in this rank's `pieces`.
     pub fn rows<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,
@@ -180,7 +181,7 @@ impl Past {
         (ids, rows)
     }
 
-    /// Where the row of a new point starts: the mean of those that it lies between.
+    /// Index of the row of a new point, which is the mean of its parents.
     fn row(&self, grids: &Grids<'_>, (body, place): (usize, GridIndex), born: &mut Born) -> usize {
         if let Some(row) = born.at.get(&(body, place)) {
             return *row;
@@ -215,7 +216,7 @@ impl Past {
 /// The rows of new points.
 #[derive(Default)]
 struct Born {
-    /// Where the row starts, by body and place.
+    /// Index of the first number of the row, by body and grid index.
     at: FxHashMap<(usize, GridIndex), usize>,
     rows: Vec<f64>,
 }

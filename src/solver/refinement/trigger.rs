@@ -1,4 +1,4 @@
-//! Which points are refined during a run, and when.
+//! Triggers: which points are refined during a run, and when.
 
 use crate::comm::all_gather_many;
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::observers::Snapshot;
 
-/// A point that makes those within its horizon be refined.
+/// A trigger; the points within its horizon are refined.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Source {
@@ -17,25 +17,25 @@ struct Source {
     horizon: f64,
 }
 
-/// What the triggers want, of all ranks.
+/// Points that the triggers of all ranks select.
 pub struct Wanted {
-    /// Points that are to be refined.
+    /// Points to refine.
     pub finer: Vec<NodeKey>,
-    /// Refined points that are to become coarse again.
+    /// Refined points to coarsen.
     pub coarser: Vec<NodeKey>,
 }
 
-/// Damage that is more than rounding.
+/// Smallest damage that is not round-off.
 const LEAST_DAMAGE: f64 = 1e-9;
 
-/// More places within the horizon of a finer point are not looked at for coarser ones.
+/// With more grid positions than this within the horizon of a finer point, coarsening is not checked.
 const MOST_PLACES: f64 = 1e4;
 
-/// Whether a run can refine as its problem wants.
+/// Check that a run can refine as its problem requests.
 ///
 /// # Errors
-/// With horizons of very many spacings; with loads on sets given by ids; during a run with relaxation and
-/// steps that are undone.
+/// For horizons of very many spacings, and for loads on sets given by ids. During a run, also for
+/// relaxation and for steps that are rolled back.
 pub fn is_possible(problem: &Problem) -> Result<()> {
     let Some(refinement) = &problem.refinement else {
         return Ok(());
@@ -112,7 +112,7 @@ fn trigger(problem: &Problem) -> Option<&Trigger> {
     refinement.and_then(|refinement| refinement.trigger.as_ref())
 }
 
-/// Whether grids become coarser again during a run.
+/// Whether grids are coarsened again during a run.
 pub fn may_coarsen(problem: &Problem) -> bool {
     trigger(problem).is_some_and(|trigger| trigger.coarsen_after.is_some())
 }
@@ -122,18 +122,18 @@ impl<'a, const D: usize> Simulation<'a, D> {
         trigger(self.problem)
     }
 
-    /// Whether points may be born during the run.
+    /// Whether points may be created during the run.
     pub fn may_refine(&self) -> bool {
         self.trigger().is_some()
     }
 
-    /// What is to be refined now: points within the horizon of a trigger; and what is to become coarse:
-    /// refined points that have been in the horizon of neither a trigger nor a torn point for long enough.
-    /// Collective.
+    /// Select the points to refine: those within the horizon of a trigger. Select the points to coarsen:
+    /// refined points that have not been within the horizon of a trigger or of a point with missing bonds
+    /// for long enough. Collective.
     pub(super) fn wanted(&mut self, trigger: &Trigger, snapshot: &Snapshot) -> Wanted {
         let triggers = self.triggers(trigger, snapshot);
         let pick = |block, position| self.grids.refining(block, position);
-        // Where nothing becomes coarse again, points that cannot be refined need not be looked at.
+        // Without coarsening, points that cannot be refined further are skipped.
         let matters =
             |block, position| trigger.coarsen_after.is_some() || pick(block, position).is_some();
         let seen = self.seen(&self.sources(|point| triggers[point]), matters);
@@ -160,7 +160,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         Wanted { finer, coarser }
     }
 
-    /// What `pick` makes of the blocks and positions of the marked points of all ranks.
+    /// Apply `pick` to the blocks and positions of the marked points of all ranks.
     fn picks(
         &self,
         marked: &[bool],
@@ -172,7 +172,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own.collect::<Vec<_>>())
     }
 
-    /// Of the owned points, which are triggers.
+    /// Mark the owned points that are triggers.
     fn triggers(&self, trigger: &Trigger, snapshot: &Snapshot) -> Vec<bool> {
         let model = &self.model;
         let mut most = [0.0_f64];
@@ -202,7 +202,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (0..model.owned()).map(is_trigger).collect()
     }
 
-    /// The marked points of all ranks, with their horizons.
+    /// The marked points of all ranks with their horizons.
     fn sources(&self, marked: impl Fn(usize) -> bool) -> Vec<Source> {
         let model = &self.model;
         let own = (0..model.owned()).filter(|point| marked(*point));
@@ -215,7 +215,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         all_gather_many(self.comm, &own)
     }
 
-    /// Which owned points lie within the horizon of one of the sources, of those that matter (by block and position).
+    /// Mark the owned points within the horizon of one of the sources. Only points for which `matters` (of
+    /// block and position) is true are checked.
     fn seen(&self, sources: &[Source], matters: impl Fn(usize, [f64; 3]) -> bool) -> Vec<bool> {
         let model = &self.model;
         let longest = sources
