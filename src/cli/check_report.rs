@@ -67,7 +67,10 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("critical energy", format_args!("{:.4e} J/m⁶", law.critical));
                 }
             }
-            report.line("alpha", damage.alpha());
+            // Bonds that soften break by their law.
+            if body.damage.is_some() {
+                report.line("alpha", damage.alpha());
+            }
             if let Some(weibull) = laws.weibull {
                 report.line("Weibull modulus", weibull.modulus);
             }
