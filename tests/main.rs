@@ -70,6 +70,7 @@ mod parallel {
 mod restart {
     mod checkpoints;
     mod undo;
+    mod further_outputs;
 }
 
 mod papers {

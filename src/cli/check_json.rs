@@ -176,10 +176,17 @@ fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String
 }
 
 fn costs(cost: &Cost, request: &Request, ghosts: f64) -> Map<String, Value> {
+    let (main, further) = (cost.results.first(), cost.results.iter().skip(1));
+    let further = further.map(|result| {
+        let figures = json!({ "outputs": result.outputs, "result_bytes": result.bytes });
+        (result.name.clone().unwrap_or_default(), figures)
+    });
     object(json!({
         "memory_of_each_rank_bytes": cost.memory_of_a_rank(request.ranks, ghosts),
-        "outputs": cost.outputs,
-        "result_bytes": cost.result,
+        "outputs": main.map(|result| result.outputs),
+        "result_bytes": main.map(|result| result.bytes),
+        "further_outputs": further.collect::<Map<String, Value>>(),
+        "all_results_bytes": cost.all_results(),
         "checkpoint_bytes": cost.checkpoint,
     }))
 }

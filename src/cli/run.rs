@@ -229,6 +229,9 @@ fn report(outcome: &Outcome, threads: usize, verbosity: Verbosity) {
     let (result, history) = (&outcome.files.result, &outcome.files.history);
     let (result, history) = (result.display(), history.display());
     outln!("result   {result}   (ParaView 5.12 or later; result.xdmf for older ones)");
+    for further in &outcome.files.further {
+        outln!("result   {}", further.display());
+    }
     outln!("history  {history}");
     outln!("picture  fissure plot {result}");
 }

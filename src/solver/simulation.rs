@@ -214,6 +214,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             damage: problem.has_damage(),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
+            further_counts: problem.further_counts().count(),
             coarsening: refinement::may_coarsen(problem),
         };
         let mut fields = Fields::new(&model, needs);

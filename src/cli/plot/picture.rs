@@ -88,7 +88,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
-        None => file.with_file_name(format!("{}.png", painter.name())),
+        None => beside(&file, &format!("{}.png", painter.name())),
     };
     let hint = "; `--y` draws curves, and `fissure movie` films";
     check_ending(&path, &["png"], hint)?;
@@ -108,6 +108,14 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
         }
     }
     Ok(())
+}
+
+/// The path of a file beside a result. The name begins with that of a further result, such as `result_edge.vtkhdf`.
+pub fn beside(result: &Path, name: &str) -> PathBuf {
+    let stem = result.file_stem().unwrap_or_default().to_string_lossy();
+    let further = stem.strip_prefix("result_");
+    let further = further.map_or(String::new(), |further| format!("{further}_"));
+    result.with_file_name(format!("{further}{name}"))
 }
 
 fn number(text: &str, wanted: &str) -> Result<f64> {

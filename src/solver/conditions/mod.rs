@@ -12,7 +12,7 @@ use crate::comm::{Communicator, total};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::set;
-use crate::problem::{Action, Problem};
+use crate::problem::{Action, Output, Problem};
 use crate::refine::{Grids, SetFractions};
 
 use super::model::Model;
@@ -118,12 +118,14 @@ pub fn output_members<const D: usize>(
     problem: &Problem,
     comm: &dyn Communicator,
     model: &Model<D>,
+    output: &Output,
 ) -> Result<Option<Vec<u32>>> {
-    let Some((set, span)) = &problem.output.set else {
+    let Some((set, span)) = &output.set else {
         return Ok(None);
     };
     let points = members(problem, model, *set);
-    not_empty(problem, comm, *set, &points, ("[output] set", span.clone()))?;
+    let key = format!("{} set", output.section());
+    not_empty(problem, comm, *set, &points, (&key, span.clone()))?;
     Ok(Some(points))
 }
 
