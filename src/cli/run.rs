@@ -240,6 +240,7 @@ fn print_stop(outcome: &Outcome, reason: Reason) {
     let because = match reason {
         Reason::Signal => "by a signal",
         Reason::WallTime => "as the wall-clock limit is near",
+        Reason::Observer => "by an observer",
     };
     let (number, last) = (outcome.number, outcome.last);
     let time = si(outcome.time, "s");

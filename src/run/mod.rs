@@ -36,7 +36,7 @@ mod warnings;
 mod watch;
 
 pub use files::Files;
-pub use observer::{Message, Observer, Row, RunState, Unobserved};
+pub use observer::{Message, Observer, Row, RunState, StateEnergies, Unobserved};
 pub use options::{Existing, Options};
 pub use signals::Signals;
 pub use summary::{Phases, Summary};
@@ -62,7 +62,7 @@ use energy_watch::EnergyWatch;
 use output_file::Start;
 use recorder::{Continuation, Recorder, damage, reasons_for_new_results};
 use restart::{Restart, restart};
-use watch::{Decision, Watch};
+use watch::{Decision, Votes, Watch};
 
 /// The outcome of a run; equal on all ranks.
 #[derive(Debug, Clone)]
@@ -298,12 +298,20 @@ impl<'a> Job<'a> {
             let due = step.is_some_and(|clock| recorder.is_due(clock));
             let is_checked = due || complete || stepper.load_step().has_failed;
             let is_agreed = watch.end_iteration(step) || is_checked;
-            let decision = if is_agreed {
-                watch.decide(self.comm, step)
+            let mut decision = if is_agreed {
+                let votes = Votes {
+                    stop: stepper.is_stop_requested(),
+                    is_wrong: stepper.wrong_request().is_some(),
+                    factors: stepper.load_factors().fingerprint(),
+                };
+                watch.decide(self.comm, step, votes)
             } else {
                 Decision::default()
             };
-            let saves = complete || decision.checkpoint || decision.stop.is_some();
+            if decision.has_wrong_request || decision.factors_differ {
+                return Ok(LoopEnd::Failed(self.wrong_request(stepper)));
+            }
+            let mut saves = complete || decision.checkpoint || decision.stop.is_some();
             if is_checked || saves {
                 // The check includes velocities at the full step.
                 stepper.at_full_step();
@@ -321,6 +329,11 @@ impl<'a> Job<'a> {
                         contact = None;
                     }
                     recorder.record(stepper, self.observer)?;
+                    let stop = u64::from(stepper.is_stop_requested());
+                    if decision.stop.is_none() && comm::total(self.comm, stop) > 0 {
+                        decision.stop = Some(Reason::Observer);
+                        saves = true;
+                    }
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
                 if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
@@ -357,6 +370,15 @@ impl<'a> Job<'a> {
         }
         self.warn_of_overshoot(recorder);
         Ok(LoopEnd::Complete)
+    }
+
+    /// The error of requests of the observer, which all ranks return. Collective.
+    fn wrong_request<const D: usize>(&self, stepper: &Stepper<'a, D>) -> Error {
+        let own = stepper.wrong_request().cloned().map_or(Ok(()), Err);
+        match agree(self.comm, own) {
+            Err(error) => error,
+            Ok(()) => Error::run("the observers of the ranks have set different load factors"),
+        }
     }
 
     fn begin_run<const D: usize>(
@@ -441,28 +463,6 @@ impl<'a> Job<'a> {
         Ok((checkpoints, recorder))
     }
 
-    /// Broadcast the text of rank 0.
-    fn text_of_rank_0(&self, text: &str) -> String {
-        let mut bytes = text.as_bytes().to_vec();
-        self.comm.broadcast(0, &mut bytes);
-        String::from_utf8_lossy(&bytes).into_owned()
-    }
-
-    /// Attributes of the result: provenance.
-    fn metadata<const D: usize>(
-        &self,
-        simulation: &Simulation<'_, D>,
-    ) -> Vec<(&'static str, String)> {
-        // Attributes are written collectively, so values that can differ come from rank 0.
-        let [text, in_full, path] = match self.options.deck.as_ref().map(Deck::source) {
-            Some(Source { path, text, .. }) => [
-                text.clone(),
-                self.physics.clone(),
-                path.display().to_string(),
-            ],
-            None => Default::default(),
-        };
-        let mut metadata = vec![
     /// Rename the files that are not continued, and report why; then the way to new ones is free.
     fn set_aside<const D: usize>(
         &mut self,
@@ -502,6 +502,28 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
+    /// Broadcast the text of rank 0.
+    fn text_of_rank_0(&self, text: &str) -> String {
+        let mut bytes = text.as_bytes().to_vec();
+        self.comm.broadcast(0, &mut bytes);
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// Attributes of the result: provenance.
+    fn metadata<const D: usize>(
+        &self,
+        simulation: &Simulation<'_, D>,
+    ) -> Vec<(&'static str, String)> {
+        // Attributes are written collectively, so values that can differ come from rank 0.
+        let [text, in_full, path] = match self.options.deck.as_ref().map(Deck::source) {
+            Some(Source { path, text, .. }) => [
+                text.clone(),
+                self.physics.clone(),
+                path.display().to_string(),
+            ],
+            None => Default::default(),
+        };
+        let mut metadata = vec![
             ("title", self.problem.title.clone()),
             ("deck", text),
             ("deck_in_full", in_full),
