@@ -41,6 +41,7 @@ mod physics {
     mod dynamics;
     mod history;
     mod impact;
+    mod load_factors;
     mod newton;
     mod pressed;
     mod refinement;
@@ -69,6 +70,7 @@ mod parallel {
 
 mod restart {
     mod checkpoints;
+    mod further_outputs;
     mod undo;
 }
 

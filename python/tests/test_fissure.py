@@ -170,6 +170,28 @@ class Results(unittest.TestCase):
             fissure.run(self.deck, output=out, overwrite=True, sped=1)
         fissure.run(self.deck, output=out, overwrite=True, dx=2e-3).close()
 
+    def test_overlays_replace_keys(self):
+        slow, short = self.folder / "slow.toml", self.folder / "short.toml"
+        slow.write_text("parameters.speed = 0.5\ntime.end = 3e-6\n")
+        short.write_text("time.end = 2e-6\noutput.left = { every_steps = 1, fields = ['stress'], set = 'left' }\n")
+        out = self.folder / "overlaid"
+        with fissure.run(self.deck, output=out, overlays=[slow, str(short)], threads=1) as result:
+            self.assertEqual(result.deck["time"]["end"], 2e-6)
+            self.assertEqual(result.deck["parameters"]["speed"], 0.5)
+            count = result.steps[-1] + 1
+        with fissure.run(self.deck, output=out, overlays=slow, overwrite=True, speed=2, threads=1) as result:
+            self.assertEqual(result.deck["time"]["end"], 3e-6)
+            self.assertEqual(result.deck["parameters"]["speed"], 2)
+        for path in (out, out / "result.vtkhdf"):
+            with fissure.open(path, output="left") as result:
+                self.assertEqual((len(result), len(result.points)), (count, 30))
+                self.assertEqual(sorted(result.fields), ["block", "id", "stress", "volume"])
+                self.assertEqual(len(result.history), 0)
+        with self.assertRaisesRegex(FileNotFoundError, "no result of the output 'right'; there are left"):
+            fissure.open(out, output="right")
+        with self.assertRaisesRegex(fissure.RunError, "missing.toml"):
+            fissure.run(self.deck, output=out, overlays=["missing.toml"])
+
     def test_ranks_are_started_by_a_launcher(self):
         with fissure.run(self.deck, output=self.folder / "ranks", ranks=2, threads=1) as result:
             self.assertEqual(result.attributes["ranks"], "2")

@@ -1,7 +1,8 @@
 //! The report of `fissure check --json`: the figures of a deck in SI units.
 
 use fissure::deck::Deck;
-use fissure::problem::{Block, Body, Problem};
+use fissure::material::Property;
+use fissure::problem::{Block, Body, InterfacePair, Problem};
 use fissure::solver::assign::block_laws;
 use fissure::survey::{BodyFigures, Cost, DryRun, Interior, Size};
 use serde_json::{Map, Value, json};
@@ -19,7 +20,7 @@ pub fn simulated(
     let bodies = problem.bodies.iter().zip(&survey.bodies).zip(interiors);
     let bodies = bodies.map(|((body, figures), interior)| {
         let mut entry = described(problem, body, interior.as_ref());
-        entry.append(&mut measured(body, figures));
+        entry.append(&mut measured(problem, body, figures));
         Value::Object(entry)
     });
     let name = |body: usize| problem.bodies[body].name.as_str();
@@ -115,7 +116,13 @@ fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map
         .law
         .described()
         .into_iter()
-        .map(|(name, value)| (name.to_owned(), json!(value.to_string())))
+        .map(|(name, property)| {
+            let value = match property {
+                Property::Number(value, _) => json!(value),
+                Property::Text(words) => json!(words),
+            };
+            (name.replace([' ', '-'], "_"), value)
+        })
         .collect();
     let mut entry = object(json!({
         "name": body.name,
@@ -144,7 +151,7 @@ fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map
 }
 
 /// Figures of a body's points.
-fn measured(body: &Body, figures: &BodyFigures) -> Map<String, Value> {
+fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String, Value> {
     let mut entry = object(json!({
         "points": figures.points,
         "volume": figures.volume,
@@ -159,16 +166,27 @@ fn measured(body: &Body, figures: &BodyFigures) -> Map<String, Value> {
         let range = json!({ "least": least, "median": median, "most": most });
         entry.insert("neighbours".to_owned(), range);
     }
-    let damage = body.can_break();
+    // Bonds to other bodies may have damage of their own.
+    let pairs = &problem.interface.pairs;
+    let has_own = |pair: &InterfacePair| pair.damage.own().is_some();
+    let has_pair = |pair: &InterfacePair| has_own(pair) && pair.bodies.contains(&body.name);
+    let damage = body.can_break() || pairs.iter().any(has_pair);
     entry.insert("has_damage".to_owned(), json!(damage));
     entry
 }
 
 fn costs(cost: &Cost, request: &Request, ghosts: f64) -> Map<String, Value> {
+    let (main, further) = (cost.results.first(), cost.results.iter().skip(1));
+    let further = further.map(|result| {
+        let figures = json!({ "outputs": result.outputs, "result_bytes": result.bytes });
+        (result.name.clone().unwrap_or_default(), figures)
+    });
     object(json!({
         "memory_of_each_rank_bytes": cost.memory_of_a_rank(request.ranks, ghosts),
-        "outputs": cost.outputs,
-        "result_bytes": cost.result,
+        "outputs": main.map(|result| result.outputs),
+        "result_bytes": main.map(|result| result.bytes),
+        "further_outputs": further.collect::<Map<String, Value>>(),
+        "all_results_bytes": cost.all_results(),
         "checkpoint_bytes": cost.checkpoint,
     }))
 }

@@ -67,7 +67,10 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("critical energy", format_args!("{:.4e} J/m⁶", law.critical));
                 }
             }
-            report.line("alpha", damage.alpha());
+            // Bonds that soften break by their law.
+            if body.damage.is_some() {
+                report.line("alpha", damage.alpha());
+            }
             if let Some(weibull) = laws.weibull {
                 report.line("Weibull modulus", weibull.modulus);
             }
@@ -355,14 +358,26 @@ pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
         "memory of each rank",
         format_args!("about {memory} on {ranks} rank(s)"),
     );
-    report.line(
-        "result",
-        format_args!(
-            "about {}, {} outputs",
-            bytes(cost.result),
-            count(cost.outputs)
-        ),
-    );
+    for result in &cost.results {
+        let name = match &result.name {
+            None => "result".to_owned(),
+            Some(name) => format!("result {name}"),
+        };
+        report.line(
+            &name,
+            format_args!(
+                "about {}, {} outputs",
+                bytes(result.bytes),
+                count(result.outputs)
+            ),
+        );
+    }
+    if cost.results.len() > 1 {
+        report.line(
+            "all results",
+            format_args!("about {}", bytes(cost.all_results())),
+        );
+    }
     report.line(
         "checkpoints",
         format_args!("two of about {} each", bytes(cost.checkpoint)),

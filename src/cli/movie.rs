@@ -9,7 +9,7 @@ use fissure::picture::Image;
 use fissure::picture::film::Film;
 
 use super::plot::check_ending;
-use super::plot::picture::{Frame, Painter, PictureArguments};
+use super::plot::picture::{Frame, Painter, PictureArguments, beside};
 use super::progress::Progress;
 use super::{Verbosity, file_error, outln, result_file};
 
@@ -63,7 +63,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
-        None => file.with_file_name(format!("{}_movie.png", painter.name())),
+        None => beside(&file, &format!("{}_movie.png", painter.name())),
     };
     let hint = " (an animated PNG); for other formats, write --frames and encode them with ffmpeg";
     check_ending(&path, &["png", "apng"], hint)?;

@@ -229,6 +229,9 @@ fn report(outcome: &Outcome, threads: usize, verbosity: Verbosity) {
     let (result, history) = (&outcome.files.result, &outcome.files.history);
     let (result, history) = (result.display(), history.display());
     outln!("result   {result}   (ParaView 5.12 or later; result.xdmf for older ones)");
+    for further in &outcome.files.further {
+        outln!("result   {}", further.display());
+    }
     outln!("history  {history}");
     outln!("picture  fissure plot {result}");
 }
@@ -237,6 +240,7 @@ fn print_stop(outcome: &Outcome, reason: Reason) {
     let because = match reason {
         Reason::Signal => "by a signal",
         Reason::WallTime => "as the wall-clock limit is near",
+        Reason::Observer => "by an observer",
     };
     let (number, last) = (outcome.number, outcome.last);
     let time = si(outcome.time, "s");

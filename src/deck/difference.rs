@@ -57,8 +57,12 @@ fn compared(
     let decks = (Deck::new(old.clone())?, Deck::new(new.clone())?);
     let old_scope = Scope::of(old, &decks.0.grammar)?;
     let new_scope = Scope::of(new, &decks.1.grammar)?;
-    let table = |source: &Source| {
-        let parsed = source.text.parse::<Table>();
+    // A checkpoint of an earlier version lacks keys that were added since; they have their defaults. A deck that this version
+    // cannot fill in, because a file is gone, is compared as it is.
+    let table = |deck: &Deck| {
+        let text = deck.explain();
+        let text = text.unwrap_or_else(|_| deck.source().text.clone());
+        let parsed = text.parse::<Table>();
         parsed
             .map(Value::Table)
             .map_err(|error| Error::input(error.to_string()))
@@ -67,7 +71,7 @@ fn compared(
         scopes: [&old_scope, &new_scope],
         lines: Vec::new(),
     };
-    compare(&mut comparison, &table(old)?, &table(new)?);
+    compare(&mut comparison, &table(&decks.0)?, &table(&decks.1)?);
     Ok(comparison.lines)
 }
 
@@ -211,6 +215,34 @@ mod tests {
         assert_eq!(lines, ["history.probe.end.at[0]: was `2*dx` = 1, is 2"]);
         let lines = against("every = 1, damage_threshold = 0.4, probe.end.at = ['2*dx']");
         assert_eq!(lines, ["history.damage_threshold: was 0.3, is 0.4"]);
+    }
+
+    #[test]
+    fn keys_that_a_checkpoint_lacks_have_their_defaults() {
+        let old = source(&format!("{DECK}\n history.probe.end.at = [1.0]"));
+        let new = Deck::new(old.clone()).unwrap().explain().unwrap();
+        assert!(new.contains("angular_momentum = false"), "{new}");
+        let differences = |new: &str| {
+            let new = source(new);
+            let history = history_differences(&old, &new).unwrap();
+            [differences(&old, &new).unwrap(), history].concat()
+        };
+        assert_eq!(differences(&new), [""; 0]);
+        for (default, other, line) in [
+            (
+                "volume_correction = \"exact\"",
+                "volume_correction = \"none\"",
+                "grid.volume_correction: was \"exact\", is \"none\"",
+            ),
+            (
+                "fragments = false",
+                "fragments = true",
+                "history.fragments: was false, is true",
+            ),
+        ] {
+            assert!(new.contains(default), "{new}");
+            assert_eq!(differences(&new.replace(default, other)), [line]);
+        }
     }
 
     #[test]

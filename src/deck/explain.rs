@@ -1,8 +1,8 @@
 //! A deck with every default filled in.
 
 use super::grammar::{
-    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Relaxation, Rule,
-    Static, THERMAL_EXPANSION, Table, VolumeCorrection, common_keys,
+    ConstraintName, Count, DAMPING, Deck, ELASTIC_CONSTANTS, Grid, Material, Output, Relaxation,
+    Rule, Static, THERMAL_EXPANSION, Table, VolumeCorrection, common_keys,
 };
 use super::number::{Edges, Number, Written, default_number};
 use super::resolve::Scope;
@@ -109,16 +109,10 @@ fn fill(deck: &mut Deck, problem: &Problem) {
         let default = || Spanned::new(0..0, Static::default());
         time.newton.get_or_insert_with(default);
     }
-    let output = deck.output.get_mut();
-    if let Some(interval) = problem.output.every {
-        fill_interval(&mut output.every, output.every_steps.is_some(), interval);
-    }
-    output.fields.get_or_insert_with(|| {
-        let names = problem.output.fields.iter().map(|field| field.name());
-        names
-            .map(|name| Spanned::new(0..0, name.to_owned()))
-            .collect()
-    });
+    let outputs = deck.output.get_mut();
+    fill_output(&mut outputs.main, &problem.output);
+    let further = outputs.further.values_mut().zip(&problem.further_outputs);
+    further.for_each(|(table, output)| fill_output(table.get_mut(), output));
     let checkpoint = deck.checkpoint.get_mut();
     if let CheckpointRule::WallClock(seconds) = problem.checkpoint {
         let text = || Spanned::new(0..0, format!("{seconds} s"));
@@ -189,6 +183,18 @@ fn edge(grid: &Grid) -> Option<Number> {
         Edges::Same(edge) => Some(Spanned::new(spacing.span(), edge.clone())),
         Edges::Each(_) => None,
     }
+}
+
+fn fill_output(table: &mut Output, output: &problem::Output) {
+    if let Some(interval) = output.every {
+        fill_interval(&mut table.every, table.every_steps.is_some(), interval);
+    }
+    table.fields.get_or_insert_with(|| {
+        let names = output.fields.iter().map(|field| field.name());
+        names
+            .map(|name| Spanned::new(0..0, name.to_owned()))
+            .collect()
+    });
 }
 
 fn fill_interval(every: &mut Option<Number>, in_steps: bool, interval: Interval) {

@@ -172,6 +172,7 @@ time.end = 1
             "initial.push = { set = 'some', velocity = [1, 0] }",
             "condition.hold = { set = 'some', displacement = [0, 0] }",
             "output.set = 'some'",
+            "output.edge.set = 'some'",
             "history.reactions = ['some']",
             "history.force.pull = { set = 'some', direction = [1, 0] }",
             "history.field.pull = { set = 'some', field = 'damage', of = ['mean'] }",

@@ -8,7 +8,10 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem;
 
-/// Validates what is written to the result; `end` (s) is the end of the run.
+/// Part of the names of results that a restart has set aside.
+const SET_ASIDE: &str = "until_step_";
+
+/// Validates what is written to the main result; `end` (s) is the end of the run.
 ///
 /// # Errors
 /// On an unknown field or set and on a wrong interval.
@@ -18,14 +21,71 @@ pub fn output(
     sets: &[problem::Set],
     end: f64,
 ) -> Result<problem::Output> {
-    let output = deck.output.get_ref();
+    of_table(scope, (None, &deck.output.get_ref().main), sets, end)
+}
+
+/// Validates what is written to further results; `end` (s) is the end of the run.
+///
+/// # Errors
+/// As [`output`], and on a name that cannot be part of the name of a file.
+pub fn further_outputs(
+    scope: &Scope,
+    deck: &Deck,
+    sets: &[problem::Set],
+    end: f64,
+) -> Result<Vec<problem::Output>> {
+    let tables = &deck.output.get_ref().further;
+    let mut found: Vec<problem::Output> = Vec::new();
+    for (name, table) in tables {
+        let wrong = |words: String| {
+            let message = format!("[output.{name}]: the name becomes that of a file, {words}");
+            scope.error(table.span(), message)
+        };
+        if !name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+        {
+            return Err(wrong(
+                "so it must have only the letters a to z and A to Z, digits, `_` and `-`"
+                    .to_owned(),
+            ));
+        }
+        if name.contains(SET_ASIDE) {
+            let words =
+                format!("so it must not contain `{SET_ASIDE}`, as those of older results do");
+            return Err(wrong(words));
+        }
+        let mut names = found.iter().filter_map(|output| output.name.as_ref());
+        if let Some(other) = names.find(|other| other.eq_ignore_ascii_case(name)) {
+            return Err(wrong(format!(
+                "and differs from `{other}` only in upper and lower case, which some file systems ignore"
+            )));
+        }
+        found.push(of_table(scope, (Some(name), table.get_ref()), sets, end)?);
+    }
+    Ok(found)
+}
+
+/// Validates an output, the main one or one with a name.
+fn of_table(
+    scope: &Scope,
+    (name, output): (Option<&String>, &grammar::Output),
+    sets: &[problem::Set],
+    end: f64,
+) -> Result<problem::Output> {
+    let section = name.map_or("[output]".to_owned(), |name| format!("[output.{name}]"));
     let names = problem::Field::ALL.map(problem::Field::name);
     let fields = match &output.fields {
         None => problem::DEFAULT_FIELDS.to_vec(),
         Some(fields) => fields
             .iter()
             .map(|field| {
-                let index = find(scope.source, field, names.into_iter(), "[output] fields")?;
+                let index = find(
+                    scope.source,
+                    field,
+                    names.into_iter(),
+                    &format!("{section} fields"),
+                )?;
                 Ok(problem::Field::ALL[index])
             })
             .collect::<Result<Vec<_>>>()?,
@@ -35,44 +95,56 @@ pub fn output(
             .fields
             .as_ref()
             .map_or(0..0, |fields| fields[twice].span());
-        let message = format!("[output] fields: `{}` is named twice", fields[twice].name());
+        let message = format!(
+            "{section} fields: `{}` is named twice",
+            fields[twice].name()
+        );
         return Err(scope.error(place, message));
     }
     Ok(problem::Output {
-        every: every(scope, output, end)?,
-        times: times(scope, output, end)?,
+        name: name.cloned(),
+        every: every(scope, &section, output, end)?,
+        times: times(scope, &section, output, end)?,
         fields,
         single: output.precision == grammar::Precision::Single,
         set: match &output.set {
             None => None,
-            Some(name) => Some((find_set(scope, name, sets, "[output] set")?, name.span())),
+            Some(name) => {
+                let key = format!("{section} set");
+                Some((find_set(scope, name, sets, &key)?, name.span()))
+            }
         },
     })
 }
 
 /// The interval of outputs; none where only `times` are given.
-fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<Option<problem::Interval>> {
+fn every(
+    scope: &Scope,
+    section: &str,
+    output: &grammar::Output,
+    end: f64,
+) -> Result<Option<problem::Interval>> {
     let default = problem::Interval::Seconds(end / problem::OUTPUTS);
     match (&output.every, &output.every_steps) {
         (None, None) => Ok(output.times.is_none().then_some(default)),
         (Some(every), None) => {
-            let seconds = scope.positive(every, "[output] every")?;
+            let seconds = scope.positive(every, &format!("{section} every"))?;
             Ok(Some(problem::Interval::Seconds(seconds)))
         }
         (None, Some(steps)) => Ok(Some(problem::Interval::Steps(steps.get_ref().get()))),
         (Some(_), Some(steps)) => {
-            let message = "[output] every_steps: give either `every` or `every_steps`";
+            let message = format!("{section} every_steps: give either `every` or `every_steps`");
             Err(scope.error(steps.span(), message))
         }
     }
 }
 
 /// The given times of outputs, in ascending order.
-fn times(scope: &Scope, output: &grammar::Output, end: f64) -> Result<Vec<f64>> {
+fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Result<Vec<f64>> {
     let Some(written) = &output.times else {
         return Ok(Vec::new());
     };
-    let key = "[output] times";
+    let key = &format!("{section} times");
     if written.get_ref().is_empty() {
         let message = format!("{key}: must have at least one time; leave it out for the default");
         return Err(scope.error(written.span(), message));

@@ -7,7 +7,7 @@ use serde::de::IntoDeserializer;
 use serde::de::value::{Error as NameError, StrDeserializer};
 use toml::de::{DeTable, DeValue};
 
-use super::grammar::{Crack, Damage, DimensionName, Form, Section, Shape};
+use super::grammar::{Crack, Damage, DimensionName, Form, OUTPUT_KEYS, Section, Shape};
 use super::source::Source;
 use crate::error::Error;
 use crate::material::declarations;
@@ -63,6 +63,19 @@ fn grammar_error(source: &Source, tree: &DeTable, span: Range<usize>, message: &
         let colon = if key.is_empty() { "" } else { ": " };
         source.error(span.clone(), format!("{key}{colon}{words}"))
     };
+    // A key of [output] that is not known is read as a further output.
+    if let ([section, key], Some(value)) = (&place.path[..], place.value)
+        && section == "output"
+        && !OUTPUT_KEYS.contains(&key.as_str())
+        && value.as_table().is_none()
+    {
+        let words = format!(
+            "unknown key `{key}`{}",
+            suggestion(key, OUTPUT_KEYS.into_iter())
+        );
+        let message = format!("[output]: {words}; a table with this name is a further output");
+        return source.error(span, message);
+    }
     if message.starts_with("missing field") {
         return match (&place.path[..], first) {
             ([], "dimension") => {
@@ -198,7 +211,7 @@ fn find_value<'t>(
 /// A path as the deck's sections have it: `[body.plate] shape box`.
 fn label(path: &[String]) -> String {
     let section = Section::containing(path);
-    let count = section.map_or(0, Section::header_length);
+    let count = section.map_or(0, |section| section.header_length(path));
     let (header, keys) = path.split_at(count.min(path.len()));
     let header = match header {
         [] => Vec::new(),
@@ -321,6 +334,8 @@ tolerance = 1e-3
 [[stage]]
 safety = 0.5
 [output]
+every = 1
+[output.NAME]
 every = 1
 [history]
 every = 1

@@ -63,6 +63,7 @@ pub fn validate(scope: &Scope, deck: &Deck) -> Result<Problem> {
         conditions,
         stages,
         output: outputs::output(scope, deck, &sets, time.end)?,
+        further_outputs: outputs::further_outputs(scope, deck, &sets, time.end)?,
         history: history::history(scope, deck, &sets, horizon)?,
         checkpoint: outputs::checkpoint(scope, deck)?,
         balance: outputs::balance(scope, deck)?,

@@ -2,7 +2,9 @@
 
 use nalgebra::SMatrix;
 
-use super::{AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Rotation, with_law};
+use super::{
+    AnyLaw, Bond, COUNTS, Described, ForceState, Law, PlasticState, Property, Rotation, with_law,
+};
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd, UpTo};
 
 /// How many numbers of each kind the points and bonds of a law have.
@@ -95,7 +97,7 @@ fn padded<A: LaneTuple, B: LaneTuple>(some: A) -> B {
 
 impl AnyLaw {
     /// [`Described::described`] of the law that it is.
-    pub fn described(&self) -> Vec<(&'static str, String)> {
+    pub fn described(&self) -> Vec<(&'static str, Property)> {
         with_law!(self, law => law.described())
     }
 

@@ -9,6 +9,7 @@ use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law, Pmb,
+    Property,
 };
 use crate::lanes::{IsaSet, Lanes, Simd};
 
@@ -65,9 +66,9 @@ fn critical_stretch(given: &Given, energy: f64) -> f64 {
 }
 
 impl Described for ElasticPlasticPmb {
-    fn described(&self) -> Vec<(&'static str, String)> {
+    fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
-        facts.push(("yield stretch", format!("{:.4e}", self.yield_stretch)));
+        facts.push(("yield stretch", Property::Number(self.yield_stretch, "")));
         facts
     }
 }

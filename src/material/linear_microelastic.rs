@@ -8,7 +8,8 @@
 use std::sync::Arc;
 
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb, Word,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Pmb, Property,
+    Word,
 };
 use crate::lanes::{IsaSet, Lanes};
 
@@ -65,8 +66,8 @@ fn build(given: &Given) -> Built {
 }
 
 impl Described for LinearMicroelastic {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        vec![("micromodulus", format!("{:.4e} N/m⁶", self.micromodulus))]
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![("micromodulus", Property::Number(self.micromodulus, "N/m⁶"))]
     }
 }
 

@@ -54,15 +54,36 @@ registration::register! {
     correspondence::BondAssociated,
 }
 
+use std::fmt;
+
 use nalgebra::SMatrix;
 
 use crate::lanes::{IsaSet, LaneTuple, Lanes, Simd};
 use bond::Weights;
 
+/// A property of a law, for reports.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Property {
+    /// A number and its unit; the unit is empty if there is none.
+    Number(f64, &'static str),
+    /// Words.
+    Text(&'static str),
+}
+
+impl fmt::Display for Property {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value, "") => write!(formatter, "{value:.4e}"),
+            Self::Number(value, unit) => write!(formatter, "{value:.4e} {unit}"),
+            Self::Text(words) => formatter.write_str(words),
+        }
+    }
+}
+
 /// What can be told of a law without bonds.
 pub trait Described {
     /// Names and values of what it was given or has found, for people to read.
-    fn described(&self) -> Vec<(&'static str, String)>;
+    fn described(&self) -> Vec<(&'static str, Property)>;
 }
 
 /// A material law: what bonds add to the numbers of a point, and the force state that follows.

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law, Pmb,
-    Word,
+    Property, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::Lanes;
@@ -113,8 +113,8 @@ impl Normalised {
 }
 
 impl Described for Normalised {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        vec![("micromodulus", "of each point's own family".to_owned())]
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![("micromodulus", Property::Text("of each point's own family"))]
     }
 }
 

@@ -19,7 +19,7 @@
 use super::bond::Weights;
 use super::{
     Along, AnyLaw, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law,
-    PlasticState, Word,
+    PlasticState, Property, Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -197,8 +197,8 @@ pub(super) fn eased_force<const D: usize>(
 }
 
 impl Described for Ordinary {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        vec![("forces", "ordinary state-based".to_owned())]
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![("forces", Property::Text("ordinary state-based"))]
     }
 }
 

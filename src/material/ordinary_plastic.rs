@@ -21,7 +21,7 @@
 use super::ordinary::{Ordinary, eased_force};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind,
-    Law, PlasticState, Word,
+    Law, PlasticState, Property, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::{IsaSet, Lanes};
@@ -86,13 +86,13 @@ fn build(given: &Given) -> Built {
 }
 
 impl Described for OrdinaryPlastic {
-    fn described(&self) -> Vec<(&'static str, String)> {
+    fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
         let yields = match self.whole {
             None => "by each point's own family",
             Some(_) => "as if families were whole",
         };
-        facts.push(("yields", yields.to_owned()));
+        facts.push(("yields", Property::Text(yields)));
         facts
     }
 }

@@ -15,7 +15,7 @@
 use super::ordinary::{INFLUENCE, Ordinary, eased_force, influence};
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
-    PlasticState,
+    PlasticState, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
@@ -75,16 +75,12 @@ fn build(given: &Given) -> Built {
 }
 
 impl Described for OrdinaryViscoelastic {
-    fn described(&self) -> Vec<(&'static str, String)> {
+    fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
-        let share = 100.0 * self.relaxing_share;
-        facts.push((
-            "relaxation",
-            format!(
-                "{share} % of the deviatoric force in {:.4e} s",
-                self.relaxation_time
-            ),
-        ));
+        let time = Property::Number(self.relaxation_time, "s");
+        facts.push(("relaxation time", time));
+        let share = Property::Number(self.relaxing_share, "");
+        facts.push(("relaxing share", share));
         facts
     }
 }

@@ -10,7 +10,7 @@ use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised,
-    TensorPmb, Word,
+    Property, TensorPmb, Word,
 };
 use crate::dimension::{Constraint, Dimension};
 use crate::lanes::{Lanes, Simd};
@@ -104,8 +104,8 @@ fn build(given: &Given) -> Built {
 }
 
 impl Described for Pmb {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        vec![("micromodulus", format!("{:.4e} N/m⁶", self.micromodulus))]
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![("micromodulus", Property::Number(self.micromodulus, "N/m⁶"))]
     }
 }
 

@@ -24,7 +24,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::declaration::bond_based_critical_stretch;
 use super::{
     Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
-    LawFault, Pmb, Values, Word,
+    LawFault, Pmb, Property, Values, Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -402,9 +402,12 @@ impl SofteningPmb {
 }
 
 impl Described for SofteningPmb {
-    fn described(&self) -> Vec<(&'static str, String)> {
+    fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
-        facts.push(("strength stretch", format!("{:.4e}", self.strength_stretch)));
+        facts.push((
+            "strength stretch",
+            Property::Number(self.strength_stretch, ""),
+        ));
         facts
     }
 }

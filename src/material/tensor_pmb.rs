@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
 use super::symmetric::{Symmetric, mixed, to_entries};
-use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb};
+use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
 /// Smallest eigenvalue of H: bodies of two or three points across would have bonds that push when they are pulled.
@@ -59,12 +59,14 @@ impl Declared for TensorPmb {
 }
 
 impl Described for TensorPmb {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        let value = format!(
-            "{:.4e} N/m⁶ inside, by direction at surfaces",
-            self.micromodulus
-        );
-        vec![("micromodulus", value)]
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![
+            (
+                "micromodulus inside",
+                Property::Number(self.micromodulus, "N/m⁶"),
+            ),
+            ("micromodulus at surfaces", Property::Text("by direction")),
+        ]
     }
 }
 

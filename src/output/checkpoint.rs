@@ -44,8 +44,10 @@ pub struct Header {
     pub points: u64,
     /// Hash of the points.
     pub fingerprint: u64,
-    /// Outputs in the result file.
+    /// Outputs in the main result.
     pub outputs: u64,
+    /// The further results.
+    pub further: Vec<FurtherResult>,
     /// Rows in the history.
     pub rows: u64,
     /// Reference values of the history: energy at the start, J, and number of intact bonds before it.
@@ -53,6 +55,21 @@ pub struct Header {
     /// The deck with all defaults.
     pub deck: String,
 }
+
+/// What a checkpoint knows of a further result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FurtherResult {
+    /// Name of its output.
+    pub name: String,
+    /// Outputs in the file.
+    pub outputs: u64,
+    /// The state has a column of the bonds that have broken since its last output, after all other columns.
+    pub counts_newly_broken: bool,
+}
+
+/// Attribute with the names of the further results, one per line; absent without them. Two numbers of each follow the other
+/// `numbers`.
+const FURTHER: &str = "further_outputs";
 
 /// The datasets of the state of the grids; absent if empty.
 const GRIDS: [&str; 2] = ["/refined", "/parted"];
@@ -186,7 +203,35 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
     let numbers = file.integers_attribute("/", "numbers")?;
     let deck = file.text_attribute("/", "deck")?;
     let mut grids = [const { Vec::new() }; 2];
-    if let [VERSION, .., refined, suppressed] = numbers[..] {
+    let mut further = Vec::new();
+    if let [
+        VERSION,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        refined,
+        suppressed,
+        ref figures @ ..,
+    ] = numbers[..]
+    {
+        if !figures.is_empty() {
+            let names = file.text_attribute("/", FURTHER)?;
+            let figures = figures.as_chunks().0.iter();
+            further = names
+                .lines()
+                .zip(figures)
+                .map(|(name, [outputs, counts])| FurtherResult {
+                    name: name.to_owned(),
+                    outputs: *outputs as u64,
+                    counts_newly_broken: *counts != 0,
+                })
+                .collect();
+        }
         for ((keys, name), count) in grids.iter_mut().zip(GRIDS).zip([refined, suppressed]) {
             if count > 0 {
                 let dataset = file.open_dataset(name)?;
@@ -209,6 +254,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             intact,
             _,
             _,
+            ..,
         ] => Ok(Header {
             number: number as u64,
             step: f64::from_bits(step as u64),
@@ -216,6 +262,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
             points: points as u64,
             fingerprint: fingerprint as u64,
             outputs: outputs as u64,
+            further,
             rows: rows as u64,
             start: (f64::from_bits(energy as u64), intact as u64),
             deck,
@@ -268,7 +315,7 @@ fn write_file<const D: usize>(
 ) -> Result<()> {
     let comm = simulation.comm;
     let mut file = CollectiveFile::create(path, comm, Creation::Truncate)?;
-    let numbers = [
+    let mut numbers = vec![
         VERSION,
         header.number as i64,
         header.step.to_bits() as i64,
@@ -281,6 +328,18 @@ fn write_file<const D: usize>(
         header.grids[0].len() as i64,
         header.grids[1].len() as i64,
     ];
+    for further in &header.further {
+        let counts = i64::from(further.counts_newly_broken);
+        numbers.extend([further.outputs as i64, counts]);
+    }
+    if !header.further.is_empty() {
+        let names: Vec<&str> = header
+            .further
+            .iter()
+            .map(|result| &result.name[..])
+            .collect();
+        file.set_attribute("/", FURTHER, Attribute::Text(&names.join("\n")))?;
+    }
     file.set_attribute("/", "numbers", Attribute::Integers(&numbers))?;
     let progress: Vec<i64> = simulation
         .progress()

@@ -160,7 +160,8 @@ fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     let inode = || std::fs::metadata(&path).unwrap().ino();
     let before = inode();
     let second = metadata(deck, "12");
-    let (mut file, past) = ResultFile::resume(&path, &comm, &contents(&second), &history, (1, 1))?;
+    let (mut file, past) =
+        ResultFile::resume(&path, &comm, &contents(&second), Some((&history, 1)), 1)?;
     assert_eq!(past, [[0.0]]);
     assert_eq!(file.past(), [(0.0, 2)]);
     for step in 1..4 {

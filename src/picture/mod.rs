@@ -7,6 +7,7 @@
 //!     dimension: 2,
 //!     positions: &[[0.0, 0.0, 0.0], [0.001, 0.0, 0.0]],
 //!     sizes: &[0.001, 0.001],
+//!     scattered: &[],
 //!     values: &[0.0, 0.4],
 //!     field: "damage",
 //!     unit: "",
@@ -24,6 +25,7 @@
 
 mod axes;
 mod canvas;
+mod cells;
 pub mod chart;
 mod colours;
 pub mod film;
@@ -73,7 +75,18 @@ pub fn render(scene: &Scene) -> Image {
         if projection == Projection::Isometric {
             hidden_edges(&mut pen, &layout, &bounds);
         }
-        points::paint(pen.image, &marks, colouring, &layout, projection);
+        let are_flat = matches!(projection, Projection::Flat(_));
+        let (scattered, others): (Vec<_>, Vec<_>) =
+            marks.iter().partition(|mark| are_flat && mark.scattered);
+        points::paint(pen.image, &others, colouring, &layout, projection);
+        cells::paint(
+            pen.image,
+            &scattered,
+            |mark| scene.depth(mark),
+            colouring,
+            &layout,
+            projection,
+        );
         if let Projection::Flat(_) = projection {
             lines(&mut pen, &layout, projection, scene);
         }

@@ -43,7 +43,7 @@ const BRIGHTNESS: [f64; 3] = [1.0, 0.86, 0.7];
 /// Paints all points in their order.
 pub fn paint(
     image: &mut Image,
-    marks: &[Mark],
+    marks: &[&Mark],
     colouring: Colouring,
     layout: &Layout,
     projection: Projection,

@@ -145,6 +145,7 @@ mod tests {
             position,
             size,
             value: 0.0,
+            scattered: false,
         }
     }
 

@@ -65,6 +65,9 @@ pub struct Scene<'a> {
     pub positions: &'a [[f64; 3]],
     /// Edge length of the cell of each point (m).
     pub sizes: &'a [f64],
+    /// For each point whether it is one of scattered points, drawn as a Voronoi cell in flat views; others are drawn as
+    /// squares. May be empty, for none.
+    pub scattered: &'a [bool],
     /// Value of each point, shown as its colour; NaN is shown grey.
     pub values: &'a [f64],
     /// Name of the values, for the colour bar; "damage" in it selects the
@@ -98,6 +101,8 @@ pub struct Mark {
     pub size: f64,
     /// Its value.
     pub value: f64,
+    /// It is one of scattered points.
+    pub scattered: bool,
 }
 
 /// Largest coordinate; points beyond it are omitted as results of a failed run.
@@ -115,12 +120,15 @@ impl Scene<'_> {
 
     /// The points to draw, in the order in which they are painted.
     pub fn marks(&self) -> Vec<Mark> {
+        let scattered = self.scattered.iter().copied();
         let mut marks: Vec<Mark> = self
             .positions
             .iter()
             .zip(self.sizes)
             .zip(self.values)
-            .map(|((position, size), value)| Mark {
+            .zip(scattered.chain(std::iter::repeat(false)))
+            .map(|(((position, size), value), scattered)| Mark {
+                scattered,
                 position: self.without_unused(*position),
                 size: if (0.0..LARGEST_COORDINATE).contains(size) {
                     *size
@@ -154,6 +162,14 @@ impl Scene<'_> {
             }),
         }
         marks
+    }
+
+    /// Distance of a point from the drawn plane, m; 0 without a slice.
+    pub fn depth(&self, mark: &Mark) -> f64 {
+        match self.effective_view() {
+            View::Slice { axis, position } => mark.position[axis.index()] - position,
+            View::Plane | View::Orthographic => 0.0,
+        }
     }
 
     /// The box of the points that are drawn, with a margin.
@@ -235,6 +251,7 @@ mod tests {
             dimension: 3,
             positions,
             sizes: &SIZES,
+            scattered: &[],
             values,
             field: "velocity",
             unit: "m/s",

@@ -51,12 +51,14 @@ impl Problem {
             },
             stages: Vec::new(),
             output: Output {
+                name: None,
                 every: Some(Interval::Seconds(end / OUTPUTS)),
                 times: Vec::new(),
                 fields: DEFAULT_FIELDS.to_vec(),
                 single: false,
                 set: None,
             },
+            further_outputs: Vec::new(),
             history: History {
                 every: None,
                 reactions: Vec::new(),

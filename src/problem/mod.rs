@@ -81,6 +81,8 @@ pub struct Problem {
     pub stages: Vec<Stage>,
     /// The result file.
     pub output: Output,
+    /// Further result files with their own fields and times.
+    pub further_outputs: Vec<Output>,
     /// The history.
     pub history: History,
     /// When checkpoints are written.

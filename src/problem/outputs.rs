@@ -39,9 +39,11 @@ pub struct Balance {
     pub imbalance: f64,
 }
 
-/// The result file.
+/// The main result file or a further one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
+    /// Name of a further output; `None` for the main one.
+    pub name: Option<String>,
     /// How often; `None` for the given times only.
     pub every: Option<Interval>,
     /// Simulated times of further outputs in ascending order, s.
@@ -52,6 +54,21 @@ pub struct Output {
     pub single: bool,
     /// Index of the set whose points the result holds, and where it is named; `None` for all points.
     pub set: Option<(usize, Range<usize>)>,
+}
+
+impl Output {
+    /// The section of the deck, for messages.
+    pub fn section(&self) -> String {
+        match &self.name {
+            None => "[output]".to_owned(),
+            Some(name) => format!("[output.{name}]"),
+        }
+    }
+
+    /// Whether the result has the number of bonds that have broken since its last output.
+    pub fn counts_newly_broken(&self) -> bool {
+        self.fields.contains(&Field::NewlyBrokenBonds)
+    }
 }
 
 /// The history.
@@ -346,6 +363,17 @@ pub(crate) const DEFAULT_CHECKPOINT: f64 = 600.0;
 pub(crate) const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
 impl Problem {
+    /// The main output, then the further ones.
+    pub fn outputs(&self) -> impl Iterator<Item = &Output> {
+        [&self.output].into_iter().chain(&self.further_outputs)
+    }
+
+    /// The further outputs with the number of bonds that have broken since their last output.
+    pub fn further_counts(&self) -> impl Iterator<Item = &Output> {
+        let further = self.further_outputs.iter();
+        further.filter(|output| output.counts_newly_broken())
+    }
+
     /// When rows of the history are written.
     pub fn row_interval(&self) -> Interval {
         let seconds = self.time.end / ROWS;

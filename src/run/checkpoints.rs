@@ -74,8 +74,9 @@ impl CheckpointWriter {
             } else {
                 self.fingerprint
             },
-            outputs: recorder.file.steps(),
-            rows: recorder.file.history_rows(),
+            outputs: recorder.main().steps(),
+            further: recorder.further(simulation),
+            rows: recorder.main().history_rows(),
             start: recorder.observer.start().unwrap_or_default(),
             deck: self.physics.clone(),
         };

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::output::checkpoint::{Checkpoints, is_taken};
+use crate::problem::Problem;
 
 /// Maximum wait for the lock of the folder.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(5);
@@ -15,20 +16,32 @@ const LOCK_TIMEOUT: Duration = Duration::from_secs(5);
 pub struct Files {
     /// The folder.
     pub folder: PathBuf,
-    /// The result.
+    /// The main result.
     pub result: PathBuf,
+    /// The further results, in the order of the outputs.
+    pub further: Vec<PathBuf>,
     /// The history, as CSV.
     pub history: PathBuf,
 }
 
 impl Files {
-    /// The files of a folder.
-    pub fn new(folder: PathBuf) -> Self {
+    /// The files of a run in a folder.
+    pub fn new(problem: &Problem, folder: PathBuf) -> Self {
+        let further = problem.further_outputs.iter();
         Self {
-            result: folder.join("result.vtkhdf"),
+            result: result_of(&folder, None),
+            further: further
+                .map(|output| result_of(&folder, output.name.as_deref()))
+                .collect(),
             history: folder.join("history.csv"),
             folder,
         }
+    }
+
+    /// The results, the main one first.
+    pub fn results(&self) -> impl Iterator<Item = &Path> {
+        let all = [&self.result].into_iter().chain(&self.further);
+        all.map(PathBuf::as_path)
     }
 
     /// Check that a new run may write to the folder. For rank 0.
@@ -36,9 +49,9 @@ impl Files {
     /// # Errors
     /// If there is a result or checkpoint that must not be replaced.
     pub fn prepare(&self, overwrite: bool) -> Result<()> {
-        let files = [self.result.clone(), self.history.clone()];
+        let files = self.results().chain([self.history.as_path()]);
         let existing = files
-            .into_iter()
+            .map(Path::to_path_buf)
             .chain(Checkpoints::paths(&self.folder))
             .find(|file| is_taken(file));
         if let (Some(file), false) = (existing, overwrite) {
@@ -89,11 +102,11 @@ impl Files {
         }
     }
 
-    /// Rename an existing result and history, so new ones can be created; return the new names. For rank 0.
+    /// Rename existing files, so new ones can be created; return the new names. For rank 0.
     ///
     /// # Errors
     /// If a file cannot be renamed.
-    pub fn set_aside(&self, number: u64) -> Result<Vec<PathBuf>> {
+    pub fn set_aside(files: &[&Path], number: u64) -> Result<Vec<PathBuf>> {
         let named = |file: &Path, count: u32| {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy();
             let extension = file.extension().unwrap_or_default().to_string_lossy();
@@ -104,13 +117,11 @@ impl Files {
             };
             file.with_file_name(format!("{stem}_until_step_{number}{again}.{extension}"))
         };
-        let is_free = |count: &u32| {
-            !is_taken(&named(&self.result, *count)) && !is_taken(&named(&self.history, *count))
-        };
+        let is_free = |count: &u32| files.iter().all(|file| !is_taken(&named(file, *count)));
         let count = (0..).find(is_free).unwrap_or(u32::MAX);
         let aside = |file: &Path| named(file, count);
         let mut renamed = Vec::new();
-        for file in [&self.result, &self.history] {
+        for file in files {
             if is_taken(file) {
                 fs::rename(file, aside(file))
                     .map_err(|error| file_error(file, "rename", &error))?;
@@ -118,6 +129,14 @@ impl Files {
             }
         }
         Ok(renamed)
+    }
+}
+
+/// Path of the result of an output, the main one if it has no name.
+fn result_of(folder: &Path, name: Option<&str>) -> PathBuf {
+    match name {
+        None => folder.join("result.vtkhdf"),
+        Some(name) => folder.join(format!("result_{name}.vtkhdf")),
     }
 }
 

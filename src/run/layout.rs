@@ -2,7 +2,7 @@
 
 use crate::comm::{self, IdOrder};
 use crate::output::{Contents, FieldData, FieldDescription, Piece};
-use crate::problem::Field;
+use crate::problem::{Field, Output};
 use crate::solver::Simulation;
 
 /// Names of the fields that change only with the points.
@@ -24,9 +24,10 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data by id; `rows` are those in the result. Collective.
+    /// Redistribute the static data of an output by id; `rows` are those in the result. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
+        output: &Output,
         (order, rows): (&IdOrder, &Option<Vec<usize>>),
         steps: u64,
         metadata: &'a [(&'a str, String)],
@@ -40,7 +41,6 @@ impl<'a> ResultLayout<'a> {
         let level = |block: &u16| problem.block(usize::from(*block)).level;
         let levels: Option<Vec<u32>> =
             (problem.refinement.is_some()).then(|| model.block.iter().map(level).collect());
-        let output = &problem.output;
         let describe = |field: &Field| FieldDescription {
             name: field.name(),
             unit: field.unit(),

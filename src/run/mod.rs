@@ -26,6 +26,7 @@ mod files;
 mod layout;
 mod observer;
 mod options;
+mod output_file;
 mod recorder;
 mod restart;
 mod restart_compatibility;
@@ -35,7 +36,7 @@ mod warnings;
 mod watch;
 
 pub use files::Files;
-pub use observer::{Message, Observer, Row, RunState, Unobserved};
+pub use observer::{Message, Observer, Row, RunState, StateEnergies, Unobserved};
 pub use options::{Existing, Options};
 pub use signals::Signals;
 pub use summary::{Phases, Summary};
@@ -58,9 +59,10 @@ use crate::survey::Survey;
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
 use energy_watch::EnergyWatch;
-use recorder::{Recorder, Start, damage, reason_for_new_result};
+use output_file::Start;
+use recorder::{Continuation, Recorder, damage, reasons_for_new_results};
 use restart::{Restart, restart};
-use watch::{Decision, Watch};
+use watch::{Decision, Votes, Watch};
 
 /// The outcome of a run; equal on all ranks.
 #[derive(Debug, Clone)]
@@ -129,7 +131,7 @@ fn run_unlocated(
     let calibrated = calibrated(problem)?;
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
-    let files = Files::new(options.folder.clone());
+    let files = Files::new(problem, options.folder.clone());
     // Locked first, and until the end.
     let prepared = match comm.rank() {
         0 => files.lock().and_then(|lock| {
@@ -205,7 +207,7 @@ impl<'a> Job<'a> {
         self.observer.begin(&mut stepper);
         let end = self.make_steps(&mut stepper, &mut checkpoints, &mut recorder)?;
         self.observer.end(matches!(end, LoopEnd::Complete));
-        let no_collective_cause = recorder.file.no_collective_cause();
+        let no_collective_cause = recorder.no_collective_cause();
         let last_row = recorder.last_row.take();
         let spent = (recorder.spent, recorder.spent_on_rows);
         recorder.close(matches!(end, LoopEnd::Stopped(_)))?;
@@ -296,12 +298,20 @@ impl<'a> Job<'a> {
             let due = step.is_some_and(|clock| recorder.is_due(clock));
             let is_checked = due || complete || stepper.load_step().has_failed;
             let is_agreed = watch.end_iteration(step) || is_checked;
-            let decision = if is_agreed {
-                watch.decide(self.comm, step)
+            let mut decision = if is_agreed {
+                let votes = Votes {
+                    stop: stepper.is_stop_requested(),
+                    is_wrong: stepper.wrong_request().is_some(),
+                    factors: stepper.load_factors().fingerprint(),
+                };
+                watch.decide(self.comm, step, votes)
             } else {
                 Decision::default()
             };
-            let saves = complete || decision.checkpoint || decision.stop.is_some();
+            if decision.has_wrong_request || decision.factors_differ {
+                return Ok(LoopEnd::Failed(self.wrong_request(stepper)));
+            }
+            let mut saves = complete || decision.checkpoint || decision.stop.is_some();
             if is_checked || saves {
                 // The check includes velocities at the full step.
                 stepper.at_full_step();
@@ -309,7 +319,7 @@ impl<'a> Job<'a> {
             if is_agreed {
                 if let Err(error) = stepper.check() {
                     // Output the failed state for analysis.
-                    recorder.write(stepper.at_full_step(), true, true)?;
+                    recorder.write_all(stepper.at_full_step())?;
                     return Ok(LoopEnd::Failed(error));
                 }
                 if due {
@@ -319,6 +329,11 @@ impl<'a> Job<'a> {
                         contact = None;
                     }
                     recorder.record(stepper, self.observer)?;
+                    let stop = u64::from(stepper.is_stop_requested());
+                    if decision.stop.is_none() && comm::total(self.comm, stop) > 0 {
+                        decision.stop = Some(Reason::Observer);
+                        saves = true;
+                    }
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
                 if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
@@ -357,6 +372,15 @@ impl<'a> Job<'a> {
         Ok(LoopEnd::Complete)
     }
 
+    /// The error of requests of the observer, which all ranks return. Collective.
+    fn wrong_request<const D: usize>(&self, stepper: &Stepper<'a, D>) -> Error {
+        let own = stepper.wrong_request().cloned().map_or(Ok(()), Err);
+        match agree(self.comm, own) {
+            Err(error) => error,
+            Ok(()) => Error::run("the observers of the ranks have set different load factors"),
+        }
+    }
+
     fn begin_run<const D: usize>(
         &mut self,
         stepper: &mut Stepper<'a, D>,
@@ -368,7 +392,8 @@ impl<'a> Job<'a> {
         };
         let checkpoints = CheckpointWriter::new(simulation, &self.files, self.physics.clone())?;
         let metadata = self.metadata(simulation);
-        let mut recorder = Recorder::new(simulation, &self.files, Start::New(creation), &metadata)?;
+        let starts = vec![Start::New(creation); self.files.results().count()];
+        let mut recorder = Recorder::new(simulation, &self.files, (&starts, 0), &metadata)?;
         recorder.record(stepper, self.observer)?;
         Ok((checkpoints, recorder))
     }
@@ -388,44 +413,93 @@ impl<'a> Job<'a> {
         });
         self.warn_of_resumed_step(simulation)?;
         let metadata = self.metadata(simulation);
-        let reason = reason_for_new_result(simulation, &self.files, &header, &self.physics)?;
-        let reason = match reason {
-            Some(reason) => reason,
-            None => {
-                let start = Start::After(header.outputs, header.rows);
-                match Recorder::new(simulation, &self.files, start, &metadata) {
-                    Ok(mut recorder) => {
-                        recorder.observer.continue_from(header.start);
-                        return Ok((checkpoints, recorder));
-                    }
-                    // The checkpoint is intact, so a damaged result is replaced by a new one. Other errors,
-                    // such as a full disk, leave the result in place.
-                    Err(error) => match damage(self.comm, &self.files, header.outputs)? {
-                        Some(reason) => reason,
-                        None => return Err(error),
-                    },
-                }
+        let mut continued =
+            reasons_for_new_results(simulation, &self.files, &header, &self.physics)?;
+        let counted = |number: usize| match number.checked_sub(1) {
+            None => header.outputs,
+            Some(number) => {
+                let name = self.problem.further_outputs[number].name.as_ref();
+                let mut known = header.further.iter();
+                let known = known.find(|result| Some(&result.name) == name);
+                known.map_or(0, |result| result.outputs)
             }
         };
-        let renamed = match self.comm.rank() {
-            0 => self.files.set_aside(simulation.clock.number()),
-            _ => Ok(Vec::new()),
+        let mut recorder = loop {
+            let start = |(number, continuation): (usize, &Continuation)| match continuation {
+                Continuation::Resume => Start::After(counted(number)),
+                Continuation::New(_) => Start::New(Creation::Exclusive),
+            };
+            let starts: Vec<Start> = continued.iter().enumerate().map(start).collect();
+            self.set_aside(simulation, &mut continued)?;
+            let opened = Recorder::new(simulation, &self.files, (&starts, header.rows), &metadata);
+            let error = match opened {
+                Ok(recorder) => break recorder,
+                Err(error) => error,
+            };
+            // The checkpoint is intact, so a damaged result is replaced by a new one. Other errors, such as a full disk,
+            // leave the results in place.
+            let mut is_damaged = false;
+            for (number, path) in self.files.results().enumerate() {
+                if matches!(continued[number], Continuation::Resume)
+                    && let Some(reason) = damage(self.comm, path, counted(number))?
+                {
+                    continued[number] = Continuation::New(Some(reason));
+                    is_damaged = true;
+                }
+            }
+            if !is_damaged {
+                return Err(error);
+            }
         };
-        let renamed: Vec<String> = agree(self.comm, renamed)?
-            .iter()
-            .map(|path| path.to_string_lossy().into_owned())
-            .collect();
-        let renamed = self.text_of_rank_0(&renamed.join("\n"));
-        let renamed = renamed.lines().map(PathBuf::from).collect();
-        self.observer
-            .message(&Message::SetAside { reason, renamed });
-        let start = Start::New(Creation::Exclusive);
-        let mut recorder = Recorder::new(simulation, &self.files, start, &metadata)?;
         recorder.observer.continue_from(header.start);
-        recorder.write(simulation, true, true)?;
-        // The previous checkpoint counts the outputs of the renamed file.
-        checkpoints.write(simulation, &mut recorder)?;
+        if continued
+            .iter()
+            .any(|continuation| *continuation != Continuation::Resume)
+        {
+            recorder.write_first(simulation)?;
+            // The previous checkpoint counts the outputs of the renamed files.
+            checkpoints.write(simulation, &mut recorder)?;
+        }
         Ok((checkpoints, recorder))
+    }
+
+    /// Rename the files that are not continued, and report why; then the way to new ones is free.
+    fn set_aside<const D: usize>(
+        &mut self,
+        simulation: &Simulation<'a, D>,
+        continued: &mut [Continuation],
+    ) -> Result<()> {
+        for (number, continuation) in continued.iter_mut().enumerate() {
+            let Continuation::New(reason) = continuation else {
+                continue;
+            };
+            let Some(reason) = reason.take() else {
+                continue;
+            };
+            let (files, reason) = match number.checked_sub(1) {
+                None => (vec![&*self.files.result, &*self.files.history], reason),
+                Some(number) => {
+                    let section = self.problem.further_outputs[number].section();
+                    (
+                        vec![&*self.files.further[number]],
+                        format!("{section}: {reason}"),
+                    )
+                }
+            };
+            let renamed = match self.comm.rank() {
+                0 => Files::set_aside(&files, simulation.clock.number()),
+                _ => Ok(Vec::new()),
+            };
+            let renamed: Vec<String> = agree(self.comm, renamed)?
+                .iter()
+                .map(|path| path.to_string_lossy().into_owned())
+                .collect();
+            let renamed = self.text_of_rank_0(&renamed.join("\n"));
+            let renamed = renamed.lines().map(PathBuf::from).collect();
+            self.observer
+                .message(&Message::SetAside { reason, renamed });
+        }
+        Ok(())
     }
 
     /// Broadcast the text of rank 0.

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::problem::Field;
 use crate::solver::Stepper;
-use crate::solver::observers::{Energies, HistoryRow};
+use crate::solver::observers::{Energies, HistoryRow, Snapshot, state_energies};
 use crate::solver::refinement::Regridded;
 use crate::solver::repartition::Repartition;
 use crate::survey::Survey;
@@ -85,6 +86,35 @@ pub enum Message {
 
 /// The state of a run between two steps. Points are those owned by this rank; their order may change from
 /// step to step, see [`RunState::ids`].
+///
+/// An observer may [stop](RunState::stop) the run and [change a load](RunState::set_load_factor):
+///
+/// ```no_run
+/// use fissure::comm::threads;
+/// use fissure::error::Result;
+/// use fissure::problem::{Field, Problem};
+/// use fissure::run::{Observer, Options, Row, RunState};
+///
+/// /// Halves the load `pull` when the first bonds break, and stops when a point is cracked.
+/// struct Control;
+///
+/// impl Observer for Control {
+///     fn row(&mut self, now: &mut dyn RunState, row: &Row) {
+///         if row.broken_bonds() > 0 {
+///             now.set_load_factor("pull", 0.5);
+///         }
+///         // Of the points of this rank: a stop on one rank stops all.
+///         if now.field(Field::Damage).iter().any(|damage| *damage > 0.4) {
+///             now.stop();
+///         }
+///     }
+/// }
+///
+/// # fn run(problem: &Problem) -> Result<()> {
+/// fissure::run(problem, &threads::alone(), Options::new("out/plate"), &mut Control)?;
+/// # Ok(())
+/// # }
+/// ```
 pub trait RunState {
     /// Number of the step reached.
     fn number(&self) -> u64;
@@ -113,6 +143,41 @@ pub trait RunState {
     /// A component of the velocities, m/s. Computed on request: one pass over the points for each step
     /// in which they are read.
     fn velocity(&mut self, component: usize) -> &[f64];
+
+    /// Values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], row by row with
+    /// [`Field::components`] numbers a point, in the unit of [`Field::unit`]. Computed on request: one to three passes over
+    /// the bonds. Collective: all ranks ask for the same field.
+    fn field(&mut self, field: Field) -> Vec<f64>;
+
+    /// Energies of all points, J. Computed on request: one pass over the bonds. Collective.
+    fn energies(&mut self) -> StateEnergies;
+
+    /// Stop the run before its end with a checkpoint; one rank is enough. Asked for at a row of the history, the stop
+    /// comes after this step; otherwise up to ten steps later.
+    fn stop(&mut self);
+
+    /// The factor of a load in the next step, 1 unless an observer has set it; `None` if there is no load of this name.
+    fn load_factor(&self, name: &str) -> Option<f64>;
+
+    /// Multiply a load, a condition with `force`, `body_force`, `traction` or `pressure`, by a factor. It acts from the end of
+    /// the next step, or from the next load step, until another one is set; its work counts as external. Checkpoints hold it.
+    /// All ranks set the same factor at the same step.
+    ///
+    /// The run ends with an error soon after if there is no load of this name, the factor is not finite, or the ranks differ.
+    fn set_load_factor(&mut self, name: &str, factor: f64);
+}
+
+/// Energies of all points, J; equal on all ranks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StateEnergies {
+    /// Kinetic energy.
+    pub kinetic: f64,
+    /// Strain energy of the intact bonds.
+    pub strain: f64,
+    /// Energy that broken bonds have released.
+    pub fracture: f64,
+    /// Work of loads and supports.
+    pub work: f64,
 }
 
 impl<const D: usize> RunState for Stepper<'_, D> {
@@ -150,6 +215,38 @@ impl<const D: usize> RunState for Stepper<'_, D> {
 
     fn velocity(&mut self, component: usize) -> &[f64] {
         &self.at_full_step().fields.velocity[component]
+    }
+
+    fn field(&mut self, field: Field) -> Vec<f64> {
+        let simulation = self.at_full_step();
+        let snapshot = match field {
+            Field::StrainEnergyDensity => Snapshot::new(simulation),
+            _ => Snapshot::without_energies(simulation),
+        };
+        snapshot.field(simulation, field)
+    }
+
+    fn energies(&mut self) -> StateEnergies {
+        let [kinetic, strain, fracture, work] = state_energies(self.at_full_step());
+        StateEnergies {
+            kinetic,
+            strain,
+            fracture,
+            work,
+        }
+    }
+
+    fn stop(&mut self) {
+        self.request_stop();
+    }
+
+    fn load_factor(&self, name: &str) -> Option<f64> {
+        let load = self.load(name).ok()?;
+        Some(self.load_factors().get(load))
+    }
+
+    fn set_load_factor(&mut self, name: &str, factor: f64) {
+        Stepper::set_load_factor(self, name, factor);
     }
 }
 

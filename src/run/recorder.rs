@@ -1,17 +1,13 @@
-//! Output of result and history at their scheduled steps.
+//! Output of results and history at their scheduled steps.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::comm::{self, Communicator, IdOrder, agree};
 use crate::error::{Error, ErrorKind, Result};
-use crate::output::checkpoint::{Header, is_taken};
-use crate::output::{
-    Creation, HistoryContents, Number, ResultFile, ResultReader, SideCar, StoredField, mix,
-};
-use crate::problem::Field;
-use crate::problem::Problem;
-use crate::solver::conditions::output_members;
+use crate::output::checkpoint::{FurtherResult, Header, is_taken};
+use crate::output::{HistoryContents, Number, ResultFile, ResultReader, StoredField, mix};
+use crate::problem::Output;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
@@ -19,120 +15,109 @@ use crate::solver::{Simulation, Stepper};
 
 use super::crack_files;
 use super::files::Files;
-use super::layout::{FIXED, ResultLayout, select};
+use super::layout::{FIXED, select};
 use super::observer::{Observer, Row};
+use super::output_file::{OutputFile, Start, output_rows};
 use super::restart_compatibility::history_differences;
 
 /// Number of history rows buffered before a write.
 const BUFFERED_ROWS: usize = 256;
 
-/// The open result and history of a run.
+/// The open results and history of a run.
 pub struct Recorder<'a> {
-    /// The result file.
-    pub file: ResultFile<'a>,
     /// Computes the rows of the history.
     pub observer: HistoryObserver,
-    /// Redistribution from owned points to blocks of ids, for checkpoints and the result.
+    /// Redistribution from owned points to blocks of ids, for checkpoints and results.
     pub order: IdOrder,
-    /// The rows of this rank's block that are in the result; `None` for all.
-    output_rows: Option<Vec<usize>>,
     /// The last row of the history.
     pub last_row: Option<HistoryRow>,
-    /// Time spent on the result.
+    /// Time spent on results.
     pub spent: Duration,
     /// Time spent on the history.
     pub spent_on_rows: Duration,
+    /// The result files, the main one first, which has the history.
+    files: Vec<OutputFile<'a>>,
     /// Folder of the crack files.
     folder: PathBuf,
-    fields: Vec<Field>,
-    outputs: Schedule,
     rows: Schedule,
     buffered: Vec<Vec<f64>>,
-    /// The side-car; on rank 0 only.
-    side_car: Option<SideCar>,
-}
-
-/// Start of a recorder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Start {
-    /// Create new files.
-    New(Creation),
-    /// Resume existing files after a number of outputs and history rows.
-    After(u64, u64),
 }
 
 impl<'a> Recorder<'a> {
-    /// Create or resume the files. Collective.
+    /// Create or resume the files: the main result and the history after a number of rows, and the further results. Collective.
     ///
     /// # Errors
-    /// If they cannot be written, or a set of the history is empty.
+    /// If they cannot be written, or a set of the history or an output is empty.
     pub fn new<const D: usize>(
         simulation: &Simulation<'a, D>,
         files: &Files,
-        start: Start,
+        (starts, rows): (&[Start], u64),
         metadata: &[(&str, String)],
     ) -> Result<Self> {
-        let (problem, comm) = (simulation.problem, simulation.comm);
+        let problem = simulation.problem;
         let mut observer = HistoryObserver::new(simulation)?;
         let order = simulation.id_order();
-        let output_rows = output_rows(simulation, &order)?;
-        let clock = &simulation.expected_clock();
-        let (outputs, rows) = (
-            Schedule::of_outputs(&problem.output),
-            Schedule::every(problem.row_interval()),
-        );
-        let selection = (&order, &output_rows);
-        let layout = ResultLayout::new(simulation, selection, outputs.count(clock), metadata);
-        let fixed = layout.fixed();
-        let contents = layout.contents(&fixed);
-        let history = HistoryContents {
+        let schedule = Schedule::every(problem.row_interval());
+        let contents = HistoryContents {
             columns: observer.columns(),
             csv: &files.history,
-            rows: rows.count(clock),
+            rows: schedule.count(&simulation.expected_clock()),
         };
-        let file = match start {
-            Start::New(creation) => {
-                let made = ResultFile::create(&files.result, comm, creation, &contents).and_then(
-                    |mut file| {
-                        file.create_history(&history)?;
-                        Ok(file)
-                    },
-                );
-                let begun = made
-                    .as_ref()
-                    .err()
-                    .is_some_and(|error| error.kind == ErrorKind::Run);
-                if begun && comm.rank() == 0 {
-                    // Best effort: a result without outputs only takes space.
-                    let _ = std::fs::remove_file(&files.result);
+        let mut opened = Vec::new();
+        let mut past = Vec::new();
+        let outputs = problem.outputs().zip(files.results()).zip(starts);
+        for (number, (output, start)) in outputs.enumerate() {
+            let history = (number == 0).then_some((&contents, rows));
+            let file = OutputFile::new(simulation, output, &order, (*start, history), metadata);
+            match file {
+                Ok((file, rows)) => {
+                    opened.push(file);
+                    past.extend(rows);
                 }
-                made?
+                Err(error) => {
+                    abandon(simulation.comm, opened, files, starts);
+                    return Err(error);
+                }
             }
-            Start::After(outputs, rows) => {
-                let retained = (outputs, rows);
-                let (file, past) =
-                    ResultFile::resume(&files.result, comm, &contents, &history, retained)?;
-                observer.recall(&past);
-                file
-            }
-        };
-        let side_car =
-            (comm.rank() == 0).then(|| SideCar::new(&files.result, &contents, file.past()));
+        }
+        observer.recall(&past);
         Ok(Self {
-            file,
             observer,
             order,
-            output_rows,
             last_row: None,
             spent: Duration::ZERO,
             spent_on_rows: Duration::ZERO,
+            files: opened,
             folder: files.folder.clone(),
-            fields: problem.output.fields.clone(),
-            outputs,
-            rows,
+            rows: schedule,
             buffered: Vec::new(),
-            side_car,
         })
+    }
+
+    /// The main result.
+    pub fn main(&self) -> &ResultFile<'a> {
+        &self.files[0].file
+    }
+
+    /// The further results, for a checkpoint.
+    pub fn further<const D: usize>(&self, simulation: &Simulation<'_, D>) -> Vec<FurtherResult> {
+        let problem = simulation.problem;
+        let outputs = problem.further_outputs.iter().zip(&self.files[1..]);
+        let result = |(output, file): (&Output, &OutputFile)| FurtherResult {
+            name: output.name.clone().unwrap_or_default(),
+            outputs: file.file.steps(),
+            counts_newly_broken: problem.has_damage() && output.counts_newly_broken(),
+        };
+        outputs.map(result).collect()
+    }
+
+    /// Causes of non-collective writes to any result, as HDF5's bits; 0 if all were collective.
+    pub fn no_collective_cause(&self) -> u32 {
+        let causes = self
+            .files
+            .iter()
+            .map(|file| file.file.no_collective_cause());
+        causes.fold(0, |all, cause| all | cause)
     }
 
     /// Update after a rebalancing or refinement. Collective.
@@ -141,16 +126,19 @@ impl<'a> Recorder<'a> {
     /// As [`HistoryObserver::new`].
     pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
-        self.output_rows = output_rows(simulation, &self.order)?;
+        for file in &mut self.files {
+            file.update_points(simulation, &self.order)?;
+        }
         self.observer.follow(simulation)
     }
 
     /// Test whether an output or row is due after a step.
     pub fn is_due(&self, clock: &Clock) -> bool {
-        self.outputs.is_due(clock) || self.rows.is_due(clock)
+        let mut outputs = self.files.iter();
+        outputs.any(|file| file.schedule.is_due(clock)) || self.rows.is_due(clock)
     }
 
-    /// Write the due output and history row, and pass the row to `observer`. Collective.
+    /// Write the due outputs and history row, and pass the row to `observer`. Collective.
     ///
     /// # Errors
     /// If the disk is full.
@@ -159,9 +147,10 @@ impl<'a> Recorder<'a> {
         stepper: &mut Stepper<'_, D>,
         observer: &mut dyn Observer,
     ) -> Result<()> {
-        let clock = stepper.clock();
-        let (output, row) = (self.outputs.is_due(clock), self.rows.is_due(clock));
-        self.write(stepper.at_full_step(), output, row)?;
+        let clock = *stepper.clock();
+        let row = self.rows.is_due(&clock);
+        let is_due = |file: &OutputFile| file.schedule.is_due(&clock);
+        self.write(stepper.at_full_step(), is_due, row)?;
         if let (Some(values), true) = (&self.last_row, row) {
             let columns = self.observer.columns();
             let row = Row {
@@ -173,21 +162,44 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Write an output, a history row or both. Collective.
+    /// Write outputs to all files, and a history row. Collective.
     ///
     /// # Errors
     /// If the disk is full.
-    pub fn write<const D: usize>(
+    pub fn write_all<const D: usize>(&mut self, simulation: &mut Simulation<'_, D>) -> Result<()> {
+        self.write(simulation, |_| true, true)
+    }
+
+    /// Write the first outputs of new files, and a history row if the main one is new. Collective.
+    ///
+    /// # Errors
+    /// If the disk is full.
+    pub fn write_first<const D: usize>(
         &mut self,
         simulation: &mut Simulation<'_, D>,
-        output: bool,
+    ) -> Result<()> {
+        let row = self.main().steps() == 0;
+        self.write(simulation, |file| file.file.steps() == 0, row)
+    }
+
+    /// Write outputs to the chosen files, a history row or both. Collective.
+    ///
+    /// # Errors
+    /// If the disk is full.
+    fn write<const D: usize>(
+        &mut self,
+        simulation: &mut Simulation<'_, D>,
+        is_chosen: impl Fn(&OutputFile) -> bool,
         row: bool,
     ) -> Result<()> {
+        let is_main = is_chosen(&self.files[0]);
+        let output = self.files.iter().any(&is_chosen);
         if !output && !row {
             return Ok(());
         }
         let start = Instant::now();
-        let energies = row || self.fields.contains(&Field::StrainEnergyDensity);
+        let mut chosen = self.files.iter().filter(|file| is_chosen(file));
+        let energies = row || chosen.any(OutputFile::has_energies);
         let snapshot = if energies {
             Snapshot::new(simulation)
         } else {
@@ -200,33 +212,17 @@ impl<'a> Recorder<'a> {
             self.buffered.push(row.values.clone());
             self.last_row = Some(row);
         }
-        if output || self.buffered.len() >= BUFFERED_ROWS {
+        if is_main || self.buffered.len() >= BUFFERED_ROWS {
             self.write_rows()?;
         }
         let row_time = rows_start.elapsed();
         self.spent_on_rows += row_time;
-        if output {
-            if simulation.may_refine() {
-                let layout =
-                    ResultLayout::new(simulation, (&self.order, &self.output_rows), 0, &[]);
-                let fixed = layout.fixed();
-                self.file.set_points(&layout.contents(&fixed))?;
-            }
-            let (time, number) = (simulation.clock.time(), simulation.clock.number());
-            let (fields, order, rows) = (&self.fields, &self.order, &self.output_rows);
-            self.file.write_step(time, number, |k| {
-                let (field, width) = (fields[k], fields[k].components());
-                let values = snapshot.field(simulation, field);
-                select(rows, order.collect(simulation.comm, &values, width), width)
-            })?;
+        for file in self.files.iter_mut().filter(|file| is_chosen(file)) {
+            file.write(simulation, &snapshot, &self.order)?;
+        }
+        if is_main {
             let cracks = self.observer.crack_paths(simulation, &snapshot);
             crack_files::write(simulation.comm, &self.folder, &cracks)?;
-            let written = match &mut self.side_car {
-                Some(side_car) => side_car.add(simulation.clock.time(), self.file.points()),
-                None => Ok(()),
-            };
-            agree(simulation.comm, written)?;
-            simulation.fields.forget_newly_broken();
         }
         self.spent += start.elapsed() - row_time;
         Ok(())
@@ -238,7 +234,7 @@ impl<'a> Recorder<'a> {
         self.last_row.as_ref().filter(is_now)
     }
 
-    /// Output the state of a failed run. Collective.
+    /// Output the state of a failed run to the files that do not have it. Collective.
     ///
     /// # Errors
     /// If the disk is full.
@@ -246,98 +242,142 @@ impl<'a> Recorder<'a> {
         &mut self,
         simulation: &mut Simulation<'_, D>,
     ) -> Result<()> {
-        if self.outputs.is_due(&simulation.clock) {
-            self.sync()
-        } else {
-            self.write(simulation, true, false)
-        }
+        let clock = simulation.clock;
+        self.write(simulation, |file| !file.schedule.is_due(&clock), false)?;
+        self.sync()
     }
 
-    /// Close the result; `will_resume` keeps its unused space. Collective.
+    /// Close the results; `will_resume` keeps their unused space. Collective.
     ///
     /// # Errors
     /// If the disk is full, or an earlier write failed.
     pub fn close(self, will_resume: bool) -> Result<()> {
-        let comm = self.file.communicator();
-        self.file.close(will_resume)?;
-        agree(comm, self.side_car.map_or(Ok(()), SideCar::finish))
+        let mut files = self.files.into_iter();
+        files.try_for_each(|file| file.close(will_resume))
     }
 
-    /// Write buffered rows and fsync the result. Collective.
+    /// Write buffered rows and fsync the results. Collective.
     ///
     /// # Errors
     /// If the disk is full.
     pub fn sync(&mut self) -> Result<()> {
         self.write_rows()?;
-        self.file.sync()
+        let mut files = self.files.iter_mut();
+        files.try_for_each(|file| file.file.sync())
     }
 
     fn write_rows(&mut self) -> Result<()> {
         if !self.buffered.is_empty() {
-            self.file.append_history(&self.buffered)?;
+            self.files[0].file.append_history(&self.buffered)?;
             self.buffered.clear();
         }
         Ok(())
     }
 }
 
-/// The rows of this rank's block that are in the result; `None` for all. Collective.
-///
-/// # Errors
-/// If the output set is empty.
-fn output_rows<const D: usize>(
-    simulation: &Simulation<'_, D>,
-    order: &IdOrder,
-) -> Result<Option<Vec<usize>>> {
-    let (problem, model, comm) = (simulation.problem, &simulation.model, simulation.comm);
-    let Some(points) = output_members(problem, comm, model)? else {
-        return Ok(None);
-    };
-    let mut flags = vec![0_u32; model.owned()];
-    points.iter().for_each(|point| flags[*point as usize] = 1);
-    let flags = order.collect(comm, &flags, 1);
-    Ok(Some(
-        (0..flags.len()).filter(|row| flags[*row] == 1).collect(),
-    ))
+/// Close the files that are open when another one fails, and remove new ones. Collective.
+fn abandon(comm: &dyn Communicator, opened: Vec<OutputFile>, files: &Files, starts: &[Start]) {
+    for ((file, path), start) in opened.into_iter().zip(files.results()).zip(starts) {
+        // The error that is reported is that of the other file.
+        let _ = file.close(true);
+        if matches!(start, Start::New(_)) && comm.rank() == 0 {
+            // Best effort: a result without outputs only takes space.
+            let _ = std::fs::remove_file(path);
+        }
+    }
 }
 
-/// The reason why the result of a checkpoint cannot be continued, if any: it is missing, damaged, of other
-/// points, or has other fields or columns. Collective.
+/// How the results of a checkpoint are continued: for each output, whether its file is resumed or why there is a new one, which
+/// is `None` where the checkpoint knows of no file and there is none. Collective.
 ///
 /// # Errors
-/// If a set of the history is empty, a deck cannot be parsed, or the result is locked or unreadable.
-pub fn reason_for_new_result<const D: usize>(
+/// If a set of the history is empty, a deck cannot be parsed, or a result is locked or unreadable.
+pub fn reasons_for_new_results<const D: usize>(
     simulation: &Simulation<'_, D>,
     files: &Files,
     header: &Header,
     physics: &str,
+) -> Result<Vec<Continuation>> {
+    let mut found = Vec::new();
+    for (output, path) in simulation.problem.outputs().zip(files.results()) {
+        let reason = match &output.name {
+            None => {
+                let observer = HistoryObserver::new(simulation)?;
+                let changed = history_differences(&header.deck, physics);
+                let changed = agree(simulation.comm, changed)?;
+                let history = Some((&observer, header.rows, changed));
+                let counted = (output, path, header.outputs);
+                reason_for_new_result(simulation, counted, history)?
+            }
+            Some(name) => match header.further.iter().find(|result| result.name == *name) {
+                Some(known) => {
+                    let counted = (output, path, known.outputs);
+                    reason_for_new_result(simulation, counted, None)?
+                }
+                None => {
+                    let there = || {
+                        let text = "the checkpoint does not know of it".to_owned();
+                        Ok(is_taken(path).then_some(text))
+                    };
+                    let there = found_by_root(simulation.comm, there)?;
+                    found.push(Continuation::New(there));
+                    continue;
+                }
+            },
+        };
+        found.push(match reason {
+            None => Continuation::Resume,
+            Some(reason) => Continuation::New(Some(reason)),
+        });
+    }
+    Ok(found)
+}
+
+/// How the result of an output is continued.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Continuation {
+    /// The file is resumed.
+    Resume,
+    /// There is a new file; the reason, if an existing one is set aside.
+    New(Option<String>),
+}
+
+/// The reason why the file of an output with a number of outputs cannot be continued, if any: it is missing, damaged, of other
+/// points, or has other fields or columns. The history comes with its number of rows and with differences of its columns.
+/// Collective.
+///
+/// # Errors
+/// If the result is locked or unreadable.
+fn reason_for_new_result<const D: usize>(
+    simulation: &Simulation<'_, D>,
+    (output, path, outputs): (&Output, &Path, u64),
+    history: Option<(&HistoryObserver, u64, Option<String>)>,
 ) -> Result<Option<String>> {
     let comm: &dyn Communicator = simulation.comm;
-    let observer = HistoryObserver::new(simulation)?;
-    let changed = agree(comm, history_differences(&header.deck, physics))?;
     let order = simulation.id_order();
-    let rows = output_rows(simulation, &order)?;
+    let rows = output_rows(simulation, output, &order)?;
     let owned = &simulation.model.ids[..simulation.model.owned()];
     let ids = select(&rows, order.collect(comm, owned, 1), 1);
     let own = ids.into_iter().map(mix).fold(0, u64::wrapping_add);
     let points = comm::total(comm, own);
     let compare = || -> Result<Option<String>> {
-        if !is_taken(&files.result) {
+        if !is_taken(path) {
             return Ok(Some("the result so far is gone".to_owned()));
         }
         // A link to an unmounted file system is an error, not damage.
-        std::fs::metadata(&files.result).map_err(|error| {
-            let path = files.result.display();
+        std::fs::metadata(path).map_err(|error| {
+            let path = path.display();
             Error::run(format!("{path}: cannot read the result so far: {error}"))
         })?;
-        let reader = ResultReader::open(&files.result)?;
+        let reader = ResultReader::open(path)?;
         let columns = reader.history()?;
         let rows = columns
             .first()
             .map_or(0, |column| column.values.len() as u64);
-        let outputs = reader.steps()?.len() as u64;
+        let found_outputs = reader.steps()?.len() as u64;
         reader.times()?;
-        if outputs < header.outputs || rows < header.rows {
+        let counted_rows = history.as_ref().map_or(0, |(_, rows, _)| *rows);
+        if found_outputs < outputs || rows < counted_rows {
             let text = "the result so far has fewer outputs or rows than the checkpoint counts";
             return Ok(Some(text.to_owned()));
         }
@@ -346,10 +386,9 @@ pub fn reason_for_new_result<const D: usize>(
             .iter()
             .filter(|field| field.dynamic && !FIXED.contains(&&field.name[..]));
         let found: Vec<&str> = moving.map(|field| &field.name[..]).collect();
-        let mut requested: Vec<&str> = requested_fields(simulation.problem);
+        let requested = output.fields.iter().map(|field| field.name());
+        let mut requested: Vec<&str> = requested.collect();
         requested.sort_unstable();
-        let names = columns.iter().map(|column| &column.name);
-        let expected = observer.columns().iter().map(|(name, _)| name);
         let single = |field: &StoredField| field.number == Number::F32;
         let changing = simulation.may_refine();
         if reader.is_changing() != changing {
@@ -359,13 +398,16 @@ pub fn reason_for_new_result<const D: usize>(
         let found_points = reader.ids(0)?.into_iter().map(mix);
         if !changing && found_points.fold(0, u64::wrapping_add) != points {
             return Ok(Some("other points are asked for".to_owned()));
-        } else if fields.iter().any(single)
-            != (simulation.problem.output.single && !requested.is_empty())
-        {
+        } else if fields.iter().any(single) != (output.single && !requested.is_empty()) {
             return Ok(Some("numbers of another length are asked for".to_owned()));
         } else if found != requested {
             return Ok(Some("other fields are asked for".to_owned()));
-        } else if !names.eq(expected) {
+        }
+        let Some((observer, _, changed)) = history else {
+            return Ok(None);
+        };
+        let names = columns.iter().map(|column| &column.name);
+        if !names.eq(observer.columns().iter().map(|(name, _)| name)) {
             return Ok(Some(
                 "other columns of the history are asked for".to_owned(),
             ));
@@ -379,9 +421,9 @@ pub fn reason_for_new_result<const D: usize>(
 ///
 /// # Errors
 /// If the result is locked or unreadable.
-pub fn damage(comm: &dyn Communicator, files: &Files, outputs: u64) -> Result<Option<String>> {
+pub fn damage(comm: &dyn Communicator, path: &Path, outputs: u64) -> Result<Option<String>> {
     found_by_root(comm, || {
-        ResultReader::open(&files.result)?.check(outputs as usize)?;
+        ResultReader::open(path)?.check(outputs as usize)?;
         Ok(None)
     })
 }
@@ -406,13 +448,4 @@ fn found_by_root(
     comm.broadcast(0, &mut reason);
     let reason = String::from_utf8_lossy(&reason).into_owned();
     Ok((!reason.is_empty()).then_some(reason))
-}
-
-fn requested_fields(problem: &Problem) -> Vec<&'static str> {
-    problem
-        .output
-        .fields
-        .iter()
-        .map(|field| field.name())
-        .collect()
 }

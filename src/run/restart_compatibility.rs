@@ -29,7 +29,9 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
         last.time.end = 0.0;
     }
     problem.time.end = 0.0;
+    problem.further_outputs.clear();
     problem.output = Output {
+        name: None,
         every: None,
         times: Vec::new(),
         fields: Vec::new(),

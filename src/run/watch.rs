@@ -28,6 +28,21 @@ pub struct Decision {
     pub checkpoint: bool,
     /// Stop, with the reason.
     pub stop: Option<Reason>,
+    /// The observer of a rank has made a wrong request.
+    pub has_wrong_request: bool,
+    /// The observers of the ranks have set different load factors.
+    pub factors_differ: bool,
+}
+
+/// What the observer of this rank has asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Votes {
+    /// Stop the run.
+    pub stop: bool,
+    /// The request was wrong.
+    pub is_wrong: bool,
+    /// Fingerprint of the load factors.
+    pub factors: f64,
 }
 
 /// Reason of a stop before the end.
@@ -37,6 +52,8 @@ pub enum Reason {
     Signal,
     /// The wall-clock limit is near.
     WallTime,
+    /// The observer of a rank asked for it.
+    Observer,
 }
 
 /// The signals and clocks of a rank.
@@ -97,8 +114,14 @@ impl<'a> Watch<'a> {
         step.is_some_and(due)
     }
 
-    /// Decide on a checkpoint or stop after this iteration; equal on all ranks. Collective.
-    pub fn decide(&mut self, comm: &dyn Communicator, step: Option<&Clock>) -> Decision {
+    /// Decide on a checkpoint or stop after this iteration, with the votes of this rank's observer; equal on all ranks.
+    /// Collective.
+    pub fn decide(
+        &mut self,
+        comm: &dyn Communicator,
+        step: Option<&Clock>,
+        observer: Votes,
+    ) -> Decision {
         let (then, before) = self.last_decision;
         let per_iteration = then.elapsed().as_secs_f64() / (self.iterations - before).max(1) as f64;
         let due = match self.rule {
@@ -117,6 +140,10 @@ impl<'a> Watch<'a> {
             flag(late),
             flag(due || self.signals.is_some_and(Signals::take_request)),
             per_iteration,
+            flag(observer.stop),
+            flag(observer.is_wrong),
+            observer.factors,
+            -observer.factors,
         ];
         comm.max(&mut votes);
         let iterations = (INTERVAL / votes[3].max(1e-9)) as u64;
@@ -124,11 +151,14 @@ impl<'a> Watch<'a> {
         self.last_decision = (Instant::now(), self.iterations);
         Decision {
             checkpoint: votes[2] > 0.0 || self.is_scheduled(step),
-            stop: match (votes[0] > 0.0, votes[1] > 0.0) {
-                (true, _) => Some(Reason::Signal),
-                (_, true) => Some(Reason::WallTime),
+            stop: match (votes[0] > 0.0, votes[1] > 0.0, votes[4] > 0.0) {
+                (true, _, _) => Some(Reason::Signal),
+                (_, true, _) => Some(Reason::WallTime),
+                (_, _, true) => Some(Reason::Observer),
                 _ => None,
             },
+            has_wrong_request: votes[5] > 0.0,
+            factors_differ: votes[6] != -votes[7],
         }
     }
 

@@ -13,7 +13,7 @@ use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
-use super::conditions::{Conditions, Here, Work, apply_initials, are_finite, members};
+use super::conditions::{Conditions, Here, LoadFactors, Work, apply_initials, are_finite, members};
 use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
@@ -50,7 +50,9 @@ pub struct Simulation<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// Loads and supports of the present stage.
     pub conditions: Conditions<D>,
-    /// Loads and supports of the other stages, by stage.
+    /// Factors on the loads.
+    pub load_factors: LoadFactors,
+    /// Those of the other stages, by stage.
     pub(super) waiting: Vec<Option<Conditions<D>>>,
     /// The stages of the run.
     pub stages: Vec<Stage>,
@@ -213,6 +215,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             equilibria: problem.is_quasi_static(),
             relaxation: problem.has_relaxation(),
             damage: problem.has_damage(),
+            further_counts: problem.further_counts().count(),
             plasticity: forces.has_plasticity(),
             contact: problem.has_contact(),
             coarsening: refinement::may_coarsen(problem),
@@ -237,6 +240,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             forces,
             contact,
             conditions: waiting[0].take().unwrap_or_default(),
+            load_factors: LoadFactors::new(problem.conditions.len()),
             waiting,
             integrator: Some(integrator(&stages[0].time)),
             stages,
@@ -351,6 +355,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
             part.write_bond_inputs();
             finite
         });
+        self.load_factors.end_step();
         if !finite {
             self.note_bad(&before);
         }
@@ -361,7 +366,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Prepare the conditions for the second half kick at the present time of a clock.
     fn set_second_half(&mut self, clock: &Clock) {
         let (time, step) = (clock.time(), clock.step());
-        self.conditions.set_loads(time, false);
+        self.conditions
+            .set_loads(time, self.load_factors.present(), false);
         self.conditions.set_guidance(time, step);
     }
 
@@ -452,7 +458,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
 
     /// Update the external forces at `time` (s). Constant forces are updated only if `all`.
     pub(super) fn apply_loads(&mut self, time: f64, all: bool) {
-        self.conditions.set_loads(time, all);
+        self.conditions
+            .set_loads(time, self.load_factors.present(), all);
         self.walk(|part, mut here| {
             here.apply_loads(part);
             true

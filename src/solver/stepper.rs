@@ -1,10 +1,12 @@
 //! The leapfrog driver: it defers the second half kick of a step until a caller requests the state.
 
 use crate::comm::Communicator;
-use crate::error::Result;
-use crate::problem::Time;
+use crate::error::{Error, Result};
+use crate::message::suggestion;
+use crate::problem::{Action, Condition, Time};
 
 use super::Simulation;
+use super::conditions::LoadFactors;
 use super::model::Model;
 use super::motion::Clock;
 use super::motion::load_step::LoadStep;
@@ -21,6 +23,17 @@ pub struct Stepper<'a, const D: usize> {
     simulation: Simulation<'a, D>,
     /// Whether the second half kick of the last step is still to be applied.
     half_kick_pending: bool,
+    /// What an observer has asked for.
+    requests: Requests,
+}
+
+/// What an observer has asked for on this rank.
+#[derive(Default)]
+struct Requests {
+    /// Stop the run.
+    stop: bool,
+    /// What is wrong in a request.
+    error: Option<Error>,
 }
 
 impl<'a, const D: usize> Stepper<'a, D> {
@@ -29,6 +42,7 @@ impl<'a, const D: usize> Stepper<'a, D> {
         Self {
             simulation,
             half_kick_pending: false,
+            requests: Requests::default(),
         }
     }
 
@@ -92,6 +106,65 @@ impl<'a, const D: usize> Stepper<'a, D> {
     /// Wall-clock time by phase.
     pub fn times(&self) -> &Times {
         &self.simulation.times
+    }
+
+    /// Ask for a stop of the run.
+    pub fn request_stop(&mut self) {
+        self.requests.stop = true;
+    }
+
+    /// Whether a stop was asked for on this rank.
+    pub fn is_stop_requested(&self) -> bool {
+        self.requests.stop
+    }
+
+    /// The error of a request on this rank, if any.
+    pub fn wrong_request(&self) -> Option<&Error> {
+        self.requests.error.as_ref()
+    }
+
+    /// Factors on the loads.
+    pub fn load_factors(&self) -> &LoadFactors {
+        &self.simulation.load_factors
+    }
+
+    /// Index of the load with a name.
+    ///
+    /// # Errors
+    /// If there is no condition of this name, or it is no load.
+    pub fn load(&self, name: &str) -> Result<usize> {
+        let conditions = &self.simulation.problem.conditions;
+        let is_load = |condition: &Condition| {
+            matches!(condition.action, Action::BodyForce(..) | Action::Force(_))
+        };
+        let found = conditions
+            .iter()
+            .position(|condition| condition.name == name);
+        if let Some(found) = found.filter(|found| is_load(&conditions[*found])) {
+            return Ok(found);
+        }
+        let loads = conditions.iter().filter(|condition| is_load(condition));
+        let loads = loads.map(|condition| condition.name.as_str());
+        Err(Error::input(format!(
+            "there is no load `{name}`{}",
+            suggestion(name, loads)
+        )))
+    }
+
+    /// Multiply a load by a factor from the next step, or load step, on. All ranks pass the same. If there is no such load, or
+    /// the factor is not finite, [`Self::wrong_request`] says so.
+    pub fn set_load_factor(&mut self, name: &str, factor: f64) {
+        let checked = self.load(name).and_then(|load| {
+            if factor.is_finite() {
+                return Ok(load);
+            }
+            let message = format!("the factor of the load `{name}` must be finite, is {factor}");
+            Err(Error::input(message))
+        });
+        match checked {
+            Ok(load) => self.simulation.load_factors.set(load, factor),
+            Err(error) => self.requests.error = Some(error),
+        }
     }
 
     /// The points.

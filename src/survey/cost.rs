@@ -2,7 +2,7 @@
 
 use super::Size;
 use crate::material::{Law, PlasticState};
-use crate::problem::{Action, Block, Body, FamilyRule, Problem};
+use crate::problem::{Action, Block, Body, FamilyRule, Output, Problem};
 use crate::solver::Simulation;
 use crate::solver::assign::block_laws;
 use crate::solver::motion::Clock;
@@ -51,27 +51,36 @@ pub struct Measured {
 }
 
 /// Memory and disk space of a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
     /// Total memory of all ranks in the time loop at its peak during output, without ghosts, bytes: on one
     /// rank, and on several.
     pub time_loop: [f64; 2],
-    /// Number of outputs.
-    pub outputs: u64,
-    /// Size of the result at the end, bytes.
-    pub result: f64,
+    /// The main result, with the history, and the further ones.
+    pub results: Vec<ResultCost>,
     /// Size of one checkpoint, bytes; there are two.
     pub checkpoint: f64,
 }
 
+/// Disk space of a result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultCost {
+    /// Name of a further output.
+    pub name: Option<String>,
+    /// Number of outputs.
+    pub outputs: u64,
+    /// Size at the end, bytes.
+    pub bytes: f64,
+}
+
 /// Inputs of the cost.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Counts {
     points: f64,
-    /// Fraction of the points in the result.
-    output_fraction: f64,
+    /// Number of points in each result.
+    output_points: Vec<f64>,
     memory: Measured,
     /// Bytes of the bonds in a checkpoint.
     bonds: f64,
@@ -83,11 +92,11 @@ struct Counts {
 
 impl Cost {
     /// The cost of a run that is set up on one rank, with `columns` history columns and `output_points` in
-    /// its result. Memory is estimated if not measured.
+    /// each result. Memory is estimated if not measured.
     pub fn of<const D: usize>(
         simulation: &Simulation<'_, D>,
         columns: usize,
-        output_points: u64,
+        output_points: &[u64],
         measured: Option<Measured>,
     ) -> Self {
         let (problem, model) = (simulation.problem, &simulation.model);
@@ -98,7 +107,7 @@ impl Cost {
         let listed = simulation.forces.directed_bonds() - simulation.forces.lattice_bonds();
         let counts = Counts {
             points,
-            output_fraction: output_points as f64 / points,
+            output_points: output_points.iter().map(|count| *count as f64).collect(),
             memory: measured.unwrap_or_else(|| estimated(problem, points, bonds, listed as f64)),
             bonds: saved,
             columns: columns as f64,
@@ -124,13 +133,18 @@ impl Cost {
         let bonds = bytes * directed_bonds + history;
         let counts = Counts {
             points,
-            output_fraction: size.output_points / points,
+            output_points: size.output_points.clone(),
             memory: estimated(problem, points, bonds, listed),
             bonds: ON_LATTICE * directed_bonds + history,
             columns: 16.0,
             saved: saved_width(problem),
         };
         cost(problem, counts, clock)
+    }
+
+    /// Size of all results at the end, bytes.
+    pub fn all_results(&self) -> f64 {
+        self.results.iter().map(|result| result.bytes).sum()
     }
 
     /// Peak memory of one of `ranks` ranks, bytes; `ghosts` is relative to owned points.
@@ -203,7 +217,11 @@ fn saved_width(problem: &Problem) -> usize {
         0
     };
     let worked = usize::from(!problem.conditions.is_empty());
-    let broken = if problem.has_damage() { 4 } else { 0 };
+    let broken = if problem.has_damage() {
+        4 + problem.further_counts().count()
+    } else {
+        0
+    };
     let damped = problem
         .bodies
         .iter()
@@ -248,20 +266,30 @@ fn saved_width(problem: &Problem) -> usize {
 }
 
 fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
-    let outputs = Schedule::of_outputs(&problem.output).count(clock);
     let rows = Schedule::every(problem.row_interval()).count(clock) as f64;
-    let components: usize = problem
-        .output
-        .fields
-        .iter()
-        .map(|field| field.components())
-        .sum();
-    let number = if problem.output.single { 4.0 } else { 8.0 };
-    let written = counts.output_fraction * (FIXED + number * outputs as f64 * components as f64);
+    let result = |(output, points): (&Output, &f64)| {
+        let outputs = Schedule::of_outputs(output).count(clock);
+        let components = output.fields.iter().map(|field| field.components());
+        let components = components.sum::<usize>() as f64;
+        let number = if output.single { 4.0 } else { 8.0 };
+        let history = if output.name.is_none() {
+            8.0 * rows * counts.columns
+        } else {
+            0.0
+        };
+        ResultCost {
+            name: output.name.clone(),
+            outputs,
+            bytes: OVERHEAD + points * (FIXED + number * outputs as f64 * components) + history,
+        }
+    };
+    let results = problem.outputs().zip(&counts.output_points).map(result);
+    let results = results.collect();
     let saved = 8.0 * counts.saved as f64 + 4.0;
     // During output of a field: sums over bonds, and copies of the field.
-    let widest = problem.output.fields.iter().map(|field| field.components());
-    let widest = widest.max().unwrap_or(0).max(3) as f64;
+    let fields = problem.outputs().flat_map(|output| &output.fields);
+    let widest = fields.map(|field| field.components()).max();
+    let widest = widest.unwrap_or(0).max(3) as f64;
     let output = counts.points * 8.0 * (5.0 + FIELD_COPIES * widest);
     let bonds = counts.bonds;
     let offsets = counts.points * 24.0;
@@ -280,8 +308,7 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
         time_loop: checkpoint.map(|checkpoint| {
             counts.memory.resident + vectors + output.max(checkpoint).max(restart)
         }),
-        outputs,
-        result: OVERHEAD + counts.points * written + 8.0 * rows * counts.columns,
+        results,
         checkpoint: OVERHEAD + counts.points * saved + bonds,
     }
 }

@@ -61,8 +61,12 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
     simulation.check()?;
     let columns = HistoryObserver::new(&simulation)?.columns().len();
     let total = simulation.model.total;
-    let output_points = output_members(problem, &comm, &simulation.model)?;
-    let output_points = output_points.map_or(total, |points| points.len() as u64);
+    let of_output = |output| {
+        let points = output_members(problem, output, &comm, &simulation.model)?;
+        Ok(points.map_or(total, |points| points.len() as u64))
+    };
+    let output_points = problem.outputs().map(of_output);
+    let output_points = output_points.collect::<Result<Vec<_>>>()?;
     let survey = Survey::new(&mut simulation);
     let measured = before.map(|before| Measured {
         peak: after.peak - before,
@@ -74,7 +78,7 @@ fn dry_run_in<const D: usize>(problem: &Problem, ranks: u32, measure: bool) -> R
         bonds: simulation.forces.directed_bonds() / 2,
         lattice_bonds: simulation.forces.lattice_bonds() / 2,
         ghosts: ghost_share(&edges(&simulation), problem.horizon, ranks),
-        cost: Cost::of(&simulation, columns, output_points, measured),
+        cost: Cost::of(&simulation, columns, &output_points, measured),
         stable_step: simulation.scaled_stable_step(),
         steps: choose_steps(problem, simulation.stable_step)?,
         seconds: measure.then(|| seconds_per_step(simulation)),

@@ -11,7 +11,7 @@ mod size;
 mod speed;
 
 pub use bodies::BodyFigures;
-pub use cost::{Cost, Measured, ghost_share};
+pub use cost::{Cost, Measured, ResultCost, ghost_share};
 pub use dry_run::{DryRun, dry_run};
 pub use interior::{Interior, interior};
 pub use size::{Size, size};

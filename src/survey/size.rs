@@ -21,8 +21,8 @@ pub struct Size {
     pub points: Vec<f64>,
     /// Number of neighbours of all points of each body; their sum counts each bond twice.
     pub bonds: Vec<f64>,
-    /// Number of points in the result.
-    pub output_points: f64,
+    /// Number of points in each result, the main one first.
+    pub output_points: Vec<f64>,
 }
 
 impl Size {
@@ -58,7 +58,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
             .sum(),
         points: (0..bodies.len()).map(points).collect(),
         bonds: Vec::new(),
-        output_points: 0.0,
+        output_points: Vec::new(),
     };
     let (cutoffs, all) = (cutoffs(problem), size.all_points());
     for (index, body) in bodies.iter().enumerate() {
@@ -75,7 +75,12 @@ pub fn size(problem: &Problem) -> Result<Size> {
         // max also replaces the NaN of a body without points.
         size.bonds.push(size.points[index] * neighbours.max(0.0));
     }
-    size.output_points = output_points(problem, &bodies, &files, &size.points);
+    let outputs = problem.outputs().enumerate();
+    let counted = outputs.map(|(number, output)| {
+        let set = output.set.as_ref().map(|(set, _)| *set);
+        output_points(problem, (number, set), &bodies, (&files, &size.points))
+    });
+    size.output_points = counted.collect();
     Ok(size)
 }
 
@@ -104,18 +109,22 @@ fn neighbours(body: &LatticeBody, others: &[Option<LatticeBody>], reach: &[f64])
 }
 
 /// Figures of a body's points from a file or a mesh.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 struct Rows {
     points: f64,
     /// Volume of all points, m³.
     volume: f64,
-    /// Number of points in the result.
-    output_points: f64,
+    /// Number of points in each result.
+    output_points: Vec<f64>,
 }
 
 /// The figures of the points from files, by body.
 fn from_files(problem: &Problem) -> Vec<Rows> {
-    let mut rows = vec![Rows::default(); problem.bodies.len()];
+    let none = Rows {
+        output_points: vec![0.0; 1 + problem.further_outputs.len()],
+        ..Rows::default()
+    };
+    let mut rows = vec![none; problem.bodies.len()];
     for (index, body) in problem.bodies.iter().enumerate() {
         // Each file is read once, for its first body.
         let sample = match &body.points {
@@ -136,8 +145,11 @@ fn from_files(problem: &Problem) -> Vec<Rows> {
             let body = point.block as usize;
             rows[body].points += weight;
             rows[body].volume += weight * point.volume;
-            let in_result = is_in_result(problem, body, point.position);
-            rows[body].output_points += weight * f64::from(u8::from(in_result));
+            for (output, count) in problem.outputs().zip(&mut rows[body].output_points) {
+                let set = output.set.as_ref().map(|(set, _)| *set);
+                let in_result = is_in_result(problem, set, body, point.position);
+                *count += weight * f64::from(u8::from(in_result));
+            }
         }
     }
     rows
@@ -155,36 +167,35 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
     }
 }
 
-/// Test whether a point is in the output set, which is not a set of ids. Points of a set of a mesh are not known yet;
+/// Test whether a point is in the set of an output, which is not a set of ids. Points of a set of a mesh are not known yet;
 /// all of them count.
-fn is_in_result(problem: &Problem, body: usize, position: [f64; 3]) -> bool {
-    let set = problem.output.set.as_ref();
-    set.map(|(set, _)| &problem.sets[*set]).is_none_or(|set| {
+fn is_in_result(problem: &Problem, set: Option<usize>, body: usize, position: [f64; 3]) -> bool {
+    set.map(|set| &problem.sets[set]).is_none_or(|set| {
         matches!(set.selector, Selector::Mesh(_))
             || set::contains(set, problem.horizon, 0, position, body)
     })
 }
 
-/// Number of points in the result, from sampled points of each body.
+/// Number of points in the result of an output, its number and set, from sampled points of each body.
 fn output_points(
     problem: &Problem,
+    (number, set): (usize, Option<usize>),
     bodies: &[Option<LatticeBody>],
-    files: &[Rows],
-    points: &[f64],
+    (files, points): (&[Rows], &[f64]),
 ) -> f64 {
-    let Some((set, _)) = &problem.output.set else {
+    let Some(index) = set else {
         return points.iter().sum();
     };
-    if let Selector::Ids { ids, .. } = &problem.sets[*set].selector {
+    if let Selector::Ids { ids, .. } = &problem.sets[index].selector {
         return ids.len() as f64;
     }
     let of_body = |(index, body): (usize, &Option<LatticeBody>)| match body {
-        None => files[index].output_points,
+        None => files[index].output_points[number],
         Some(lattice) => {
             let centres = lattice.some_centres(u64::MAX);
             let selected = centres
                 .iter()
-                .filter(|centre| is_in_result(problem, index, **centre))
+                .filter(|centre| is_in_result(problem, set, index, **centre))
                 .count();
             points[index] * selected as f64 / centres.len().max(1) as f64
         }

@@ -972,3 +972,45 @@ fn errors_in_an_overlay_name_its_line() {
         text(&printed)
     );
 }
+
+#[test]
+fn check_reports_properties_of_laws_as_numbers_and_damage_of_pairs() {
+    let folder = Folder::new("check-laws");
+    let deck = folder.write(
+        "deck.toml",
+        "dimension = 'plane-strain'
+        grid = { spacing = 1, horizon = 3 }
+        material.glass.pmb = { density = 2, youngs_modulus = 5 }
+        material.concrete.softening_pmb = { density = 2, youngs_modulus = 5, tensile_strength = 0.05, fracture_energy = 0.1 }
+        damage.brittle.critical_stretch = { critical_stretch = 0.1, alpha = 0.25 }
+        damage.glue.critical_stretch = { critical_stretch = 0.05 }
+        body.left = { material = 'glass', shape.box = { lower = [0, 0], upper = [8, 8] } }
+        body.middle = { material = 'glass', damage = 'brittle', shape.box = { lower = [8, 0], upper = [16, 8] } }
+        body.right = { material = 'concrete', shape.box = { lower = [16, 0], upper = [24, 8] } }
+        body.far = { material = 'glass', shape.box = { lower = [40, 0], upper = [44, 8] } }
+        interface.pair.glue = { bodies = ['left', 'middle'], damage = 'glue' }
+        time.end = 1
+        ",
+    );
+    let json = succeed(fissure(1).arg("check").arg(&deck).arg("--json"));
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let body = |k: usize| &report["bodies"][k];
+    let horizon = 3.0_f64;
+    let micromodulus = 48.0 * 5.0 / (5.0 * std::f64::consts::PI * horizon.powi(3));
+    let found = body(0)["law"]["micromodulus"].as_f64().unwrap();
+    assert!((found / micromodulus - 1.0).abs() < 1e-9, "{json}");
+    let damage = [0, 1, 2, 3].map(|k| body(k)["has_damage"].as_bool().unwrap());
+    assert_eq!(damage, [true, true, true, false], "{json}");
+    assert!(
+        body(2)["law"]["strength_stretch"].as_f64().unwrap() > 0.0,
+        "{json}"
+    );
+    let printed = succeed(fissure(1).arg("check").arg(&deck));
+    let alphas = printed
+        .lines()
+        .filter(|line| line.trim_start().starts_with("alpha "));
+    let alphas: Vec<&str> = alphas
+        .filter_map(|line| line.split_whitespace().last())
+        .collect();
+    assert_eq!(alphas, ["0.25"], "{printed}");
+}

@@ -284,3 +284,49 @@ fn films_have_all_outputs_in_frames_of_one_even_size() {
         expect(&movie(options), 2, &[words]);
     }
 }
+
+#[test]
+fn scattered_points_are_cells_without_gaps_and_holes_stay_open() {
+    let folder = Folder::new("cells");
+    let share = |name: &str, old: &str, new: &str| {
+        let deck = PLATE.replace("upper = [0.02, 0.01] }", "upper = [0.04, 0.03] }");
+        assert!(deck.contains(old));
+        let out = run(&folder, name, &deck.replace(old, new), &[]);
+        let picture = folder.join(format!("{name}.png"));
+        let options = ["--field", "velocity", "--deform", "0", "-o"];
+        let path = picture.to_str().unwrap();
+        expect(
+            &command("plot", &[&out], &[&options[..], &[path]].concat()),
+            0,
+            &[],
+        );
+        white(&picture)
+    };
+    let lattice = share("lattice", "horizon = 2e-3", "horizon = 2e-3");
+    let scattered = share(
+        "scattered",
+        "horizon = 2e-3",
+        "horizon = 2e-3, jitter = 0.3",
+    );
+    assert!((scattered - lattice).abs() < 0.03, "{scattered} {lattice}");
+    let hole = "shape.difference = [{ box = { lower = [0, 0], upper = [0.04, 0.03] } }, { disc = { centre = [0.02, 0.015], radius = 0.008 } }]";
+    let scattered_grid = "horizon = 2e-3, jitter = 0.3 }\nmaterial";
+    let with_hole = {
+        let deck = PLATE.replace("shape.box = { lower = [0, 0], upper = [0.02, 0.01] }", hole);
+        let deck = deck.replace("horizon = 2e-3 }\nmaterial", scattered_grid);
+        let out = run(&folder, "hole", &deck, &[]);
+        let picture = folder.join("hole.png");
+        let options = [
+            "--field",
+            "velocity",
+            "--deform",
+            "0",
+            "-o",
+            picture.to_str().unwrap(),
+        ];
+        expect(&command("plot", &[&out], &options), 0, &[]);
+        white(&picture)
+    };
+    // A sixth of the plate, which takes about half of the picture.
+    assert!(with_hole - scattered > 0.05, "{with_hole} {scattered}");
+}

@@ -8,6 +8,7 @@
     energy = result.history["fracture_energy"]
 
     result = fissure.run("plate.toml", ranks=2, threads=4, tension=20e6)
+    result = fissure.run("plate.toml", overlays=["slow.toml"], output="out/slow")
 """
 
 from .history import History, read_history

@@ -25,6 +25,7 @@ def run(
     threads=None,
     overwrite=False,
     restart=False,
+    overlays=(),
     keys=None,
     launcher=None,
     binary=None,
@@ -38,6 +39,7 @@ def run(
     threads     threads of each rank [the cores of the rank]
     overwrite   replace a result that is already there
     restart     continue from the newest checkpoint instead
+    overlays    paths of decks whose keys replace those of the deck, later ones those of earlier ones
     keys        other values of keys, such as {"time.safety": 0.4}
     launcher    words that start the ranks [mpirun -n RANKS --bind-to none]
     binary      the program [$FISSURE, or fissure on the path]
@@ -55,6 +57,8 @@ def run(
         command.append("--restart")
     elif overwrite:
         command.append("--overwrite")
+    for overlay in [overlays] if isinstance(overlays, (str, os.PathLike)) else overlays:
+        command += ["--with", os.fspath(overlay)]
     for name, value in {**(keys or {}), **parameters}.items():
         command += ["--set", f"{name}={_toml(value)}"]
     if launcher is None and ranks > 1:

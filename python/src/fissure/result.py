@@ -13,9 +13,21 @@ _STEPS = "VTKHDF/Steps"
 _DATA = "VTKHDF/PointData"
 
 
-def open(path):
-    """Open a result: a file result.vtkhdf, or the folder that has it. Close it with `close()`, or use `with`."""
-    return Result(path)
+def open(path, output=None):
+    """Open a result: a file result.vtkhdf, or the folder that has it. Close it with `close()`, or use `with`.
+
+    With `output`, the result of [output.NAME] in the folder; it has no history.
+    """
+    if output is None:
+        return Result(path)
+    path = pathlib.Path(path)
+    folder = path if path.is_dir() else path.parent
+    file = folder / f"result_{output}.vtkhdf"
+    if not file.exists():
+        names = sorted(found.stem.removeprefix("result_") for found in folder.glob("result_*.vtkhdf"))
+        hint = f"; there are {', '.join(names)}" if names else ""
+        raise FileNotFoundError(f"{file}: there is no result of the output {output!r}{hint}")
+    return Result(file)
 
 
 class Result:

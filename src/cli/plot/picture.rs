@@ -88,7 +88,7 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
     let painter = Painter::new(&arguments.picture, &file, &result, last)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
-        None => file.with_file_name(format!("{}.png", painter.name())),
+        None => beside(&file, &format!("{}.png", painter.name())),
     };
     let hint = "; `--y` draws curves, and `fissure movie` films";
     check_ending(&path, &["png"], hint)?;
@@ -108,6 +108,14 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
         }
     }
     Ok(())
+}
+
+/// The path of a file beside a result. The name begins with that of a further result, such as `result_edge.vtkhdf`.
+pub fn beside(result: &Path, name: &str) -> PathBuf {
+    let stem = result.file_stem().unwrap_or_default().to_string_lossy();
+    let further = stem.strip_prefix("result_");
+    let further = further.map_or(String::new(), |further| format!("{further}_"));
+    result.with_file_name(format!("{further}{name}"))
 }
 
 fn number(text: &str, wanted: &str) -> Result<f64> {
@@ -249,6 +257,12 @@ impl Frame {
     }
 }
 
+/// Difference of the coordinates of two points of a lattice in one row, by round-off, as a share of the extent.
+const SAME_COORDINATE: f64 = 1e-9;
+
+/// Most combinations of coordinates of the points of lattices, over the number of points to the power of 1.5.
+const MOST_COMBINATIONS: f64 = 4.0;
+
 /// Settings of all pictures of a result.
 pub struct Painter<'a> {
     result: &'a ResultReader,
@@ -262,6 +276,8 @@ pub struct Painter<'a> {
     range: Range,
     view: View,
     factor: f64,
+    /// Bodies whose points are scattered, by number.
+    scattered: Vec<bool>,
     /// Lines over the picture, by file.
     paths: Vec<Vec<Line>>,
 }
@@ -270,6 +286,8 @@ pub struct Painter<'a> {
 struct Points {
     positions: Vec<[f64; 3]>,
     sizes: Vec<f64>,
+    /// Points of bodies whose points are scattered; empty if there are none.
+    scattered: Vec<bool>,
     values: Vec<f64>,
     lines: Vec<(usize, Vec<[f64; 3]>)>,
 }
@@ -317,6 +335,7 @@ impl<'a> Painter<'a> {
                 .map_or(Ok(Range::Automatic), range)?,
             view: view(arguments.slice.as_deref(), dimension)?,
             factor: 0.0,
+            scattered: scattered_bodies(result, reference, dimension)?,
             paths: paths.collect::<Result<_>>()?,
             result,
             arguments,
@@ -386,6 +405,7 @@ impl<'a> Painter<'a> {
         Ok(Points {
             positions: both.map(moved).collect(),
             sizes: volumes.iter().map(edge).collect(),
+            scattered: self.are_scattered(index)?,
             values,
             lines: self.moved_paths(&places, &displacements),
         })
@@ -396,6 +416,7 @@ impl<'a> Painter<'a> {
             dimension: self.dimension,
             positions: &points.positions,
             sizes: &points.sizes,
+            scattered: &points.scattered,
             values: &points.values,
             field: &self.quantity.label,
             unit: &self.quantity.unit,
@@ -407,6 +428,19 @@ impl<'a> Painter<'a> {
             note: "",
             bounds: None,
         }
+    }
+
+    /// For each point whether it belongs to a body with scattered points; empty if there is no such body.
+    fn are_scattered(&self, index: usize) -> Result<Vec<bool>> {
+        if !self.scattered.contains(&true) {
+            return Ok(Vec::new());
+        }
+        if !self.scattered.contains(&false) {
+            return Ok(vec![true; self.result.points(index)]);
+        }
+        let bodies = self.result.field("block", index)?;
+        let is_scattered = |body: &f64| self.scattered.get(*body as usize) == Some(&true);
+        Ok(bodies.iter().map(is_scattered).collect())
     }
 
     /// The limits of a scene; damage has no outliers.
@@ -524,6 +558,43 @@ impl<'a> Painter<'a> {
             .flat_map(|(number, lines)| lines.iter().map(move |own| line(number, own)))
             .collect()
     }
+}
+
+/// Which bodies have scattered points at an output, by number.
+///
+/// The points of lattices share coordinates: n points have about n combinations of different coordinates, scattered ones
+/// n² in the plane. Few points are not scattered.
+fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Result<Vec<bool>> {
+    if dimension < 2 || result.times()?.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (positions, bodies) = (result.positions(index)?, result.field("block", index)?);
+    let count = bodies
+        .iter()
+        .fold(0.0, |most: f64, body| most.max(body + 1.0)) as usize;
+    let is_scattered = |body: usize| {
+        let own = || {
+            let both = positions.iter().zip(&bodies);
+            both.filter(|(_, own)| **own as usize == body)
+        };
+        let mut combinations = 1.0;
+        let mut points = 0;
+        for d in 0..dimension {
+            let mut along: Vec<f64> = own().map(|(position, _)| position[d]).collect();
+            along.sort_unstable_by(f64::total_cmp);
+            points = along.len();
+            let (Some(first), Some(last)) = (along.first(), along.last()) else {
+                return false;
+            };
+            let tolerance = SAME_COORDINATE * (last - first);
+            let steps = along
+                .windows(2)
+                .filter(|pair| pair[1] - pair[0] > tolerance);
+            combinations *= 1.0 + steps.count() as f64;
+        }
+        combinations > MOST_COMBINATIONS * (points as f64).powf(1.5)
+    };
+    Ok((0..count).map(is_scattered).collect())
 }
 
 /// The field to draw: the named one, or else the most wanted one that changes with time.

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use fissure::deck;
 use fissure::error::{Error, Result};
+use fissure::solver::observers::column_names;
 
 use super::{Verbosity, errln, outln};
 use design::{Axis, Design};
@@ -109,16 +110,19 @@ impl SweepArguments {
     }
 }
 
-/// The runs of all combinations; their decks are valid.
+/// The runs of all combinations; their decks are valid, and their histories have the columns of all values.
 ///
 /// # Errors
-/// If the deck is invalid with the values of a combination, which the message names.
+/// If the deck is invalid with the values of a combination, which the message names, or a value is of no column.
 fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
     let run = |(row, name): (&Vec<usize>, String)| {
         let (label, set) = (design.label(row), design.assignments(row));
-        let deck =
-            deck::read_with(&arguments.deck, &arguments.with, &set).and_then(|deck| deck.explain());
-        let deck = deck.map_err(|error| Error {
+        let read = || {
+            let deck = deck::read_with(&arguments.deck, &arguments.with, &set)?;
+            value::check(&arguments.value, &column_names(&deck.problem()?))?;
+            deck.explain()
+        };
+        let deck = read().map_err(|error| Error {
             message: format!("{label}: {}", error.message),
             ..error
         })?;

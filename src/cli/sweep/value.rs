@@ -124,6 +124,26 @@ impl Column {
     }
 }
 
+/// Check that a history has the columns of all values, given the names and units of its columns.
+///
+/// # Errors
+/// If one has no such column.
+pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
+    let names = || columns.iter().map(|(name, _)| name.as_str());
+    match values
+        .iter()
+        .find(|value| !names().any(|name| name == value.name))
+    {
+        None => Ok(()),
+        Some(value) => Err(Error::input(format!(
+            "--value {}: the history has no column `{}`{}",
+            value.title(),
+            value.name,
+            suggestion(&value.name, names())
+        ))),
+    }
+}
+
 /// Values and their units from the history in a folder.
 ///
 /// # Errors

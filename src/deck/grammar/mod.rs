@@ -106,7 +106,7 @@ pub struct Deck {
     pub stage: Vec<Spanned<Stage>>,
     /// What is written to the result, and how often.
     #[serde(default)]
-    pub output: Spanned<Output>,
+    pub output: Spanned<Outputs>,
     /// What is written to the history, and how often.
     #[serde(default)]
     pub history: Spanned<History>,

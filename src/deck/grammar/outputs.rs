@@ -1,13 +1,106 @@
 //! What is written: the result, the history, checkpoints.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeSeed, IntoDeserializer, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{Count, Tables, Text};
 use crate::deck::number::{Number, Vector, default_number};
 use crate::deck::spanned::Spanned;
 
-/// The result file.
+/// The result files.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Outputs {
+    /// `[output]`: the main result.
+    #[serde(flatten)]
+    pub main: Output,
+    /// `[output.NAME]`: further results.
+    #[serde(flatten)]
+    pub further: Tables<Output>,
+}
+
+/// Keys of [`Output`]; other keys of `[output]` are names of further results.
+pub const OUTPUT_KEYS: [&str; 6] = [
+    "every",
+    "every_steps",
+    "times",
+    "fields",
+    "precision",
+    "set",
+];
+
+impl<'de> Deserialize<'de> for Outputs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OutputsVisitor;
+
+        impl<'de> Visitor<'de> for OutputsVisitor {
+            type Value = Outputs;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("a table")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<Outputs, A::Error> {
+                let mut further = Tables::new();
+                let main = MainKeys {
+                    keys,
+                    further: &mut further,
+                };
+                let main = Output::deserialize(MapAccessDeserializer::new(main))?;
+                Ok(Outputs { main, further })
+            }
+        }
+
+        deserializer.deserialize_map(OutputsVisitor)
+    }
+}
+
+/// The keys of the main result; tables of further results are set apart.
+struct MainKeys<'a, A> {
+    keys: A,
+    further: &'a mut Tables<Output>,
+}
+
+impl<'de, A: MapAccess<'de>> MapAccess<'de> for MainKeys<'_, A> {
+    type Error = A::Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, A::Error> {
+        while let Some(key) = self.keys.next_key::<String>()? {
+            if OUTPUT_KEYS.contains(&key.as_str()) {
+                return seed.deserialize(key.into_deserializer()).map(Some);
+            }
+            self.further.insert(key, self.keys.next_value()?);
+        }
+        Ok(None)
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, A::Error> {
+        self.keys.next_value_seed(seed)
+    }
+}
+
+/// The schema of [`Output`], which further keys have as well.
+impl JsonSchema for Outputs {
+    fn schema_name() -> Cow<'static, str> {
+        "Outputs".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = Output::json_schema(generator);
+        let further = generator.subschema_for::<Output>();
+        schema.insert("additionalProperties".to_owned(), further.into());
+        schema
+    }
+}
+
+/// A result file.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
@@ -233,4 +326,29 @@ pub struct Tip {
     /// What the damage must exceed; `damage_threshold` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold: Option<Number>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_keys_of_an_output_are_listed() {
+        let error = toml::from_str::<Output>("unknown = 1").unwrap_err();
+        let keys: Vec<&str> = error.message().split('`').skip(3).step_by(2).collect();
+        assert_eq!(keys, OUTPUT_KEYS);
+    }
+
+    #[test]
+    fn tables_of_an_output_are_further_ones() {
+        let text =
+            "every = 1\nslice = { every_steps = 2 }\nfields = ['damage']\n[edge]\nset = 'left'\n";
+        let outputs: Outputs = toml::from_str(text).unwrap();
+        assert!(outputs.main.every.is_some() && outputs.main.fields.is_some());
+        let names: Vec<&String> = outputs.further.keys().collect();
+        assert_eq!(names, ["slice", "edge"]);
+        let written = toml::to_string(&outputs).unwrap();
+        let again: Outputs = toml::from_str(&written).unwrap();
+        assert_eq!(toml::to_string(&again).unwrap(), written);
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::OUTPUT_KEYS;
 use super::{Deck, Tables};
 
 /// A section of the deck, or a key outside of all sections.
@@ -26,6 +27,8 @@ pub enum Form {
     Table,
     /// `[[stage]]`
     Array,
+    /// `[output]` and `[output.NAME]`
+    TableAndNamed,
     /// `[body.NAME]`
     Named,
     /// `[material.NAME.KIND]`
@@ -45,7 +48,7 @@ pub enum Restart {
     Free,
 }
 
-use Form::{Array, Key, Named, NamedKind, Table};
+use Form::{Array, Key, Named, NamedKind, Table, TableAndNamed};
 use Restart::{Fixed, FixedOrder, Free, WhereUsed};
 
 /// All sections.
@@ -80,7 +83,7 @@ pub const SECTIONS: [Section; 38] = [
     Section::new("time.relaxation", Table, Fixed),
     Section::new("time.static", Table, Fixed),
     Section::new("stage", Array, Fixed),
-    Section::new("output", Table, Free),
+    Section::new("output", TableAndNamed, Free),
     // Definitions of history columns are compared separately.
     Section::new("history", Table, Free),
     Section::new("history.force", Named, Fixed),
@@ -122,11 +125,14 @@ impl Section {
             .find_map(|depth| Self::find(&path[..depth].join(".")))
     }
 
-    /// Number of parts of a path that stand in the header.
-    pub fn header_length(&self) -> usize {
+    /// Number of parts of a path into the section that stand in the header.
+    pub fn header_length(&self, path: &[String]) -> usize {
         let parts = self.path.split('.').count();
+        let is_key = |name: &String| OUTPUT_KEYS.contains(&name.as_str());
         match self.form {
             Key => 0,
+            TableAndNamed if path.get(parts).is_none_or(is_key) => parts,
+            TableAndNamed => parts + 1,
             Table | Array => parts,
             Named => parts + 1,
             NamedKind => parts + 2,
@@ -171,6 +177,7 @@ impl Deck {
         if let Some(contact) = &self.contact {
             add(&mut found, "contact.pair", &contact.get_ref().pair);
         }
+        add(&mut found, "output", &self.output.get_ref().further);
         add(&mut found, "rigid", &self.rigid);
         if let Some(refinement) = &self.refinement {
             let region = &refinement.get_ref().region;
@@ -232,6 +239,7 @@ mod tests {
             let row = match form {
                 Key => format!("`{path}`"),
                 Table => format!("\n| `[{path}]` |"),
+                TableAndNamed => format!("\n| `[{path}]`, `[{path}.NAME]` |"),
                 Array => format!("\n| `[[{path}]]` |"),
                 Named => format!("\n| `[{path}.NAME]` |"),
                 NamedKind => format!("\n| `[{path}.NAME."),

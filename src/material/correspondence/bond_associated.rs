@@ -25,7 +25,7 @@ use nalgebra::SMatrix;
 use super::super::symmetric::{from_entries, to_entries};
 use super::super::{
     Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Law, PlasticState,
-    Rotation,
+    Property, Rotation,
 };
 use super::family::{
     FamilyShare, ShapeTensor, family_rotation, family_share, from_rows, shape_share, to_rows,
@@ -83,8 +83,8 @@ fn build(given: &Given) -> Built {
 }
 
 impl Described for BondAssociated {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        vec![("stress of each bond", self.stress.name().to_owned())]
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        vec![("stress of each bond", Property::Text(self.stress.name()))]
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::SMatrix;
 
-use super::super::{Given, Influence, Key, Kind, LawFault, Pmb, Values, Word};
+use super::super::{Given, Influence, Key, Kind, LawFault, Pmb, Property, Values, Word};
 use super::hooke::{self, Hooke};
 use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
@@ -130,17 +130,21 @@ impl Control {
     }
 
     /// For people to read.
-    pub fn described(&self) -> String {
-        match self {
-            Self::None => "none".to_owned(),
+    pub fn described(&self) -> Vec<(&'static str, Property)> {
+        let (words, number) = match *self {
+            Self::None => ("none", None),
             Self::Dispersion { strength } => {
-                format!("{strength:.4e} N/m⁷, long shear waves without dispersion")
+                let strength = ("zero-energy stiffness", Property::Number(strength, "N/m⁷"));
+                ("long shear waves without dispersion", Some(strength))
             }
-            Self::Wan2019(_) => "as stiff as the solid (Wan et al. 2019)".to_owned(),
+            Self::Wan2019(_) => ("as stiff as the solid (Wan et al. 2019)", None),
             Self::Silling2017 { coefficient, .. } => {
-                format!("coefficient {coefficient} (Silling 2017)")
+                let coefficient = ("zero-energy coefficient", Property::Number(coefficient, ""));
+                ("Silling 2017", Some(coefficient))
             }
-        }
+        };
+        let words = ("zero energy", Property::Text(words));
+        [words].into_iter().chain(number).collect()
     }
 }
 

@@ -29,7 +29,7 @@ use super::bond::Weights;
 use super::symmetric::{Symmetric, symmetric, to_entries};
 use super::{
     Bond, Built, Counts, Declaration, Declared, Described, ForceState, Given, Influence,
-    Invariants, Key, Kind, Law, PlasticState, Rotation, Values, Word,
+    Invariants, Key, Kind, Law, PlasticState, Property, Rotation, Values, Word,
 };
 use crate::lanes::{LaneTuple, Lanes, Simd};
 pub use bond_associated::BondAssociated;
@@ -138,13 +138,11 @@ fn build(given: &Given) -> Built {
 }
 
 impl Described for Correspondence {
-    fn described(&self) -> Vec<(&'static str, String)> {
-        let mut facts = vec![
-            ("stress", self.stress.name().to_owned()),
-            ("zero energy", self.control.described()),
-        ];
+    fn described(&self) -> Vec<(&'static str, Property)> {
+        let mut facts = vec![("stress", Property::Text(self.stress.name()))];
+        facts.extend(self.control.described());
         if let Some(plastic) = &self.plastic {
-            facts.push(("yields", plastic.described()));
+            facts.extend(plastic.described());
         }
         facts
     }

@@ -16,7 +16,7 @@ use std::ops::AddAssign;
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::super::{Given, Key, Kind, LawFault, PlasticState, Values};
+use super::super::{Given, Key, Kind, LawFault, PlasticState, Property, Values};
 use super::hooke;
 use super::stress::{green_strain, stretch_of};
 use super::tensor::{matrix, rows};
@@ -110,13 +110,11 @@ impl Plastic {
     }
 
     /// For people to read.
-    pub fn described(&self) -> String {
-        let Self {
-            yield_stress,
-            hardening,
-            ..
-        } = self;
-        format!("at {yield_stress:.4e} Pa, hardening {hardening:.4e} Pa")
+    pub fn described(&self) -> [(&'static str, Property); 2] {
+        [
+            ("yield stress", Property::Number(self.yield_stress, "Pa")),
+            ("hardening", Property::Number(self.hardening, "Pa")),
+        ]
     }
 
     /// P (Pa) and the elastic energy density (J/m³) at a displacement gradient, to which the body comes from

@@ -19,8 +19,12 @@ const IDENTITY: [&str; 3] = ["deck", "deck_in_full", "version"];
 #[derive(Debug, Clone, Copy)]
 struct Retained {
     steps: u64,
-    rows: u64,
+    /// `None` for a result without a history.
+    rows: Option<u64>,
 }
+
+/// The history of a result and its number of retained rows, if it has one.
+type KeptHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
     /// Resume a result after its first steps and history rows; later ones are dropped. Return the retained
@@ -36,9 +40,10 @@ impl<'a> ResultFile<'a> {
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
-        history: &HistoryContents,
-        (steps, rows): (u64, u64),
+        history: Option<(&HistoryContents, u64)>,
+        steps: u64,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
+        let rows = history.map(|(_, rows)| rows);
         let retained = Retained { steps, rows };
         let prepared = if comm.rank() == 0 {
             prepare(path, contents, retained)
@@ -57,7 +62,7 @@ impl<'a> ResultFile<'a> {
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
-        history: &HistoryContents,
+        history: KeptHistory,
         retained: Retained,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
         let total = contents.piece.total;
@@ -65,7 +70,10 @@ impl<'a> ResultFile<'a> {
         let times = file.open_dataset(&format!("{STEPS}/Values"))?;
         let numbers = file.open_dataset(&format!("{STEPS}/Step"))?;
         let past: Vec<f64> = file.read_rows(&times, 0, retained.steps as usize)?;
-        let rows = History::read(&mut file, retained.rows)?;
+        let rows = match history {
+            Some((_, rows)) => History::read(&mut file, rows)?,
+            None => Vec::new(),
+        };
         let mut fields = Vec::new();
         for field in contents.moving {
             let path = format!("{POINT_DATA}/{}", field.name);
@@ -78,7 +86,10 @@ impl<'a> ResultFile<'a> {
         }
         let capacity = tables.iter().map(|table| table.dataset.rows());
         let capacity = capacity.chain(fields.iter().map(|(_, field)| field.rows() / total));
-        let history = History::resume(&mut file, history, &rows)?;
+        let history = match history {
+            Some((contents, _)) => Some(History::resume(&mut file, contents, &rows)?),
+            None => None,
+        };
         let result = Self {
             piece: contents.piece,
             points: contents.positions.len(),
@@ -92,7 +103,7 @@ impl<'a> ResultFile<'a> {
             numbers,
             times,
             fields,
-            history: Some(history),
+            history,
             file,
         };
         Ok((result, rows))
@@ -103,7 +114,7 @@ impl<'a> ResultFile<'a> {
         path: &Path,
         comm: &'a dyn Communicator,
         contents: &Contents,
-        history: &HistoryContents,
+        history: KeptHistory,
         retained: Retained,
     ) -> Result<(Self, Vec<Vec<f64>>)> {
         let piece = contents.piece;
@@ -127,10 +138,15 @@ impl<'a> ResultFile<'a> {
         let part = path.with_extension("vtkhdf.part");
         let copied = Self::copy(&mut old, &part, comm, contents, (times, numbers));
         let finished = copied.and_then(|mut result| {
-            let rows = History::read(&mut old, retained.rows)?;
+            let rows = match history {
+                Some((_, rows)) => History::read(&mut old, rows)?,
+                None => Vec::new(),
+            };
             old.close()?;
-            result.create_history(history)?;
-            result.append_history(&rows)?;
+            if let Some((contents, _)) = history {
+                result.create_history(contents)?;
+                result.append_history(&rows)?;
+            }
             result.file.flush()?;
             result.file.rename(path)?;
             Ok((result, rows))
@@ -285,10 +301,11 @@ fn has_room(
 }
 
 /// The datasets whose lengths count steps or rows, with their target lengths.
-fn counted_rows(retained: Retained) -> [(String, u64); 3] {
-    [
+fn counted_rows(retained: Retained) -> Vec<(String, u64)> {
+    let mut counted = vec![
         (format!("{STEPS}/Values"), retained.steps),
         (format!("{STEPS}/Step"), retained.steps),
-        (HISTORY.to_owned(), retained.rows),
-    ]
+    ];
+    counted.extend(retained.rows.map(|rows| (HISTORY.to_owned(), rows)));
+    counted
 }

@@ -10,6 +10,10 @@ use super::values::{At, Values};
 pub struct Load<const D: usize> {
     values: [Values; D],
     factors: [f64; D],
+    /// Index of its condition.
+    condition: usize,
+    /// Factor of an observer.
+    scale: f64,
     now: [At; D],
     /// Whether it must be computed: it changes with time, or all loads are requested.
     pub is_due: bool,
@@ -32,20 +36,25 @@ pub struct Loaded<const D: usize> {
 }
 
 impl<const D: usize> Load<D> {
-    /// Create a load. Each component is its expression times its factor, N/m³.
-    pub fn new(values: &[Expression], factors: [f64; D]) -> Self {
+    /// Of the condition with this index. Each component is its expression times its factor, N/m³.
+    pub fn new(condition: usize, values: &[Expression], factors: [f64; D]) -> Self {
         let values: [Values; D] = std::array::from_fn(|d| Values::new(&values[d]));
         Self {
             now: values.each_ref().map(|values| values.at(0.0)),
             values,
             factors,
+            condition,
+            scale: 1.0,
             is_due: false,
         }
     }
 
-    /// Prepare the load for a time (s). If `all`, a constant load is also computed.
-    pub fn set_time(&mut self, time: f64, all: bool) {
-        self.is_due = all || self.values.iter().any(|values| values.changes);
+    /// Gets ready for a time (s) and factors by condition; `all`: also where nothing changes.
+    pub fn set_time(&mut self, time: f64, factors: &[f64], all: bool) {
+        let scale = factors[self.condition];
+        let is_rescaled = scale != self.scale;
+        self.scale = scale;
+        self.is_due = all || is_rescaled || self.values.iter().any(|values| values.changes);
         if self.is_due {
             self.now = self.values.each_ref().map(|values| values.at(time));
         }
@@ -53,7 +62,9 @@ impl<const D: usize> Load<D> {
 
     /// Force density (N/m³) on a whole point at a position (m).
     fn on(&self, position: [f64; 3]) -> [f64; D] {
-        std::array::from_fn(|d| self.factors[d] * self.values[d].of(&self.now[d], position))
+        std::array::from_fn(|d| {
+            self.scale * (self.factors[d] * self.values[d].of(&self.now[d], position))
+        })
     }
 }
 

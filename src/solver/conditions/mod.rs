@@ -2,6 +2,7 @@
 
 mod finite;
 mod initial;
+mod load_factors;
 mod loads;
 mod supports;
 mod temperatures;
@@ -12,7 +13,7 @@ use crate::comm::{Communicator, total};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::points::set;
-use crate::problem::{Action, Problem};
+use crate::problem::{Action, Output, Problem};
 use crate::refine::{Grids, SetFractions};
 
 use super::model::Model;
@@ -20,6 +21,7 @@ use super::motion::Fields;
 use super::motion::walk::{PART, Part, parts};
 pub use finite::are_finite;
 pub use initial::apply_initials;
+pub use load_factors::LoadFactors;
 use loads::{Load, Loaded};
 use supports::{Motion, Support, Supported};
 use temperatures::{Heated, Temperatures};
@@ -116,14 +118,16 @@ fn loaded<const D: usize>(
 /// If the set of the result is empty; the error is the same on all ranks.
 pub fn output_members<const D: usize>(
     problem: &Problem,
+    output: &Output,
     comm: &dyn Communicator,
     model: &Model<D>,
 ) -> Result<Option<Vec<u32>>> {
-    let Some((set, span)) = &problem.output.set else {
+    let Some((set, span)) = &output.set else {
         return Ok(None);
     };
     let points = members(problem, model, *set);
-    not_empty(problem, comm, *set, &points, ("[output] set", span.clone()))?;
+    let key = format!("{} set", output.section());
+    not_empty(problem, comm, *set, &points, (&key, span.clone()))?;
     Ok(Some(points))
 }
 
@@ -165,8 +169,8 @@ impl<const D: usize> Conditions<D> {
         };
         // The points of the supports, collected until all supports are known.
         let mut supported: Vec<Vec<u32>> = Vec::new();
-        let of_deck = problem.conditions.iter().zip(acting);
-        for (condition, _) in of_deck.filter(|(_, acting)| **acting) {
+        let of_deck = problem.conditions.iter().enumerate().zip(acting);
+        for ((index, condition), _) in of_deck.filter(|(_, acting)| **acting) {
             let points = members(problem, model, condition.set);
             let key = format!("[condition.{}] set", condition.name);
             let place = (&key[..], condition.span.clone());
@@ -189,7 +193,7 @@ impl<const D: usize> Conditions<D> {
                 Action::BodyForce(values, factors) => {
                     let factors = std::array::from_fn(|d| factors[d]);
                     let points = loaded(problem, model, grids, condition.set);
-                    conditions.add_load(model, Load::new(values, factors), points);
+                    conditions.add_load(model, Load::new(index, values, factors), points);
                 }
                 Action::Force(values) => {
                     let mut volume = [ExactSum::default()];
@@ -199,7 +203,7 @@ impl<const D: usize> Conditions<D> {
                         volume[0].add(share * model.volume[*point as usize]);
                     }
                     let volume = reduce(comm, &mut volume)[0];
-                    let load = Load::new(values, [1.0 / volume; D]);
+                    let load = Load::new(index, values, [1.0 / volume; D]);
                     conditions.add_load(model, load, points);
                 }
                 Action::Temperature(value) => {
@@ -261,10 +265,11 @@ impl<const D: usize> Conditions<D> {
         }
     }
 
-    /// Prepare the external forces at `time` (s). Constant forces are computed only if `all`.
-    pub fn set_loads(&mut self, time: f64, all: bool) {
+    /// Gets ready to find the external forces at `time` (s) with `factors` by condition; those that do not change are found
+    /// only where `all` are wanted.
+    pub fn set_loads(&mut self, time: f64, factors: &[f64], all: bool) {
         for load in &mut self.loads {
-            load.set_time(time, all);
+            load.set_time(time, factors, all);
         }
     }
 

@@ -72,7 +72,18 @@ impl<const D: usize> Columns for [Vec<f64>; D] {
     }
 }
 
-/// A field that only some runs have.
+/// Scalars, of which there may be none.
+impl Columns for Vec<Vec<f64>> {
+    fn columns(&self) -> &[Vec<f64>] {
+        self
+    }
+
+    fn columns_mut(&mut self) -> &mut [Vec<f64>] {
+        self
+    }
+}
+
+/// A field that not every run has.
 impl<T: Columns> Columns for Option<T> {
     fn columns(&self) -> &[Vec<f64>] {
         self.as_ref().map_or(&[], T::columns)
@@ -345,6 +356,14 @@ fields! {
         name: "damped_energy",
         ..ENERGY
     };
+    /// Number of a point's bonds that have broken since the last output of each further result with this field; none without
+    /// damage. The last of the state: a restart may change the outputs.
+    newly_broken_of_further: Vec<Vec<f64>> = Description {
+        name: "newly_broken_of_further",
+        unit: "1",
+        birth: Birth::FoundAnew,
+        ..STATE
+    };
 }
 
 /// The optional fields that a run needs; the same on all ranks.
@@ -364,7 +383,9 @@ pub struct Needs {
     pub relaxation: bool,
     /// Whether bonds can break.
     pub damage: bool,
-    /// Whether points have a plastic state.
+    /// Number of further results with newly broken bonds.
+    pub further_counts: usize,
+    /// Whether points keep a plastic state.
     pub plasticity: bool,
     /// Whether there is contact.
     pub contact: bool,
@@ -471,6 +492,10 @@ impl<const D: usize> Fields<D> {
             contact_density: (needs.relaxation && needs.contact).then(scalar),
             last_seen: needs.coarsening.then(scalar),
             damped_energy: needs.damping.then(scalar),
+            newly_broken_of_further: match needs.damage {
+                true => vec![scalar(); needs.further_counts],
+                false => Vec::new(),
+            },
         }
     }
 
@@ -510,6 +535,9 @@ impl<const D: usize> Fields<D> {
             let power: f64 = (0..D).map(|d| broken.force[d] * velocity[d][point]).sum();
             count[point] += broken.count as f64;
             new[point] += broken.count as f64;
+            for further in &mut self.newly_broken_of_further {
+                further[point] += broken.count as f64;
+            }
             freed[point] += broken.energy + 0.5 * step * model.volume[point] * power;
             overshoot[point] += broken.overshoot;
         }
@@ -602,7 +630,14 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// The columns of a field, if it is a field of the points that a deck can request.
+    /// Counts bonds that break from now on as new in one of the further results with this field.
+    pub fn forget_newly_broken_of(&mut self, further: usize) {
+        if let Some(new) = self.newly_broken_of_further.get_mut(further) {
+            new.fill(0.0);
+        }
+    }
+
+    /// The columns of a field, if decks may ask for it and it is one of the points'.
     pub fn offered(&self, field: Field) -> Option<&[Vec<f64>]> {
         self.each().find_map(|(description, columns)| {
             let there = !columns.is_empty() && description.output == Some(field);

@@ -177,6 +177,7 @@ impl<const D: usize> Simulation<'_, D> {
         self.clock.advance();
         let (time, step) = (self.clock.time(), self.clock.step());
         self.apply_displacements(time, step);
+        self.load_factors.begin_load_step();
         self.apply_loads(time, false);
         if let Some(contact) = &mut self.contact {
             contact.place_rigid(time);
@@ -267,6 +268,8 @@ impl<const D: usize> Simulation<'_, D> {
         if breaks {
             self.load_step.has_broken = true;
             self.load_step.since_breaking = 0;
+        } else {
+            self.load_factors.settle();
         }
         self.load_step.is_settled = !breaks;
         breaks
@@ -373,14 +376,16 @@ impl<const D: usize> Simulation<'_, D> {
         let displacement = self.fields.equilibrium_displacement.take();
         let reaction = self.fields.equilibrium_reaction.take();
         if let Some(displacement) = &displacement {
-            self.conditions.set_loads(then, true);
+            let factors = self.load_factors.at_equilibrium();
+            self.conditions.set_loads(then, factors, true);
             self.walk(|part, mut here| {
                 let reaction = reaction.as_ref().map(|field| part.of(field));
                 here.find_loads();
                 here.remember(part.of(displacement), reaction);
                 true
             });
-            self.conditions.set_loads(now, true);
+            let factors = self.load_factors.present();
+            self.conditions.set_loads(now, factors, true);
         }
         self.walk(|part, mut here| {
             here.find_loads();

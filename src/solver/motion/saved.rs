@@ -5,6 +5,7 @@
 use crate::comm::{IdOrder, agree};
 use crate::error::{Error, Result};
 use crate::solver::Simulation;
+use crate::solver::conditions::LoadFactors;
 use crate::solver::contact::ContactState;
 use crate::solver::refinement::Refined;
 
@@ -51,6 +52,12 @@ const REFINED: usize = 2;
 impl<const D: usize> Simulation<'_, D> {
     /// Encode the progress of the run, without point data.
     pub fn progress(&self) -> Vec<u64> {
+        let mut progress = self.progress_without_factors();
+        progress.extend(self.load_factors.words());
+        progress
+    }
+
+    fn progress_without_factors(&self) -> Vec<u64> {
         let clock = self.clock.words().into_iter();
         let stage = [self.stage as u64].into_iter();
         let steps = self.step_control.words().into_iter();
@@ -76,7 +83,11 @@ impl<const D: usize> Simulation<'_, D> {
         let (scaled, rest) = rest.split_at(usize::from(self.problem.changes_density_scale()));
         let (load_step, rest) = rest.split_at(LOAD_STEP);
         let has_newton = self.problem.has_newton();
-        let (newton, contact_words) = rest.split_at(if has_newton { NEWTON } else { 0 });
+        let (newton, rest) = rest.split_at(if has_newton { NEWTON } else { 0 });
+        let contact = self.contact.as_ref();
+        let contact_count = contact.map_or(0, |contact| contact.state().words().len());
+        let (contact_words, factors) = rest.split_at(contact_count);
+        self.load_factors = LoadFactors::of_words(factors, self.problem.conditions.len());
         self.enter(stage[0] as usize);
         let clock = std::array::from_fn(|k| clock[k]);
         self.clock = Clock::of_words(clock, self.time_rule().end);
@@ -135,7 +146,10 @@ impl<const D: usize> Simulation<'_, D> {
     pub fn restore(&mut self, order: &IdOrder, saved: &Saved) -> Result<()> {
         let lengths = self.forces.saved_lengths(self.model.owned());
         let expected = order.collect(self.comm, &lengths, 1);
-        let progress = saved.progress.len() == self.progress().len();
+        let others = self.progress_without_factors().len();
+        let factors = saved.progress.len().checked_sub(others);
+        let progress =
+            matches!(factors, Some(0)) || factors == Some(self.load_factors.word_count());
         let columns = saved.columns.len() == self.saved_width();
         let fits = columns && saved.bonds.lengths == expected && progress;
         let fits = if fits {

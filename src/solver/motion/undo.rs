@@ -13,6 +13,8 @@ pub struct Kept {
     fields: Vec<Vec<f64>>,
     bonds: KeptBonds,
     contact: Option<ContactState>,
+    /// Factors of the loads.
+    load_factors: Vec<f64>,
 }
 
 impl<const D: usize> Simulation<'_, D> {
@@ -30,6 +32,9 @@ impl<const D: usize> Simulation<'_, D> {
             })
             .collect();
         self.forces.keep(&mut kept.bonds);
+        kept.load_factors.clear();
+        kept.load_factors
+            .extend_from_slice(self.load_factors.present());
         kept.contact = self.contact.as_ref().map(Contact::state);
     }
 
@@ -46,7 +51,8 @@ impl<const D: usize> Simulation<'_, D> {
         if let (Some(contact), Some(state)) = (&mut self.contact, &kept.contact) {
             contact.undo(state, &self.model, &self.forces);
         }
-        // Recompute the loads at the present time.
+        self.load_factors.undo(&kept.load_factors);
+        // Loads know their values at the present time.
         self.apply_loads(clock.time(), true);
     }
 }

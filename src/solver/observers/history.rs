@@ -1,12 +1,16 @@
 //! The history of a run: energies and other sums, probes, fronts, crack paths and crack tips.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::comm::sum::{ExactSum, reduce};
 use crate::component::{AXES, entries};
 use crate::error::Result;
-use crate::problem::{self, Field, Reaction};
+use crate::material::Law;
+use crate::problem::{self, Field, Problem, Reaction};
 use crate::solver::Simulation;
+use crate::solver::assign::block_laws;
 use crate::solver::conditions::{members, not_empty};
 use crate::solver::contact::contact_now;
 
@@ -19,7 +23,7 @@ use super::front::Front;
 use super::nearest::nearest;
 use super::row_fields::RowFields;
 use super::snapshot::Snapshot;
-use super::statistics::FieldStatistics;
+use super::statistics::{self, FieldStatistics};
 use super::tip::Tip;
 
 /// Points summed by one task.
@@ -93,175 +97,39 @@ impl HistoryObserver {
     /// If a set is empty or a line has no points; the error is the same on all ranks.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Result<Self> {
         let (problem, comm) = (simulation.problem, simulation.comm);
-        let mut columns = Columns::new(D);
-        columns.add("time", "s", |now| now.clock.time());
-        columns.add("step", "1", |now| now.clock.number() as f64);
-        columns.add("kinetic_energy", "J", |now| now.energies.kinetic);
-        columns.add("strain_energy", "J", |now| now.energies.strain);
-        columns.add("fracture_energy", "J", |now| now.energies.fracture);
-        columns.add("external_work", "J", |now| now.energies.work);
-        columns.add("dissipated_energy", "J", |now| now.energies.dissipated);
-        columns.add("energy_error", "J", |now| now.energies.error);
-        columns.add("broken_bonds", "1", |now| now.broken as f64);
-        columns.add("cracked_points", "1", |now| now.cracked_points as f64);
-        if problem.is_quasi_static() {
-            columns.add("residual", "1", |now| now.load_step.residual);
-            columns.add("iterations", "1", |now| now.load_step.iterations as f64);
-        }
-        if problem.has_newton() {
-            let evaluations = |now: &GlobalState| now.force_evaluations as f64;
-            columns.add("force_evaluations", "1", evaluations);
-        }
-        if problem.adapts() {
-            columns.add("time_step", "s", |now| now.clock.step());
-            columns.add("undone_steps", "1", |now| now.undone_steps as f64);
-            columns.add("most_broken_bonds", "1", |now| now.most_broken as f64);
-        }
-        if problem.scales_density() {
-            let ratio = |now: &GlobalState| now.energies.kinetic / now.energies.strain;
-            columns.add("kinetic_ratio", "1", ratio);
-        }
-        if problem.changes_density_scale() {
-            columns.add("density_scale_energy", "J", |now| now.density_scale_energy);
-        }
-        if simulation.may_refine() {
-            columns.add("points", "1", |now| now.points as f64);
-            columns.add("refinement_energy", "J", |now| now.refinement_energy);
-        }
-        columns.add_vector("momentum", "kg m/s", |now, d| now.momentum[d]);
-        columns.add_vector("cracked_lower", "m", |now, d| now.cracked_extent[0][d]);
-        columns.add_vector("cracked_upper", "m", |now, d| now.cracked_extent[1][d]);
-        columns.add("overshoot_energy", "J", |now| now.energies.overshoot);
-        if simulation.forces.can_be_singular() {
-            columns.add("singular_points", "1", |now| now.singular_points as f64);
-        }
-        if problem.has_contact() {
-            columns.add("contact_energy", "J", |now| now.contact.energy);
-            columns.add("friction_energy", "J", |now| now.contact.friction);
-            columns.add("contact_damping_energy", "J", |now| now.contact.damping);
-        }
-        if problem.history.fragments {
-            columns.add("fragments", "1", |now| now.fragments.count as f64);
-            columns.add("loose_points", "1", |now| now.fragments.loose as f64);
-            columns.add("largest_fragment_mass", "kg", |now| {
-                now.fragments.largest_mass
-            });
-            columns.add_vector("largest_fragment_momentum", "kg m/s", |now, d| {
-                now.fragments.largest_momentum[d]
-            });
-        }
-        for (k, rigid) in problem.rigid.iter().enumerate() {
-            let of = |quantity: &str| format!("rigid_{}_{quantity}", rigid.name);
-            columns.add_vector(&of("force"), "N", move |now, d| {
-                now.contact.rigid[k].0.contact[d]
-            });
-            for axis in rotation_axes(D) {
-                let name = format!("{}_{}", of("torque"), AXES[axis]);
-                columns.add(name, "N m", move |now| {
-                    now.contact.rigid[k].0.contact[3 + axis]
-                });
-            }
-            columns.add_vector(&of("position"), "m", move |now, d| {
-                now.contact.rigid[k].0.position[d]
-            });
-            columns.add_vector(&of("velocity"), "m/s", move |now, d| {
-                now.contact.rigid[k].0.velocity[d]
-            });
-            columns.add(of("kinetic_energy"), "J", move |now| now.contact.rigid[k].1);
-        }
-        if let Some(contact) = &problem.contact {
-            columns.add("touching_pairs", "1", |now| now.contact.all.count as f64);
-            columns.add("deepest_overlap", "m", |now| now.contact.all.overlap);
-            for (k, pair) in contact.pairs.iter().enumerate() {
-                let of = |quantity: &str| format!("contact_{}_{quantity}", pair.name);
-                columns.add_vector(&of("force"), "N", move |now, d| {
-                    now.contact.pairs[k].force[d]
-                });
-                let count = move |now: &GlobalState| now.contact.pairs[k].count as f64;
-                columns.add(of("touching_pairs"), "1", count);
-                columns.add(of("deepest_overlap"), "m", move |now| {
-                    now.contact.pairs[k].overlap
-                });
-            }
-        }
-        let mut reactions = Vec::new();
-        for (k, Reaction { set, span }) in problem.history.reactions.iter().enumerate() {
-            let points = members(problem, &simulation.model, *set);
-            let place = ("[history] reactions", span.clone());
-            not_empty(problem, comm, *set, &points, place)?;
-            reactions.push(points);
-            let name = format!("reaction_{}", problem.sets[*set].name);
-            columns.add_vector(&name, "N", move |now, d| now.reactions[k][d]);
-        }
-        let mut support_forces = Vec::new();
-        for (k, rule) in problem.history.support_forces.iter().enumerate() {
-            let points = members(problem, &simulation.model, rule.set);
+        let history = &problem.history;
+        let find = |set: usize, key: &str, span: &Range<usize>| {
+            let points = members(problem, &simulation.model, set);
+            not_empty(problem, comm, set, &points, (key, span.clone()))?;
+            Ok(points)
+        };
+        let reactions = history.reactions.iter();
+        let reactions = reactions.map(|rule| find(rule.set, "[history] reactions", &rule.span));
+        let reactions = reactions.collect::<Result<_>>()?;
+        let support_forces = history.support_forces.iter().map(|rule| {
             let key = format!("[history.force.{}] set", rule.name);
-            not_empty(problem, comm, rule.set, &points, (&key, rule.span.clone()))?;
-            support_forces.push((points, rule.direction));
-            let name = format!("force_{}", rule.name);
-            columns.add(name, "N", move |now| now.support_forces[k]);
-        }
-        if problem.history.angular_momentum {
-            for (k, axis) in rotation_axes(D).enumerate() {
-                let name = format!("angular_momentum_{}", AXES[axis]);
-                columns.add(name, "kg m^2/s", move |now| now.angular_momentum[k]);
-            }
-        }
-        let mut statistics = Vec::new();
-        for (k, rule) in problem.history.statistics.iter().enumerate() {
-            let of_field = FieldStatistics::new(simulation, rule)?;
-            for (column, (name, unit)) in of_field.columns().enumerate() {
-                columns.add(name, unit, move |now| now.statistics[k][column]);
-            }
-            statistics.push(of_field);
-        }
-        let mut probes = Vec::new();
-        for (
-            k,
-            problem::Probe {
-                name, at, fields, ..
-            },
-        ) in problem.history.probes.iter().enumerate()
-        {
-            let mut count = 0;
-            for field in [Field::Displacement, Field::Velocity].iter().chain(fields) {
-                for (_, entry) in entries(field.components(), D) {
-                    let separator = if entry.is_empty() { "" } else { "_" };
-                    let name = format!("probe_{name}_{}{separator}{entry}", field.name());
-                    let column = count;
-                    columns.add(name, field.unit(), move |now| now.probes[k][column]);
-                    count += 1;
-                }
-            }
-            probes.push(Probe {
-                point: nearest(simulation, *at).own,
-                fields: fields.clone(),
-            });
-        }
-        let mut fronts = Vec::new();
-        for (k, front) in problem.history.fronts.iter().enumerate() {
-            fronts.push(Front::new(simulation, front)?);
-            let name = format!("front_{}", front.name);
-            columns.add(name, "m", move |now| now.fronts[k]);
-        }
-        let mut cracks = Vec::new();
-        for (k, rule) in problem.history.cracks.iter().enumerate() {
-            cracks.push(CrackPath::new(simulation, rule)?);
-            let of = |quantity: &str| format!("crack_{}_{quantity}", rule.name);
-            columns.add(of("length"), "m", move |now| now.cracks[k].0);
-            columns.add(of("branches"), "1", move |now| now.cracks[k].1 as f64);
-        }
-        let mut tips = Vec::new();
-        for (k, tip) in problem.history.tips.iter().enumerate() {
-            tips.push(Tip::new(simulation, tip)?);
-            let name = format!("tip_{}", tip.name);
-            columns.add_vector(&name, "m", move |now, d| now.tips[k].position[d]);
-            columns.add(length_of(&tip.name), "m", move |now| now.tips[k].length);
-            columns.add(format!("{name}_speed"), "m/s", move |now| now.tips[k].speed);
-        }
+            Ok((find(rule.set, &key, &rule.span)?, rule.direction))
+        });
+        let support_forces = support_forces.collect::<Result<_>>()?;
+        let statistics = history.statistics.iter();
+        let statistics = statistics.map(|rule| FieldStatistics::new(simulation, rule));
+        let statistics = statistics.collect::<Result<_>>()?;
+        let probe = |probe: &problem::Probe| Probe {
+            point: nearest(simulation, probe.at).own,
+            fields: probe.fields.clone(),
+        };
+        let probes = history.probes.iter().map(probe).collect();
+        let fronts = history.fronts.iter();
+        let fronts = fronts.map(|front| Front::new(simulation, front));
+        let fronts = fronts.collect::<Result<_>>()?;
+        let cracks = history.cracks.iter();
+        let cracks = cracks.map(|rule| CrackPath::new(simulation, rule));
+        let cracks = cracks.collect::<Result<_>>()?;
+        let tips = history.tips.iter();
+        let tips = tips.map(|tip| Tip::new(simulation, tip));
+        let tips = tips.collect::<Result<_>>()?;
         Ok(Self {
-            columns,
+            columns: columns_of::<D>(problem),
             reactions,
             support_forces,
             statistics,
@@ -493,7 +361,171 @@ impl HistoryObserver {
     }
 }
 
-/// Name of the column with the length of a tip; the speed is computed from it.
+/// Name and unit of each column of the history of a problem.
+pub fn column_names(problem: &Problem) -> Vec<(String, &'static str)> {
+    let columns = match problem.dimension.count() {
+        1 => columns_of::<1>(problem),
+        2 => columns_of::<2>(problem),
+        _ => columns_of::<3>(problem),
+    };
+    columns.names().to_vec()
+}
+
+/// Whether grids of a problem change during the run.
+fn has_trigger(problem: &Problem) -> bool {
+    let refinement = problem.refinement.as_ref();
+    refinement.is_some_and(|refinement| refinement.trigger.is_some())
+}
+
+/// Whether points of a problem can have too few bonds for their law.
+fn can_be_singular<const D: usize>(problem: &Problem) -> bool {
+    let mut blocks = problem.blocks();
+    blocks.any(|block| Law::<D>::needs_shape(&block_laws(problem, &block).law))
+}
+
+/// The columns of the history of a problem.
+fn columns_of<const D: usize>(problem: &Problem) -> Columns {
+    let mut columns = Columns::new(D);
+    columns.add("time", "s", |now| now.clock.time());
+    columns.add("step", "1", |now| now.clock.number() as f64);
+    columns.add("kinetic_energy", "J", |now| now.energies.kinetic);
+    columns.add("strain_energy", "J", |now| now.energies.strain);
+    columns.add("fracture_energy", "J", |now| now.energies.fracture);
+    columns.add("external_work", "J", |now| now.energies.work);
+    columns.add("dissipated_energy", "J", |now| now.energies.dissipated);
+    columns.add("energy_error", "J", |now| now.energies.error);
+    columns.add("broken_bonds", "1", |now| now.broken as f64);
+    columns.add("cracked_points", "1", |now| now.cracked_points as f64);
+    if problem.is_quasi_static() {
+        columns.add("residual", "1", |now| now.load_step.residual);
+        columns.add("iterations", "1", |now| now.load_step.iterations as f64);
+    }
+    if problem.has_newton() {
+        let evaluations = |now: &GlobalState| now.force_evaluations as f64;
+        columns.add("force_evaluations", "1", evaluations);
+    }
+    if problem.adapts() {
+        columns.add("time_step", "s", |now| now.clock.step());
+        columns.add("undone_steps", "1", |now| now.undone_steps as f64);
+        columns.add("most_broken_bonds", "1", |now| now.most_broken as f64);
+    }
+    if problem.scales_density() {
+        let ratio = |now: &GlobalState| now.energies.kinetic / now.energies.strain;
+        columns.add("kinetic_ratio", "1", ratio);
+    }
+    if problem.changes_density_scale() {
+        columns.add("density_scale_energy", "J", |now| now.density_scale_energy);
+    }
+    if has_trigger(problem) {
+        columns.add("points", "1", |now| now.points as f64);
+        columns.add("refinement_energy", "J", |now| now.refinement_energy);
+    }
+    columns.add_vector("momentum", "kg m/s", |now, d| now.momentum[d]);
+    columns.add_vector("cracked_lower", "m", |now, d| now.cracked_extent[0][d]);
+    columns.add_vector("cracked_upper", "m", |now, d| now.cracked_extent[1][d]);
+    columns.add("overshoot_energy", "J", |now| now.energies.overshoot);
+    if can_be_singular::<D>(problem) {
+        columns.add("singular_points", "1", |now| now.singular_points as f64);
+    }
+    if problem.has_contact() {
+        columns.add("contact_energy", "J", |now| now.contact.energy);
+        columns.add("friction_energy", "J", |now| now.contact.friction);
+        columns.add("contact_damping_energy", "J", |now| now.contact.damping);
+    }
+    if problem.history.fragments {
+        columns.add("fragments", "1", |now| now.fragments.count as f64);
+        columns.add("loose_points", "1", |now| now.fragments.loose as f64);
+        columns.add("largest_fragment_mass", "kg", |now| {
+            now.fragments.largest_mass
+        });
+        columns.add_vector("largest_fragment_momentum", "kg m/s", |now, d| {
+            now.fragments.largest_momentum[d]
+        });
+    }
+    for (k, rigid) in problem.rigid.iter().enumerate() {
+        let of = |quantity: &str| format!("rigid_{}_{quantity}", rigid.name);
+        columns.add_vector(&of("force"), "N", move |now, d| {
+            now.contact.rigid[k].0.contact[d]
+        });
+        for axis in rotation_axes(D) {
+            let name = format!("{}_{}", of("torque"), AXES[axis]);
+            columns.add(name, "N m", move |now| {
+                now.contact.rigid[k].0.contact[3 + axis]
+            });
+        }
+        columns.add_vector(&of("position"), "m", move |now, d| {
+            now.contact.rigid[k].0.position[d]
+        });
+        columns.add_vector(&of("velocity"), "m/s", move |now, d| {
+            now.contact.rigid[k].0.velocity[d]
+        });
+        columns.add(of("kinetic_energy"), "J", move |now| now.contact.rigid[k].1);
+    }
+    if let Some(contact) = &problem.contact {
+        columns.add("touching_pairs", "1", |now| now.contact.all.count as f64);
+        columns.add("deepest_overlap", "m", |now| now.contact.all.overlap);
+        for (k, pair) in contact.pairs.iter().enumerate() {
+            let of = |quantity: &str| format!("contact_{}_{quantity}", pair.name);
+            columns.add_vector(&of("force"), "N", move |now, d| {
+                now.contact.pairs[k].force[d]
+            });
+            let count = move |now: &GlobalState| now.contact.pairs[k].count as f64;
+            columns.add(of("touching_pairs"), "1", count);
+            columns.add(of("deepest_overlap"), "m", move |now| {
+                now.contact.pairs[k].overlap
+            });
+        }
+    }
+    for (k, Reaction { set, .. }) in problem.history.reactions.iter().enumerate() {
+        let name = format!("reaction_{}", problem.sets[*set].name);
+        columns.add_vector(&name, "N", move |now, d| now.reactions[k][d]);
+    }
+    for (k, rule) in problem.history.support_forces.iter().enumerate() {
+        let name = format!("force_{}", rule.name);
+        columns.add(name, "N", move |now| now.support_forces[k]);
+    }
+    if problem.history.angular_momentum {
+        for (k, axis) in rotation_axes(D).enumerate() {
+            let name = format!("angular_momentum_{}", AXES[axis]);
+            columns.add(name, "kg m^2/s", move |now| now.angular_momentum[k]);
+        }
+    }
+    for (k, rule) in problem.history.statistics.iter().enumerate() {
+        for (column, (name, unit)) in statistics::columns(rule).enumerate() {
+            columns.add(name, unit, move |now| now.statistics[k][column]);
+        }
+    }
+    for (k, problem::Probe { name, fields, .. }) in problem.history.probes.iter().enumerate() {
+        let mut count = 0;
+        for field in [Field::Displacement, Field::Velocity].iter().chain(fields) {
+            for (_, entry) in entries(field.components(), D) {
+                let separator = if entry.is_empty() { "" } else { "_" };
+                let name = format!("probe_{name}_{}{separator}{entry}", field.name());
+                let column = count;
+                columns.add(name, field.unit(), move |now| now.probes[k][column]);
+                count += 1;
+            }
+        }
+    }
+    for (k, front) in problem.history.fronts.iter().enumerate() {
+        let name = format!("front_{}", front.name);
+        columns.add(name, "m", move |now| now.fronts[k]);
+    }
+    for (k, rule) in problem.history.cracks.iter().enumerate() {
+        let of = |quantity: &str| format!("crack_{}_{quantity}", rule.name);
+        columns.add(of("length"), "m", move |now| now.cracks[k].0);
+        columns.add(of("branches"), "1", move |now| now.cracks[k].1 as f64);
+    }
+    for (k, tip) in problem.history.tips.iter().enumerate() {
+        let name = format!("tip_{}", tip.name);
+        columns.add_vector(&name, "m", move |now, d| now.tips[k].position[d]);
+        columns.add(length_of(&tip.name), "m", move |now| now.tips[k].length);
+        columns.add(format!("{name}_speed"), "m/s", move |now| now.tips[k].speed);
+    }
+    columns
+}
+
+/// The column with the length of a tip, from which its speed follows.
 fn length_of(tip: &str) -> String {
     format!("tip_{tip}_length")
 }
@@ -502,6 +534,17 @@ fn sum(values: &[f64]) -> ExactSum {
     let mut sum = ExactSum::default();
     values.iter().for_each(|value| sum.add(*value));
     sum
+}
+
+/// Kinetic, strain and fracture energy and external work of all points, J. Collective.
+pub fn state_energies<const D: usize>(simulation: &mut Simulation<'_, D>) -> [f64; 4] {
+    let snapshot = Snapshot::new(simulation);
+    let mut sums = point_sums(simulation, &snapshot);
+    sums.truncate(3);
+    let work = simulation.fields.external_work.as_deref();
+    sums.push(sum(work.unwrap_or_default()));
+    let sums = reduce(simulation.comm, &mut sums);
+    std::array::from_fn(|k| sums[k])
 }
 
 /// Kinetic, strain and fracture energy (J), then momentum by component (kg m/s), of the owned points.

@@ -19,7 +19,7 @@ mod tip;
 
 pub use centre_line::{Branch, Vertex};
 pub use contact::{Contact, ContactWatch};
-pub use history::{Energies, HistoryObserver, HistoryRow};
+pub use history::{Energies, HistoryObserver, HistoryRow, column_names, state_energies};
 pub use nearest::{Nearest, nearest};
 pub use schedule::Schedule;
 pub use snapshot::Snapshot;

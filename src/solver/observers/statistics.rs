@@ -56,6 +56,15 @@ impl Totals {
     }
 }
 
+/// Name and unit of each column.
+pub fn columns(rule: &problem::FieldStatistics) -> impl Iterator<Item = (String, &'static str)> {
+    let problem::FieldStatistics {
+        name, field, of, ..
+    } = rule;
+    of.iter()
+        .map(move |of| (format!("field_{name}_{}", of.name()), of.unit(*field)))
+}
+
 impl FieldStatistics {
     /// Find the points of the set. Collective.
     ///
@@ -83,16 +92,7 @@ impl FieldStatistics {
         })
     }
 
-    /// Name and unit of each column.
-    pub fn columns(&self) -> impl Iterator<Item = (String, &'static str)> {
-        let problem::FieldStatistics {
-            name, field, of, ..
-        } = &self.rule;
-        of.iter()
-            .map(move |of| (format!("field_{name}_{}", of.name()), of.unit(*field)))
-    }
-
-    /// Totals over this rank's points.
+    /// The totals of this rank.
     fn totals<const D: usize>(
         &self,
         simulation: &mut Simulation<'_, D>,

@@ -1,0 +1,252 @@
+//! Cells of scattered points: each pixel has the colour of the nearest point.
+//!
+//! These are the Voronoi cells of the points. A cell ends at a distance that follows from the volume of its point, so that
+//! borders, holes and open cracks of a body stay visible. Between points on all sides it extends farther, so that there are no
+//! gaps. In a slice the cells are sections of those in space.
+
+use super::canvas::{Colour, Image};
+use super::layout::Layout;
+use super::points::Colouring;
+use super::projection::Projection;
+use super::scene::Mark;
+
+/// Distance from its point at which a cell ends, in edges of a cube or square with its volume: those of a lattice end 0.5 to
+/// 0.71 edges away.
+const REACH: f64 = 0.6;
+
+/// The same for a pixel that has points within this distance on all sides.
+const REACH_INSIDE: f64 = 1.5;
+
+/// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
+pub fn paint(
+    image: &mut Image,
+    marks: &[&Mark],
+    depth: impl Fn(&Mark) -> f64,
+    colouring: Colouring,
+    layout: &Layout,
+    projection: Projection,
+) {
+    if marks.is_empty() {
+        return;
+    }
+    let ends = [layout.columns, layout.rows];
+    let first = ends.map(|[low, _]| low.floor() as i64);
+    let last = ends.map(|[_, high]| high.ceil() as i64);
+    let mut pixels = Pixels::new(first, [0, 1].map(|k| (last[k] - first[k]).max(0)));
+    for mark in marks {
+        pixels.add(&Point {
+            centre: layout.pixel(projection.project(mark.position)),
+            depth: depth(mark) * layout.scale,
+            size: mark.size * layout.scale,
+            colour: colouring.of(mark.value),
+        });
+    }
+    for ([column, row], colour) in pixels.painted() {
+        image.fill_rectangle([column, column + 1], [row, row + 1], colour);
+    }
+}
+
+/// A point; lengths are in pixels.
+struct Point {
+    /// Column and row of its projection.
+    centre: [f64; 2],
+    /// Distance from the drawn plane.
+    depth: f64,
+    /// Edge of a cube or square with its volume.
+    size: f64,
+    colour: Colour,
+}
+
+/// A pixel of the frame.
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    /// Square of the distance from the nearest point so far.
+    square: f32,
+    /// Colour of that point.
+    colour: Colour,
+    /// It is in the cell of a point.
+    is_near: bool,
+    /// Eighths of a turn, a bit each, in which there are points.
+    directions: u8,
+}
+
+/// The pixels of the frame, row by row.
+struct Pixels {
+    /// First column and row.
+    first: [i64; 2],
+    /// Numbers of columns and rows.
+    size: [i64; 2],
+    pixels: Vec<Pixel>,
+}
+
+impl Pixels {
+    /// Pixels without points.
+    fn new(first: [i64; 2], size: [i64; 2]) -> Self {
+        let pixel = Pixel {
+            square: f32::INFINITY,
+            colour: [255; 3],
+            is_near: false,
+            directions: 0,
+        };
+        Self {
+            first,
+            size,
+            pixels: vec![pixel; (size[0] * size[1]) as usize],
+        }
+    }
+
+    /// Add a point to the pixels around it.
+    fn add(&mut self, point: &Point) {
+        // A pixel at least, that of the point itself.
+        let least = std::f64::consts::FRAC_1_SQRT_2.max(point.depth.abs());
+        let [reach, inside] = [REACH, REACH_INSIDE].map(|reach| (reach * point.size).max(least));
+        let range = |k: usize| {
+            let low = (point.centre[k] - inside).floor() as i64;
+            let high = (point.centre[k] + inside).ceil() as i64;
+            let ends = (self.first[k], self.first[k] + self.size[k]);
+            low.clamp(ends.0, ends.1)..high.clamp(ends.0, ends.1)
+        };
+        let (columns, rows) = (range(0), range(1));
+        for row in rows {
+            let down = point.centre[1] - (row as f64 + 0.5);
+            let start = (row - self.first[1]) * self.size[0] - self.first[0];
+            for column in columns.clone() {
+                let along = point.centre[0] - (column as f64 + 0.5);
+                let square = along * along + down * down + point.depth * point.depth;
+                if square > inside * inside {
+                    continue;
+                }
+                let pixel = &mut self.pixels[(start + column) as usize];
+                pixel.directions |= 1 << eighth(along, down);
+                pixel.is_near |= square <= reach * reach;
+                if (square as f32) < pixel.square {
+                    pixel.square = square as f32;
+                    pixel.colour = point.colour;
+                }
+            }
+        }
+    }
+
+    /// Column, row and colour of the pixels in cells.
+    fn painted(&self) -> impl Iterator<Item = ([i64; 2], Colour)> {
+        let all = self.pixels.iter().zip(0..);
+        let painted = all.filter(|(pixel, _)| pixel.is_near || is_surrounded(pixel.directions));
+        painted.map(|(pixel, number)| {
+            let (row, column) = (number / self.size[0], number % self.size[0]);
+            ([self.first[0] + column, self.first[1] + row], pixel.colour)
+        })
+    }
+}
+
+/// The eighth of a turn that a direction is in.
+fn eighth(along: f64, down: f64) -> u32 {
+    match (along >= 0.0, down >= 0.0, along.abs() >= down.abs()) {
+        (true, true, true) => 0,
+        (true, true, false) => 1,
+        (false, true, false) => 2,
+        (false, true, true) => 3,
+        (false, false, true) => 4,
+        (false, false, false) => 5,
+        (true, false, false) => 6,
+        (true, false, true) => 7,
+    }
+}
+
+/// Whether no three eighths of a turn side by side are without points: then no half of the surroundings is.
+fn is_surrounded(directions: u8) -> bool {
+    let empty = !directions;
+    empty & empty.rotate_left(1) & empty.rotate_left(2) == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of the point that each pixel of a frame shows.
+    fn shown(points: &[([f64; 2], f64, f64)]) -> Vec<Option<usize>> {
+        let mut pixels = Pixels::new([10, 20], [40, 30]);
+        for (number, (centre, size, depth)) in (0..).zip(points) {
+            pixels.add(&Point {
+                centre: *centre,
+                depth: *depth,
+                size: *size,
+                colour: [number, 0, 0],
+            });
+        }
+        let mut shown = vec![None; 1200];
+        for ([column, row], [number, ..]) in pixels.painted() {
+            shown[((row - 20) * 40 + column - 10) as usize] = Some(usize::from(number));
+        }
+        shown
+    }
+
+    #[test]
+    fn each_pixel_shows_the_nearest_point_within_reach() {
+        let points = [
+            ([20.3, 30.8], 13.0, 0.0),
+            ([27.1, 33.2], 15.0, 0.0),
+            ([23.0, 40.0], 12.0, 2.0),
+            ([12.0, 21.0], 10.0, 0.0),
+        ];
+        let mut reversed = points;
+        reversed.reverse();
+        let reversed = shown(&reversed);
+        let mut count = 0;
+        for (pixel, found) in shown(&points).into_iter().enumerate() {
+            let place = [(pixel % 40) as f64 + 10.5, (pixel / 40) as f64 + 20.5];
+            let distance = |k: usize| {
+                let (centre, _, depth) = points[k];
+                let square = (place[0] - centre[0]).powi(2) + (place[1] - centre[1]).powi(2);
+                (square + depth * depth).sqrt()
+            };
+            let within = |k: &usize| distance(*k) <= REACH * points[*k].1;
+            assert_eq!(reversed[pixel].map(|k| points.len() - 1 - k), found);
+            if !(0..points.len()).any(|k| within(&k)) {
+                continue;
+            }
+            count += 1;
+            let reached = |k: &usize| distance(*k) <= REACH_INSIDE * points[*k].1;
+            let all = (0..points.len()).filter(reached);
+            let nearest = all.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+            assert_eq!(found, nearest, "{place:?}");
+        }
+        assert!(count > 300, "{count}");
+    }
+
+    #[test]
+    fn gaps_between_points_are_filled_and_borders_are_not() {
+        // A ring of points about (30, 35) with cells of 10 pixels, 9 pixels from the middle.
+        let ring = |directions: std::ops::Range<u32>| {
+            let point = |k: u32| {
+                let (sine, cosine) = (f64::from(k) * std::f64::consts::FRAC_PI_4 + 0.1).sin_cos();
+                ([30.0 + 9.0 * cosine, 35.0 + 9.0 * sine], 10.0, 0.0)
+            };
+            shown(&directions.map(point).collect::<Vec<_>>())
+        };
+        let middle = 15 * 40 + 20;
+        assert!(ring(0..8)[middle].is_some());
+        assert!(ring(0..5)[middle].is_none());
+        // Fewer points than the body has around a gap, but on all sides.
+        for directions in [0b0101_0101, 0b1010_1010, 0b1001_0010, u8::MAX] {
+            assert!(is_surrounded(directions), "{directions:b}");
+        }
+        for directions in [0, 0b0001_0001, 0b0000_1111, 0b1110_0001] {
+            assert!(!is_surrounded(directions), "{directions:b}");
+        }
+    }
+
+    #[test]
+    fn eighths_of_a_turn_are_numbered_in_turn() {
+        for k in 0..8 {
+            let angle = (f64::from(k) + 0.5) * std::f64::consts::FRAC_PI_4;
+            assert_eq!(eighth(angle.cos(), angle.sin()), k);
+        }
+    }
+
+    #[test]
+    fn the_smallest_cell_has_the_pixel_of_its_point() {
+        let found = shown(&[([30.2, 40.9], 0.0, 0.0)]);
+        assert!(found.iter().flatten().count() <= 4);
+        assert_eq!(found[20 * 40 + 20], Some(0));
+    }
+}

@@ -1,0 +1,129 @@
+//! Factors on loads, which an observer may change during a run.
+
+/// An odd number with random bits, 2⁶⁴ over the golden ratio.
+const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// A factor for each condition of the problem, 1 at the start; the same on all ranks. Only those of loads count.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LoadFactors {
+    /// From the next step or load step on.
+    requested: Vec<f64>,
+    /// Of the present loads.
+    present: Vec<f64>,
+    /// At the last equilibrium; the present ones in explicit stages.
+    at_equilibrium: Vec<f64>,
+}
+
+impl LoadFactors {
+    /// Factors of 1.
+    pub fn new(conditions: usize) -> Self {
+        let ones = vec![1.0; conditions];
+        Self {
+            requested: ones.clone(),
+            present: ones.clone(),
+            at_equilibrium: ones,
+        }
+    }
+
+    /// The requested factor of a condition.
+    pub fn get(&self, condition: usize) -> f64 {
+        self.requested[condition]
+    }
+
+    /// Request a factor for a condition.
+    pub fn set(&mut self, condition: usize, factor: f64) {
+        self.requested[condition] = factor;
+    }
+
+    /// The factors of the present loads.
+    pub fn present(&self) -> &[f64] {
+        &self.present
+    }
+
+    /// The factors at the last equilibrium.
+    pub fn at_equilibrium(&self) -> &[f64] {
+        &self.at_equilibrium
+    }
+
+    /// Let the requested factors act in the load step that begins.
+    pub fn begin_load_step(&mut self) {
+        self.present.copy_from_slice(&self.requested);
+    }
+
+    /// The load step has come to its equilibrium.
+    pub fn settle(&mut self) {
+        self.at_equilibrium.copy_from_slice(&self.present);
+    }
+
+    /// Let the requested factors act at the end of the explicit step that is made.
+    pub fn end_step(&mut self) {
+        self.begin_load_step();
+        self.settle();
+    }
+
+    /// Go back to the factors of the present loads before a step that is undone.
+    pub fn undo(&mut self, present: &[f64]) {
+        self.present.copy_from_slice(present);
+        self.settle();
+    }
+
+    /// A whole number below 2⁵² that tells different factors apart.
+    pub fn fingerprint(&self) -> f64 {
+        let words = self.requested.iter().map(|factor| factor.to_bits());
+        let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(MULTIPLIER).rotate_left(29);
+        (words.fold(0, mix) >> 12) as f64
+    }
+
+    /// All of it, as a checkpoint holds it; empty where all factors are 1.
+    pub fn words(&self) -> Vec<u64> {
+        let all = [&self.requested, &self.present, &self.at_equilibrium];
+        if all.iter().copied().flatten().all(|factor| *factor == 1.0) {
+            return Vec::new();
+        }
+        let all = all.into_iter().flatten();
+        all.map(|factor| factor.to_bits()).collect()
+    }
+
+    /// Number of words unless all factors are 1.
+    pub fn word_count(&self) -> usize {
+        3 * self.requested.len()
+    }
+
+    /// What [`Self::words`] gave, for as many conditions as there are now.
+    pub fn of_words(words: &[u64], conditions: usize) -> Self {
+        if words.is_empty() {
+            return Self::new(conditions);
+        }
+        let mut factors = words.chunks(conditions).map(|words| {
+            let words = words.iter().copied();
+            words.map(f64::from_bits).collect()
+        });
+        let mut next = || factors.next().unwrap_or_default();
+        Self {
+            requested: next(),
+            present: next(),
+            at_equilibrium: next(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_act_from_the_next_step_on() {
+        let mut factors = LoadFactors::new(2);
+        assert_eq!(factors.words(), [0; 0]);
+        factors.set(1, 0.5);
+        assert_eq!((factors.get(1), factors.present()), (0.5, &[1.0, 1.0][..]));
+        assert_eq!(LoadFactors::of_words(&factors.words(), 2), factors);
+        assert_eq!(factors.words().len(), factors.word_count());
+        factors.begin_load_step();
+        assert_eq!(factors.present(), [1.0, 0.5]);
+        assert_eq!(factors.at_equilibrium(), [1.0, 1.0]);
+        factors.settle();
+        assert_eq!(factors.at_equilibrium(), [1.0, 0.5]);
+        assert_ne!(factors.fingerprint(), LoadFactors::new(2).fingerprint());
+    }
+}
