@@ -19,9 +19,9 @@ pub enum Fault {
     TooManyNeighbours {
         /// The blocks of the point and of its neighbours.
         blocks: [usize; 2],
-        /// Estimated number of neighbours, where it is known.
+        /// Estimated number of neighbours, if it is known.
         neighbours: Option<f64>,
-        /// Horizon over the spacing of the neighbours, if they lie on a lattice.
+        /// Ratio of the horizon to the spacing of the neighbours, if they lie on a lattice.
         spacings: Option<f64>,
     },
     /// Bonds that do not fit in memory.

@@ -3,8 +3,8 @@
 //! - A slot is an index in this layout. It holds one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
 //!   last. Lines are stored without gaps.
-//! - A band is a range of x. Bands are farther apart than the longest bond, so no bond crosses from one
-//!   to another, and no line spans the space between them.
+//! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two
+//!   bands, and no line covers the space between them.
 
 use std::ops::Range;
 
@@ -30,7 +30,7 @@ pub struct GridFrame {
     pub origin: [f64; 3],
     /// Edges of the cells by direction, m.
     pub spacing: [f64; 3],
-    /// For each block: its points lie on the grid.
+    /// For each block, whether its points lie on the grid.
     pub blocks: Vec<bool>,
 }
 
@@ -124,7 +124,8 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // Pad so that every x of a band, plus the longest bond, is in bounds relative to each of its lines.
+        // Padding, so that every x of a band, plus the longest bond, is in bounds relative to each of its
+        // lines.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];

@@ -35,13 +35,14 @@ pub struct BondLattice {
     /// Volume of i, m³.
     pub own_volume: f64,
     offsets: Vec<Offset>,
-    /// Some weights differ from 1; the weights of i and j differ.
+    /// Whether some weights differ from 1, and whether the weights of i and j differ.
     weighted: [bool; 2],
     /// Sorted by local index.
     vectors: Vec<Vector>,
     /// Offsets in y and z, in steps, of the lines that hold neighbours.
     line_offsets: Vec<[i64; 2]>,
-    /// For each line of the grid and each line offset: difference of the slots with equal x.
+    /// For each line of the grid and each line offset: the difference between slots with equal x in both
+    /// lines.
     shifts: Vec<i32>,
     /// State of the bonds: a group for each vector and offset.
     pub(super) store: Store,
@@ -76,7 +77,7 @@ impl BondLattice {
             .zip(shifts.chunks_mut(line_offsets.len().max(1)))
         {
             for ([y, z], shift) in line_offsets.iter().zip(shifts) {
-                // Without a line there is no bond, so the shift is never used.
+                // Without a line at the offset, there is no bond, so the shift is never used.
                 if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
                     *shift = (origin(other) - origin(line)) as i32;
                 }
@@ -186,7 +187,7 @@ impl BondLattice {
         self.vectors.len()
     }
 
-    /// The lattice has no bonds.
+    /// Whether the lattice has no bonds.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }

@@ -79,7 +79,8 @@ pub struct Outcome {
     pub files: Files,
     /// Figures of the run.
     pub summary: Summary,
-    /// Causes of non-collective writes to the result, as HDF5's bits; 0 if all were collective.
+    /// Causes of non-collective writes to the result, as bits defined by HDF5; 0 if all writes were
+    /// collective.
     pub no_collective_cause: u32,
 }
 
@@ -119,7 +120,7 @@ pub fn run(
     })
 }
 
-/// As [`run`]; errors name places in the deck by spans.
+/// Same as [`run`], but errors contain positions in the deck as spans.
 fn run_unlocated(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -130,7 +131,7 @@ fn run_unlocated(
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
     let files = Files::new(options.folder.clone());
-    // Locked first, and until the end.
+    // The folder is locked before anything else, and until the end of the run.
     let prepared = match comm.rank() {
         0 => files.lock().and_then(|lock| {
             if options.existing != Existing::Continue {
@@ -266,7 +267,7 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // Energy that changing temperatures put in is not counted.
+        // The energy input from changing temperatures is not counted, so such runs are not checked.
         let is_closed = !self.problem.is_quasi_static() && !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {

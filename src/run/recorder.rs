@@ -34,7 +34,7 @@ pub struct Recorder<'a> {
     pub observer: HistoryObserver,
     /// Redistribution from owned points to blocks of ids, for checkpoints and the result.
     pub order: IdOrder,
-    /// The rows of this rank's block that are in the result; `None` for all.
+    /// The rows of this rank's block that the result contains; `None` for all rows.
     output_rows: Option<Vec<usize>>,
     /// The last row of the history.
     pub last_row: Option<HistoryRow>,
@@ -103,7 +103,7 @@ impl<'a> Recorder<'a> {
                     .err()
                     .is_some_and(|error| error.kind == ErrorKind::Run);
                 if begun && comm.rank() == 0 {
-                    // Best effort: a result without outputs only takes space.
+                    // Errors are ignored: a result without outputs only uses disk space.
                     let _ = std::fs::remove_file(&files.result);
                 }
                 made?
@@ -135,10 +135,10 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Update after a rebalancing or refinement. Collective.
+    /// Update after rebalancing or refinement. Collective.
     ///
     /// # Errors
-    /// As [`HistoryObserver::new`].
+    /// Same as for [`HistoryObserver::new`].
     pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
         self.output_rows = output_rows(simulation, &self.order)?;
@@ -193,7 +193,7 @@ impl<'a> Recorder<'a> {
         } else {
             Snapshot::without_energies(simulation)
         };
-        // The time of a shared snapshot counts as output.
+        // If output and row share a snapshot, its time counts as output.
         let rows_start = if output { Instant::now() } else { start };
         if row {
             let row = self.observer.row(simulation, &snapshot);
@@ -253,7 +253,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Close the result; `will_resume` keeps its unused space. Collective.
+    /// Close the result. With `will_resume`, its unused space is retained. Collective.
     ///
     /// # Errors
     /// If the disk is full, or an earlier write failed.
@@ -281,7 +281,7 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// The rows of this rank's block that are in the result; `None` for all. Collective.
+/// The rows of this rank's block that the result contains; `None` for all rows. Collective.
 ///
 /// # Errors
 /// If the output set is empty.
@@ -301,8 +301,8 @@ fn output_rows<const D: usize>(
     ))
 }
 
-/// The reason why the result of a checkpoint cannot be continued, if any: it is missing, damaged, of other
-/// points, or has other fields or columns. Collective.
+/// The reason why the result of a checkpoint cannot be continued, if any: it is missing or damaged, has
+/// other points, or has other fields or columns. Collective.
 ///
 /// # Errors
 /// If a set of the history is empty, a deck cannot be parsed, or the result is locked or unreadable.
@@ -325,7 +325,7 @@ pub fn reason_for_new_result<const D: usize>(
         if !is_taken(&files.result) {
             return Ok(Some("the result so far is gone".to_owned()));
         }
-        // A link to an unmounted file system is an error, not damage.
+        // If the path is a link to an unmounted file system, this is an error, not damage.
         std::fs::metadata(&files.result).map_err(|error| {
             let path = files.result.display();
             Error::run(format!("{path}: cannot read the result so far: {error}"))

@@ -56,7 +56,8 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// `limit` is a wall-clock limit and its start; the default inside a Slurm job is the job's limit.
+    /// Create the watch. `limit` is a wall-clock limit and its start. The default inside a Slurm job is the
+    /// job's limit.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
@@ -82,7 +83,8 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration; return true if a decision is due. `step` is the clock if the iteration ended a step.
+    /// Count an iteration. Returns true if a decision is due. `step` is the clock if the iteration ended a
+    /// step.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;
         self.iterations >= self.next_decision || self.is_scheduled(step)
@@ -97,7 +99,8 @@ impl<'a> Watch<'a> {
         step.is_some_and(due)
     }
 
-    /// Decide on a checkpoint or stop after this iteration; equal on all ranks. Collective.
+    /// Decide on a checkpoint or stop after this iteration; the decision is the same on all ranks.
+    /// Collective.
     pub fn decide(&mut self, comm: &dyn Communicator, step: Option<&Clock>) -> Decision {
         let (then, before) = self.last_decision;
         let per_iteration = then.elapsed().as_secs_f64() / (self.iterations - before).max(1) as f64;

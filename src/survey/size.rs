@@ -6,7 +6,7 @@ use crate::points::{LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
-/// Maximum number of cells read to count neighbours, over all samples.
+/// Maximum number of cells that are read to count neighbours, over all samples.
 const MAX_CELLS_READ: f64 = 4e6;
 
 /// Maximum number of sampled points per body.
@@ -19,7 +19,8 @@ pub struct Size {
     pub cells: f64,
     /// Number of points of each body.
     pub points: Vec<f64>,
-    /// Number of neighbours of all points of each body; their sum counts each bond twice.
+    /// Number of neighbours summed over all points of each body. The total over all bodies counts each bond
+    /// twice.
     pub bonds: Vec<f64>,
     /// Number of points in the result.
     pub output_points: f64,
@@ -72,7 +73,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
                 (family_volume(problem, index) / volume).min(all) - 1.0
             }
         };
-        // max also replaces the NaN of a body without points.
+        // `max` also replaces the NaN of a body without points.
         size.bonds.push(size.points[index] * neighbours.max(0.0));
     }
     size.output_points = output_points(problem, &bodies, &files, &size.points);
@@ -155,8 +156,8 @@ fn family_volume(problem: &Problem, body: usize) -> f64 {
     }
 }
 
-/// Test whether a point is in the output set, which is not a set of ids. Points of a set of a mesh are not known yet;
-/// all of them count.
+/// Test whether a point is in the output set, which must not be a set of ids. The points of a mesh's group
+/// are not known yet, so all points count.
 fn is_in_result(problem: &Problem, body: usize, position: [f64; 3]) -> bool {
     let set = problem.output.set.as_ref();
     set.map(|(set, _)| &problem.sets[*set]).is_none_or(|set| {
