@@ -1,6 +1,6 @@
 //! The layout of the local points of a regular grid: adjacent points have adjacent neighbours.
 //!
-//! - A slot is an index in this layout. It holds one point or is a hole.
+//! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
 //!   last. Lines are stored without gaps.
 //! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two

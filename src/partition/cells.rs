@@ -96,7 +96,7 @@ impl Cells {
         })
     }
 
-    /// The cell that holds a position (m).
+    /// The cell that contains a position (m).
     pub fn of(&self, position: [f64; 3]) -> usize {
         let [x, y, z] = self.box_of(position).map(|at| at / self.boxes);
         x + self.counts[0] * (y + self.counts[1] * z)

@@ -1,6 +1,6 @@
 //! Generation of points, and the geometry of shapes, sets and pre-cracks.
 //!
-//! Each rank generates or reads its own piece of the points; no rank holds all of them.
+//! Each rank generates or reads its own piece of the points; no rank stores all of them.
 
 pub mod bins;
 pub mod columns;

@@ -51,7 +51,7 @@ pub(super) enum HaloContent {
 pub struct ForceTimes {
     /// Sums over bonds.
     pub bonds: Duration,
-    /// Packing, waiting for and unpacking messages.
+    /// Packing and unpacking of messages, and waiting for them.
     pub halo: Duration,
 }
 

@@ -9,7 +9,7 @@ use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::BondUpdate;
 
-/// Maximum number of bonds of a block, which takes some seconds.
+/// Maximum number of bonds of a block; such a block needs some seconds.
 const MAX_BONDS: f64 = 1e6;
 
 /// Relative growth of the separation per step. It limits how late bonds break. The overshoot energy is
@@ -147,7 +147,7 @@ impl Separation {
     }
 }
 
-/// Test that no intact bond of the middle points crosses the plane.
+/// Whether no intact bond of the middle points crosses the plane.
 fn is_separated<const D: usize>(
     simulation: &Simulation<'_, D>,
     middle: &[bool],

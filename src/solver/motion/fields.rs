@@ -91,12 +91,12 @@ macro_rules! fields {
         }
 
         impl<const D: usize> Fields<D> {
-            /// Every field with its components.
+            /// Iterate over all fields with their components.
             pub fn each(&self) -> impl Iterator<Item = (Description, &[Vec<f64>])> {
                 [$(($description, self.$name.columns()),)+].into_iter()
             }
 
-            /// Every field with its components.
+            /// Iterate over all fields with their components.
             pub fn each_mut(&mut self) -> impl Iterator<Item = (Description, &mut [Vec<f64>])> {
                 [$(($description, self.$name.columns_mut()),)+].into_iter()
             }

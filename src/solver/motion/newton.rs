@@ -4,8 +4,8 @@
 //!
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
-//! u ← u + s x                              s = 1, or where x·f(u + s x) is small
-//! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: by how much the forces are not linear
+//! u ← u + s x                              s = 1, or a value at which x·f(u + s x) is small
+//! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: nonlinearity of the forces
 //! ```
 //!
 //! (Eisenstat & Walker 1996 for η; Knoll & Keyes 2004 for the differences.) f includes the reactions, so it
