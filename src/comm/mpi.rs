@@ -62,7 +62,7 @@ fn name_and_version(text: &str) -> String {
 
 /// All ranks that `mpirun` started; one rank without `mpirun`.
 ///
-/// It is not `Send`, whatever the type of the MPI library's handles:
+/// It is not `Send`, for any type of the MPI library's handles:
 ///
 /// ```compile_fail,E0277
 /// fn move_to_a_thread<T: Send>() {}
@@ -70,7 +70,7 @@ fn name_and_version(text: &str) -> String {
 /// ```
 pub struct World {
     world: SimpleCommunicator,
-    /// Reused, so an exchange in the time loop does not allocate.
+    /// Reused, so that an exchange in the time loop does not allocate.
     requests: RefCell<Vec<MPI_Request>>,
     _not_send: PhantomData<*const ()>,
     // Dropped last: it calls MPI_Finalize.
@@ -315,7 +315,7 @@ impl Communicator for World {
             unsafe { in_flight.send(bytes, peer.rank, HALO_TAG) };
         }
         during(&mut || in_flight.advance());
-        // Waits; the implicit drop does so if `during` panics.
+        // The drop waits for all messages. If `during` panics, the implicit drop waits.
         drop(in_flight);
     }
 

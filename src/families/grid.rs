@@ -62,7 +62,7 @@ pub(super) struct Line {
     pub(super) length: usize,
 }
 
-/// The layout of a grid's local points, ghosts included.
+/// The layout of a grid's local points, including ghosts.
 ///
 /// Holes pad the layout at both ends. So a load of eight slots at any offset from an occupied slot
 /// stays in bounds.
@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn slots_of_any_range_are_those_of_its_points() {
         let position = |k: u64| [k % 9, k / 9 % 9, k / 81].map(|x| x as f64);
-        // A gap in x makes two bands; a plane of missing points makes holes.
+        // A gap in x creates two bands, and a plane of missing points creates holes.
         let occupied = |at: &[f64; 3]| (at[0] - 4.0).abs() > 1.0 && at.iter().sum::<f64>() != 7.0;
         let positions: Vec<[f64; 3]> = (0..729).map(position).filter(occupied).collect();
         let points = (0..).zip(&positions);

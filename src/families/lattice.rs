@@ -1,5 +1,5 @@
-//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is one
-//! bit, without a stored neighbour index. Eight points adjacent along x form a lane group.
+//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is
+//! stored as one bit, without a neighbour index. Eight points adjacent along x form a lane group.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub struct BondLattice {
     weighted: [bool; 2],
     /// Sorted by local index.
     vectors: Vec<Vector>,
-    /// Offsets in y and z, in steps, of the lines that hold neighbours.
+    /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
     /// For each line of the grid and each line offset: the difference between slots with equal x in both
     /// lines.
@@ -63,7 +63,7 @@ impl BondLattice {
         dimension: usize,
     ) -> Result<Self, Fault> {
         let (offsets, line_offsets) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
-        // A cutoff below the spacing leaves no offsets.
+        // With a cutoff below the spacing, there are no offsets.
         let none = offsets.is_empty();
         let vectors = if none { Vec::new() } else { vectors(&grid) };
         let shift_bytes = size_of::<i32>() * grid.lines.len() * line_offsets.len();
@@ -295,7 +295,7 @@ impl BondLattice {
         }
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let all = || vec![u8::MAX; self.store.intact.len()];
         let mut breakable = self.store.breakable.take().unwrap_or_else(all);

@@ -160,7 +160,7 @@ impl BondList {
         (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let all = || vec![u8::MAX; self.neighbours.len()];
         let mut breakable = self.store.breakable.take().unwrap_or_else(all);

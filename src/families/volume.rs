@@ -4,8 +4,8 @@
 //!   beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). In LAMMPS (Parks et al. 2008), the
 //!   same taper ends at δ.
 //! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
-//!   Schweitzer 2016, eq. 2). It has a closed form in 1D and 2D, and is computed by quadrature over slices
-//!   in 3D.
+//!   Schweitzer 2016, eq. 2). It has a closed form in 1-D and 2-D, and is computed by quadrature over slices
+//!   in 3-D.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};

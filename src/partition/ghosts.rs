@@ -21,8 +21,8 @@ const HALO_WIDTH: usize = 3;
 
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
-/// `owned` are this rank's points after migration, `owner` the rank of each cell, `cutoff` (m) the
-/// longest bond.
+/// `owned` are this rank's points after migration, `owner` is the rank of each cell, and `cutoff` (m) is
+/// the longest bond.
 pub fn domain(
     comm: &dyn Communicator,
     cells: &Cells,

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 
 use super::cells::{CellLoads, Cells};
 
-/// Largest total weight; METIS sums weights in 32 bits.
+/// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
 /// Additional factor on the edge weight of bonds along x, because lane groups lie along x.

@@ -15,7 +15,7 @@ use cells::{CellLoads, Cells, max_cells};
 
 /// Partition the points, migrate them to their owners and find the ghosts. Collective.
 ///
-/// `total` is the number of points of all ranks, `cutoff` (m) the longest bond.
+/// `total` is the number of points of all ranks, and `cutoff` (m) is the longest bond.
 ///
 /// # Errors
 /// If METIS fails; equal on all ranks.

@@ -8,7 +8,7 @@ use crate::problem::Crack;
 
 type Vector = Vector3<f64>;
 
-/// Relative tolerance at the rim of a crack: a bond through the rim is cut, despite round-off.
+/// Relative tolerance at the rim of a crack: a bond through the rim is cut in spite of round-off.
 const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.

@@ -268,7 +268,7 @@ mod tests {
     use crate::elastic::Isotropic;
     use crate::problem::{Law, Material, Shape};
 
-    /// Read a 2D file. Return the x coordinates of its points by id, or the error. Asserts that the result
+    /// Read a 2-D file. Return the x coordinates of its points by id, or the error. Asserts that the result
     /// is equal on any number of ranks.
     fn read(name: &str, text: &[u8]) -> std::result::Result<Vec<f64>, String> {
         let folder = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));

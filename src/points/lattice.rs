@@ -197,7 +197,8 @@ impl<'a> LatticeBody<'a> {
         count * self.points_of_cell()
     }
 
-    /// Estimate the volume (m³) of the shape without later bodies from evenly distributed positions.
+    /// Estimate the volume (m³) of the shape without the parts that later bodies occupy, from evenly
+    /// distributed positions.
     pub fn shape_volume(&self) -> f64 {
         let (region, all) = (&self.overlap, self.overlap.total() as f64);
         let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);

@@ -21,8 +21,8 @@ pub(super) fn parents(index: GridIndex) -> impl Iterator<Item = GridIndex> {
     between(low, high)
 }
 
-/// The indices at half-spacing offsets around an index, in steps of the next finer level: 2 in 1D, 8 in 2D,
-/// 26 in 3D.
+/// The indices at half-spacing offsets around an index, in steps of the next finer level: 2 in 1-D, 8 in 2-D,
+/// 26 in 3-D.
 pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item = GridIndex> {
     let middle = index.map(|x| 2 * x);
     let step = |k: usize| i64::from(k < dimension);

@@ -31,7 +31,7 @@ const CHECK_INTERVAL: u32 = 20;
 /// Compute the separation energy per area over the fracture energy. The upper half moves at an angle (rad)
 /// to the normal of the plane.
 ///
-/// The normal is y (in 1D, x); the tangential part of the motion is along x. The overshoot energy of bonds
+/// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
 ///
 /// The result is `None` for a body without a fracture energy, for points from a file, for families that are

@@ -527,7 +527,7 @@ pub(in crate::solver) fn point_sums<const D: usize>(
     sums_over(model.owned(), 3 + D, add)
 }
 
-/// Rotation axes of bodies: z in plane problems, all in 3D, none in 1D.
+/// Rotation axes of bodies: z in plane problems, all in 3-D, none in 1-D.
 fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
     match dimension {
         1 => 0..0,
