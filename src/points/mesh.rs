@@ -374,9 +374,13 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     Some([pair[0].1, pair[1].1])
 }
 
-/// The ids of the points of a group. A group contains its own elements, the elements that have all corners
-/// of one of its faces, edges or points, and the elements that have one of its nodes. `marks` has one entry
-/// per node; all entries are false before and after the call.
+/// The ids of the points of a group. They are the points of
+///
+/// - the elements of the group;
+/// - elements that have all corners of one of its faces, edges or points;
+/// - elements that have one of its nodes.
+///
+/// `marks` has one entry per node; all entries are false before and after the call.
 fn members(
     mesh: &Mesh,
     group: &Members,

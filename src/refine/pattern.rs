@@ -1,4 +1,4 @@
-//! The refined nodes of a body, and all nodes that follow from them.
+//! The refined nodes of a body, and all nodes that result from the refinement.
 
 use std::sync::Arc;
 

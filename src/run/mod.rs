@@ -99,7 +99,7 @@ pub fn start_mpi() -> Result<World> {
 /// Threads are those of Rayon's global pool. Without MPI, there must be one rank.
 ///
 /// # Errors
-/// Equal on all ranks:
+/// The error is the same on all ranks. There is an error if:
 ///
 /// - the problem cannot be run;
 /// - a signal stopped the run before the first step;

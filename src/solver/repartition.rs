@@ -25,7 +25,7 @@ pub struct Repartition {
     pub seconds: f64,
 }
 
-/// Schedule of the checks of rank loads, and the loads at the last check.
+/// Schedule of the checks of rank loads, and this rank's bond time at the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,

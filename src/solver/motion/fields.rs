@@ -564,9 +564,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s), and book the
-    /// energy that they dissipated in this step by the trapezoidal rule. Velocities are those in the middle
-    /// of the step.
+    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s). Book the
+    /// energy that they dissipated in this step, by the trapezoidal rule. Velocities are those in the
+    /// middle of the step.
     pub fn book_dissipation(
         &mut self,
         point: usize,

@@ -3,7 +3,7 @@
 //! warns the user.
 //!
 //! If the bounding boxes of two bodies overlap, their points are distributed to ranks by cells of space.
-//! The points of one body are sent to all cells in which they may meet points of the other body, so each
+//! The points of one body are sent to all cells in which they may meet points of the other body. So each
 //! rank compares a part of the pairs.
 
 use bytemuck::{Pod, Zeroable};
