@@ -168,7 +168,7 @@ impl Grid {
         })
     }
 
-    /// Number of slots, padding included.
+    /// Number of slots, including padding.
     pub fn slots(&self) -> usize {
         self.blocks.len()
     }

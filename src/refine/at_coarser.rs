@@ -80,7 +80,7 @@ impl<'a> AtCoarser<'a> {
         })
     }
 
-    /// The bits of a word at which nodes exist, valid for indices at which nodes are possible.
+    /// The bits of a word at which nodes exist. Bits at which no node is possible have no meaning.
     fn occupied(&self, word: GridIndex) -> u64 {
         let steps = (1 << self.level).max(EDGE);
         let on_coarsest = word.iter().all(|x| x * EDGE % steps == 0);
