@@ -1,7 +1,8 @@
 //! Redistribution of point values between owners and blocks of consecutive global ids.
 //!
-//! Files store points by id, so they do not depend on the number of ranks. A point of a refined level
-//! has the id m + k n, where n is the number of level-0 points and k ≥ 1. It follows level-0 point m.
+//! Files store points by id, so they do not depend on the number of ranks. Ids of refined levels are m + k
+//! n, where n is the number of level-0 points and k ≥ 1. In files, such a point follows the level-0 point
+//! m.
 
 use std::ops::Range;
 
@@ -21,13 +22,13 @@ pub struct IdOrder {
 }
 
 impl IdOrder {
-    /// Build the plan for the ids of the owned points; `coarsest` is the number of level-0 points of all
+    /// Create the plan for the ids of the owned points. `coarsest` is the number of level-0 points of all
     /// ranks. Collective.
     pub fn new(comm: &dyn Communicator, ids: &[u64], coarsest: u64) -> Self {
         let size = comm.size() as u64;
         let border =
             |rank: u64| (u128::from(coarsest) * u128::from(rank) / u128::from(size)) as u64;
-        // The guess can be one too low, as the borders are rounded down.
+        // The estimate can be one too low, because the limits are rounded down.
         let home = |id: u64| {
             let id = id % coarsest;
             let guess = (u128::from(id) * u128::from(size) / u128::from(coarsest)) as u64;
@@ -90,8 +91,8 @@ impl IdOrder {
         transfer(comm, from, (&self.owned[..], owned * width, row))
     }
 
-    /// As [`Self::collect`], for rows of different lengths: `owned` and `block` are the row lengths of the
-    /// owned points and of this rank's block.
+    /// Same as [`Self::collect`], for rows of different lengths. `owned` and `block` are the row lengths of
+    /// the owned points and of this rank's block.
     pub fn collect_ragged<T: Pod>(
         &self,
         comm: &dyn Communicator,
@@ -110,7 +111,7 @@ impl IdOrder {
         )
     }
 
-    /// As [`Self::spread`] for rows of different lengths; see [`Self::collect_ragged`].
+    /// Same as [`Self::spread`], for rows of different lengths; see [`Self::collect_ragged`].
     pub fn spread_ragged<T: Pod>(
         &self,
         comm: &dyn Communicator,
@@ -130,7 +131,7 @@ impl IdOrder {
     }
 }
 
-/// The start of each row, then the end of the last one.
+/// The offset of each row, followed by the end of the last row.
 fn offsets(lengths: &[u32]) -> Vec<usize> {
     let ends = lengths.iter().scan(0, |end, length| {
         *end += *length as usize;
@@ -139,9 +140,9 @@ fn offsets(lengths: &[u32]) -> Vec<usize> {
     std::iter::once(0).chain(ends).collect()
 }
 
-/// Send rows of `values` to each rank and write the received rows to a new array of length `size`.
+/// Send rows of `values` to each rank. Write the received rows to a new array of length `size`.
 ///
-/// `from_rows` and `to_rows` list the rows per rank; `from` and `to` map a row to its range.
+/// `from_rows` and `to_rows` list the rows per rank. `from` and `to` map a row to its range.
 fn transfer<T: Pod>(
     comm: &dyn Communicator,
     (from_rows, values, from): (&[Vec<u32>], &[T], impl Fn(usize) -> Range<usize>),
@@ -201,7 +202,7 @@ mod tests {
                 let block = order.collect(comm, &values, 2);
                 assert_eq!(order.spread(comm, &block, 2), values);
                 assert_eq!(block.len(), 2 * order.count());
-                // Rows of id mod 3 entries.
+                // Rows with id mod 3 entries.
                 let length = |id: u64| (id % 3) as u32;
                 let lengths: Vec<u32> = ids.iter().map(|id| length(*id)).collect();
                 let block_ids = order.first()..order.first() + order.count() as u64;

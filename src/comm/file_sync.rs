@@ -1,4 +1,4 @@
-//! A switch for the fsync of files written through MPI. HDF5 calls `MPI_File_sync` at every flush.
+//! Disables the fsync of files written through MPI, because HDF5 calls `MPI_File_sync` at every flush.
 
 use std::cell::Cell;
 use std::os::raw::c_int;
@@ -9,7 +9,7 @@ thread_local! {
 
 /// Run `work` with fsync disabled on this thread.
 pub fn without_fsync<T>(work: impl FnOnce() -> T) -> T {
-    /// Restores the previous value, also when `work` panics.
+    /// Restores the previous value, even if `work` panics.
     struct Restore(bool);
 
     impl Drop for Restore {

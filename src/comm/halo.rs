@@ -19,7 +19,7 @@ pub struct Neighbour {
     pub receive: Range<usize>,
 }
 
-/// Accumulated traffic of a rank.
+/// Accumulated message traffic of a rank.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Messages sent.
@@ -91,7 +91,7 @@ impl Halo {
         }
     }
 
-    /// Send the packed values, and call `during` while the messages are in flight; see
+    /// Send the packed values. `during` is called while the messages are in flight; see
     /// [`Communicator::exchange`].
     pub fn exchange(&mut self, comm: &dyn Communicator, during: &mut During<'_>) {
         let start = Instant::now();
@@ -114,7 +114,7 @@ impl Halo {
         self.sent.time += start.elapsed() - working;
     }
 
-    /// Copy the received values to the ghosts of the arrays that were packed, in the same order.
+    /// Copy the received values to the ghost entries of the packed arrays, in the same order.
     pub fn unpack<'a>(&self, components: impl Iterator<Item = &'a mut [f64]>) {
         for (k, component) in components.enumerate() {
             for (neighbour, buffers) in self.neighbours.iter().zip(&self.buffers) {

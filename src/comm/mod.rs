@@ -36,7 +36,8 @@ pub struct PeerBuffers {
 /// Work that overlaps with an exchange; see [`Communicator::exchange`].
 pub type During<'a> = dyn FnMut(&mut dyn FnMut() -> bool) + 'a;
 
-/// A group of ranks. All methods but [`Self::rank`], [`Self::size`], [`Self::abort`] and [`Self::raw`] are collective.
+/// A group of ranks. All methods except [`Self::rank`], [`Self::size`], [`Self::abort`] and [`Self::raw`]
+/// are collective.
 pub trait Communicator {
     /// This rank's number, from 0.
     fn rank(&self) -> usize;
@@ -56,16 +57,17 @@ pub trait Communicator {
     /// Send `outgoing[q]` to rank q; return the received buffers by rank.
     fn all_to_all(&self, outgoing: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
 
-    /// Gather the bytes of all ranks, concatenated in rank order; ranks may have different counts.
+    /// Gather the bytes of all ranks, concatenated in rank order. Ranks may have different numbers of
+    /// bytes.
     fn all_gather(&self, own: &[u8]) -> Vec<u8>;
 
     /// Send and receive all buffers, and call `during` while messages are in flight.
     ///
     /// Large messages progress only inside MPI calls. So `during` should call its argument from time to
-    /// time: it drives progress and returns true while any message is in flight.
+    /// time. This call drives progress and returns true while any message is in flight.
     fn exchange(&self, buffers: &mut [PeerBuffers], during: &mut During<'_>);
 
-    /// Abort all ranks, for errors on which they can no longer agree.
+    /// Abort all ranks after an error that they can no longer report collectively.
     fn abort(&self, code: i32) -> !;
 
     /// The raw MPI handle; `None` without MPI.
@@ -94,7 +96,7 @@ pub fn all_gather(comm: &dyn Communicator, value: u64) -> Vec<u64> {
     values
 }
 
-/// The values of all ranks, concatenated in rank order; ranks may have different counts.
+/// Gather the values of all ranks, concatenated in rank order. Ranks may have different numbers of values.
 pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> Vec<T> {
     bytemuck::pod_collect_to_vec(&comm.all_gather(bytemuck::cast_slice(own)))
 }
@@ -102,16 +104,16 @@ pub fn all_gather_many<T: bytemuck::Pod>(comm: &dyn Communicator, own: &[T]) -> 
 /// A candidate of a rank for [`least`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found<T, const N: usize = 1> {
-    /// Compared first.
+    /// Key that is compared first.
     pub key: f64,
-    /// Compared where keys are equal, such as the id of a point.
+    /// Ids, such as the id of a point, that are compared if keys are equal.
     pub ids: [u64; N],
     /// Data of the candidate.
     pub payload: T,
 }
 
-/// The candidate of all ranks with the least key and, among equal keys, the least ids; `None` without candidates. The same
-/// on all ranks. Collective.
+/// Find the candidate with the least key over all ranks; among equal keys, that with the least ids. `None`
+/// if there are no candidates. The result is the same on all ranks. Collective.
 pub fn least<T: bytemuck::Pod, const N: usize>(
     comm: &dyn Communicator,
     own: Option<Found<T, N>>,
@@ -138,14 +140,15 @@ where
     found.min_by(|a: &Found<T, N>, b| a.key.total_cmp(&b.key).then(a.ids.cmp(&b.ids)))
 }
 
-/// The sum of `value` over the ranks before this one, and over all.
+/// The sum of `value` over the lower ranks, and the sum over all ranks.
 pub fn scan(comm: &dyn Communicator, value: u64) -> (u64, u64) {
     let values = all_gather(comm, value);
     let before = values[..comm.rank()].iter().sum();
     (before, values.iter().sum())
 }
 
-/// Make a result equal on all ranks: if any rank failed, all return the error of the lowest failed rank.
+/// Make a result equal on all ranks. If any rank failed, all ranks return the error of the lowest failed
+/// rank.
 pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     let none = comm.size() as f64;
     let mut first = [if result.is_err() {
@@ -162,13 +165,13 @@ pub fn agree<T>(comm: &dyn Communicator, result: Result<T>) -> Result<T> {
     Err(unpack(&packed))
 }
 
-/// The span of a packed error that has none.
+/// Span of a packed error without a span.
 const NO_SPAN: [u64; 2] = [u64::MAX; 2];
 
-/// Bytes of a packed error before its message: the exit code, and start and end of the span.
+/// Number of bytes of a packed error before its message: exit code, and start and end of the span.
 const HEADER: usize = 1 + size_of::<[u64; 2]>();
 
-/// An error as bytes, to be sent.
+/// Serialize an error.
 fn pack(error: &Error) -> Vec<u8> {
     let span = error.span.as_ref();
     let span = span.map_or(NO_SPAN, |span| [span.start as u64, span.end as u64]);

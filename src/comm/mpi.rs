@@ -17,7 +17,7 @@ use mpi_sys::{MPI_Request, RSMPI_COMM_WORLD};
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 use crate::error::{Error, Result};
 
-/// Maximum bytes per MPI message, as counts are 32-bit.
+/// Maximum bytes per MPI message, because counts are 32-bit integers.
 const LARGEST_MESSAGE: usize = 1 << 30;
 const HALO_TAG: c_int = 1;
 const SET_UP_TAG: c_int = 2;
@@ -29,7 +29,7 @@ const _: () = assert!(
      run `cargo clean -p mpi-sys`"
 );
 
-/// The bindings are those of Open MPI.
+/// Whether the bindings are those of Open MPI.
 const OF_OPEN_MPI: bool = {
     // The constant of Open MPI's bindings, if present, shadows the fallback below.
     #[allow(unused_imports)]
@@ -44,7 +44,7 @@ pub fn is_running() -> bool {
     mpi::environment::is_initialized()
 }
 
-/// Name and version of the MPI library. MPI need not be started.
+/// Name and version of the MPI library. MPI does not have to be running.
 pub fn library() -> String {
     let text = mpi::environment::library_version().unwrap_or_default();
     name_and_version(&text)
@@ -62,7 +62,7 @@ fn name_and_version(text: &str) -> String {
 
 /// All ranks that `mpirun` started; one rank without `mpirun`.
 ///
-/// It is not `Send`, whatever the type of the MPI library's handles:
+/// It is not `Send`, for any type of the MPI library's handles:
 ///
 /// ```compile_fail,E0277
 /// fn move_to_a_thread<T: Send>() {}
@@ -70,7 +70,7 @@ fn name_and_version(text: &str) -> String {
 /// ```
 pub struct World {
     world: SimpleCommunicator,
-    /// Reused, so an exchange in the time loop does not allocate.
+    /// Reused, so that an exchange in the time loop does not allocate.
     requests: RefCell<Vec<MPI_Request>>,
     _not_send: PhantomData<*const ()>,
     // Dropped last: it calls MPI_Finalize.
@@ -315,7 +315,7 @@ impl Communicator for World {
             unsafe { in_flight.send(bytes, peer.rank, HALO_TAG) };
         }
         during(&mut || in_flight.advance());
-        // Waits; the implicit drop does so if `during` panics.
+        // The drop waits for all messages. If `during` panics, the implicit drop waits.
         drop(in_flight);
     }
 

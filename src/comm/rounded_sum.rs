@@ -1,13 +1,13 @@
 //! Sums of terms that are rounded to multiples of one unit.
 //!
-//! Integers add up to the same sum in any order, so the sum is bit-identical on any number of ranks and threads. It takes
-//! 8 bytes, an [`ExactSum`](super::ExactSum) 560, and has an error of half a unit a term. It is for sums that need to be
-//! reproducible but not exact.
+//! A sum of integers does not depend on the order of the terms. So the sum is bitwise the same for any
+//! number of ranks and threads. It needs 8 bytes, an [`ExactSum`](super::ExactSum) 560 bytes. The error is
+//! at most half a unit per term. Use it for sums that must be reproducible but not exact.
 
 /// Bits of the magnitude of a sum.
 const BITS: i32 = 62;
 
-/// The largest exponent of the factor, so that it and its inverse are finite.
+/// The largest exponent of the factor; with it, the factor and its inverse are finite.
 const MOST: i32 = 1000;
 
 /// The unit of the terms: a power of 2.
@@ -18,8 +18,8 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// The smallest unit with which the sum of so many terms of at most this magnitude does not overflow; `None` if the
-    /// magnitude is 0 or not finite.
+    /// The smallest unit with which a sum of `terms` terms of at most this magnitude does not overflow.
+    /// `None` if the magnitude is 0 or not finite.
     pub fn of(magnitude: f64, terms: u64) -> Option<Self> {
         if magnitude == 0.0 || !magnitude.is_finite() {
             return None;
@@ -33,7 +33,7 @@ impl Unit {
         })
     }
 
-    /// A term in units.
+    /// Round a term to a number of units.
     #[inline]
     pub fn round(self, term: f64) -> i64 {
         libm::rint(term * self.factor) as i64

@@ -1,13 +1,13 @@
 //! An exact floating-point sum, independent of the order of its terms.
 //!
-//! Every finite `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide fixed-point integer holds any sum
-//! exactly. Integer addition is associative, so the result is bit-identical on any number of ranks and
+//! Every finite `f64` is an integer multiple of 2⁻¹⁰⁷⁴, so a wide fixed-point integer represents any sum
+//! exactly. Integer addition is associative, so the result is bitwise the same for any number of ranks and
 //! threads. It is within one unit in the last place of the exact sum.
 
 use super::Communicator;
 
 const LIMB_BITS: usize = 32;
-/// 2⁻¹⁰⁷⁴ … 2¹⁰²³ are 2098 bits; two more limbs hold the carries of 2⁶³ terms.
+/// The range 2⁻¹⁰⁷⁴ … 2¹⁰²³ needs 2098 bits; two more limbs are for the carries of 2⁶³ terms.
 const LIMBS: usize = 2098_usize.div_ceil(LIMB_BITS) + 2;
 /// Each term adds less than 2³² to a limb, so 2³⁰ terms fit before a carry.
 const TERMS_BEFORE_CARRY: u32 = 1 << 30;
@@ -77,7 +77,7 @@ impl ExactSum {
         self.carry();
     }
 
-    /// Propagate carries, so every limb but the highest is in 0 … 2³² − 1.
+    /// Propagate carries, so that every limb except the highest is in 0 … 2³² − 1.
     fn carry(&mut self) {
         let mut carry = 0;
         for limb in &mut self.limbs[..LIMBS - 1] {
@@ -104,7 +104,8 @@ impl ExactSum {
         let Some(top) = magnitude.limbs.iter().rposition(|limb| *limb != 0) else {
             return 0.0;
         };
-        // The four highest limbs hold at least 97 significant bits; the conversion rounds once to 53.
+        // The four highest limbs contain at least 97 significant bits. The conversion rounds once, to 53
+        // bits.
         let lowest = top.saturating_sub(3);
         let head = magnitude.limbs[lowest..=top]
             .iter()

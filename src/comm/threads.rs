@@ -4,8 +4,8 @@ use std::sync::{Arc, Barrier, Mutex};
 
 use super::{Communicator, During, PeerBuffers, RawCommunicator};
 
-/// The shared state of the ranks: a barrier, and a slot for one message per pair of ranks. The slot of a rank and itself
-/// also holds what it contributes to an all-gather.
+/// The shared state of the ranks: a barrier, and a buffer for one message per pair of ranks. The buffer of
+/// a rank with itself is also used for its contribution to an all-gather.
 struct Shared {
     barrier: Barrier,
     slots: Vec<Mutex<Vec<u8>>>,
@@ -37,7 +37,7 @@ fn group(size: usize) -> Vec<ThreadRank> {
         .collect()
 }
 
-/// Run `body` on `size` ranks, one thread each; return their results in rank order.
+/// Run `body` on `size` ranks, each on its own thread. Return their results in rank order.
 pub fn run<T: Send>(size: usize, body: impl Fn(&dyn Communicator) -> T + Sync) -> Vec<T> {
     std::thread::scope(|scope| {
         let handles: Vec<_> = group(size)
@@ -61,7 +61,7 @@ impl ThreadRank {
             .expect("no rank panics while it holds a slot")
     }
 
-    /// Every rank's values of which all have as many, in rank order.
+    /// Gather the values of all ranks, in rank order. All ranks have the same number of values.
     fn gather<T: bytemuck::Pod>(&self, values: &[T]) -> Vec<Vec<T>> {
         let all = self.all_gather(bytemuck::cast_slice(values));
         let rows = (0..self.size).map(|rank| &all[rank * size_of_val(values)..]);

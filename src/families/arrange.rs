@@ -37,7 +37,8 @@ impl GridPoint {
 /// - Up to eight grid points adjacent along x get consecutive local indices. If one of them is a
 ///   border point, all count as border points.
 /// - Interior points come before border points.
-/// - Within each of these, points on no grid come first, in their previous order; then each grid's.
+/// - Within each of these, points on no grid come first, in their previous order; the points of each grid
+///   follow.
 pub fn arrange(domain: &mut Domain, frames: &[GridFrame]) {
     if frames.is_empty() {
         return;

@@ -7,7 +7,7 @@ use crate::points::Point;
 use crate::problem::Problem;
 use crate::problem::{Body, PointSource};
 
-/// Upper limit on the neighbours of a point, reached at a horizon of 16 spacings in 3-D and 80 in 2-D.
+/// Upper limit on the neighbours of a point, which is reached at a horizon of 16 spacings in 3-D and 80 in 2-D.
 pub const MOST_NEIGHBOURS: f64 = 20_000.0;
 
 /// An error of building families.
@@ -19,9 +19,9 @@ pub enum Fault {
     TooManyNeighbours {
         /// The blocks of the point and of its neighbours.
         blocks: [usize; 2],
-        /// Estimated number of neighbours, where it is known.
+        /// Estimated number of neighbours, if it is known.
         neighbours: Option<f64>,
-        /// Horizon over the spacing of the neighbours, if they lie on a lattice.
+        /// Ratio of the horizon to the spacing of the neighbours, if they lie on a lattice.
         spacings: Option<f64>,
     },
     /// Bonds that do not fit in memory.

@@ -1,10 +1,10 @@
 //! The layout of the local points of a regular grid: adjacent points have adjacent neighbours.
 //!
-//! - A slot is an index in this layout. It holds one point or is a hole.
+//! - A slot is an index in this layout. It contains one point or is a hole.
 //! - A line is a range of slots with equal y and z and ascending x, from its first local point to its
 //!   last. Lines are stored without gaps.
-//! - A band is a range of x. Bands are farther apart than the longest bond, so no bond crosses from one
-//!   to another, and no line spans the space between them.
+//! - A band is a range of x. The distance between bands exceeds the longest bond, so no bond joins two
+//!   bands, and no line covers the space between them.
 
 use std::ops::Range;
 
@@ -30,7 +30,7 @@ pub struct GridFrame {
     pub origin: [f64; 3],
     /// Edges of the cells by direction, m.
     pub spacing: [f64; 3],
-    /// For each block: its points lie on the grid.
+    /// For each block, whether its points lie on the grid.
     pub blocks: Vec<bool>,
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Line {
     pub(super) length: usize,
 }
 
-/// The layout of a grid's local points, ghosts included.
+/// The layout of a grid's local points, including ghosts.
 ///
 /// Holes pad the layout at both ends. So a load of eight slots at any offset from an occupied slot
 /// stays in bounds.
@@ -124,7 +124,8 @@ impl Grid {
             let [low, high] = &mut extents[at[0] as usize];
             (*low, *high) = (first.min(*low), last.max(*high));
         }
-        // Pad so that every x of a band, plus the longest bond, is in bounds relative to each of its lines.
+        // Padding, so that every x of a band, plus the longest bond, is in bounds relative to each of its
+        // lines.
         let width = WIDTH as i64;
         let beyond = |line: &Line| {
             let [low, high] = extents[line.at[0] as usize];
@@ -167,7 +168,7 @@ impl Grid {
         })
     }
 
-    /// Number of slots, padding included.
+    /// Number of slots, including padding.
     pub fn slots(&self) -> usize {
         self.blocks.len()
     }
@@ -351,7 +352,7 @@ mod tests {
     #[test]
     fn slots_of_any_range_are_those_of_its_points() {
         let position = |k: u64| [k % 9, k / 9 % 9, k / 81].map(|x| x as f64);
-        // A gap in x makes two bands; a plane of missing points makes holes.
+        // A gap in x creates two bands, and a plane of missing points creates holes.
         let occupied = |at: &[f64; 3]| (at[0] - 4.0).abs() > 1.0 && at.iter().sum::<f64>() != 7.0;
         let positions: Vec<[f64; 3]> = (0..729).map(position).filter(occupied).collect();
         let points = (0..).zip(&positions);

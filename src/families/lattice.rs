@@ -1,5 +1,5 @@
-//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is one
-//! bit, without a stored neighbour index. Eight points adjacent along x form a lane group.
+//! Lattice families: on a regular grid, all points have neighbours at the same offsets. A bond is
+//! stored as one bit, without a neighbour index. Eight points adjacent along x form a lane group.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -35,13 +35,14 @@ pub struct BondLattice {
     /// Volume of i, m³.
     pub own_volume: f64,
     offsets: Vec<Offset>,
-    /// Some weights differ from 1; the weights of i and j differ.
+    /// Whether some weights differ from 1, and whether the weights of i and j differ.
     weighted: [bool; 2],
     /// Sorted by local index.
     vectors: Vec<Vector>,
-    /// Offsets in y and z, in steps, of the lines that hold neighbours.
+    /// Offsets in y and z, in steps, of the lines that contain neighbours.
     line_offsets: Vec<[i64; 2]>,
-    /// For each line of the grid and each line offset: difference of the slots with equal x.
+    /// For each line of the grid and each line offset: the difference between slots with equal x in both
+    /// lines.
     shifts: Vec<i32>,
     /// State of the bonds: a group for each vector and offset.
     pub(super) store: Store,
@@ -62,7 +63,7 @@ impl BondLattice {
         dimension: usize,
     ) -> Result<Self, Fault> {
         let (offsets, line_offsets) = offsets(grid.frame.spacing, cutoff, domain.extent, dimension);
-        // A cutoff below the spacing leaves no offsets.
+        // With a cutoff below the spacing, there are no offsets.
         let none = offsets.is_empty();
         let vectors = if none { Vec::new() } else { vectors(&grid) };
         let shift_bytes = size_of::<i32>() * grid.lines.len() * line_offsets.len();
@@ -76,7 +77,7 @@ impl BondLattice {
             .zip(shifts.chunks_mut(line_offsets.len().max(1)))
         {
             for ([y, z], shift) in line_offsets.iter().zip(shifts) {
-                // Without a line there is no bond, so the shift is never used.
+                // Without a line at the offset, there is no bond, so the shift is never used.
                 if let Some(other) = grid.line([line.at[0], line.at[1] + y, line.at[2] + z]) {
                     *shift = (origin(other) - origin(line)) as i32;
                 }
@@ -186,7 +187,7 @@ impl BondLattice {
         self.vectors.len()
     }
 
-    /// The lattice has no bonds.
+    /// Whether the lattice has no bonds.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }
@@ -294,7 +295,7 @@ impl BondLattice {
         }
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let all = || vec![u8::MAX; self.store.intact.len()];
         let mut breakable = self.store.breakable.take().unwrap_or_else(all);

@@ -19,17 +19,17 @@ pub struct BondList {
     pub block_j: usize,
     /// Local index of each row's point, ascending.
     pub(super) points: Vec<u32>,
-    /// First group of each row, then the number of groups.
+    /// Index of the first group of each row, followed by the total number of groups.
     pub(super) starts: Vec<usize>,
     /// Local indices of the neighbours, sorted by global id in each row. Index i pads the last group of
     /// a row.
     pub(super) neighbours: Neighbours,
     /// State of the bonds; the bits of padding are clear.
     pub(super) store: Store,
-    /// Volume weights of the ends i and j, 0 for padding. Without weights of i, all are 1; without
-    /// weights of j, those of i apply to both ends.
+    /// Volume weights of the ends i and j, 0 for padding. If those of i are `None`, all weights are 1. If
+    /// only those of j are `None`, the weights of i apply to both ends.
     pub(super) weights: [Option<Vec<Lanes>>; 2],
-    /// One more than the largest local index in the list.
+    /// The largest local index in the list, plus one.
     pub(super) reach: usize,
 }
 
@@ -41,8 +41,8 @@ pub struct Row<'a> {
     pub neighbours: NeighbourGroups<'a>,
     /// State of the bonds.
     pub groups: Groups<'a>,
-    /// Volume weights of the ends i and j. Without weights of i, all are 1; without weights of j, those
-    /// of i apply to both ends.
+    /// Volume weights of the ends i and j. If those of i are `None`, all weights are 1. If only those of j
+    /// are `None`, the weights of i apply to both ends.
     pub weights: [Option<&'a [Lanes]>; 2],
 }
 
@@ -85,12 +85,12 @@ impl BondList {
         self.neighbours.len().div_ceil(self.points.len().max(1))
     }
 
-    /// The list has no bonds.
+    /// Whether the list has no bonds.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// One more than the largest local index in the list.
+    /// The largest local index in the list, plus one.
     pub fn reach(&self) -> usize {
         self.reach
     }
@@ -160,7 +160,7 @@ impl BondList {
         (ends * self.neighbours.len() * size_of::<Lanes>()) as u64
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         let all = || vec![u8::MAX; self.neighbours.len()];
         let mut breakable = self.store.breakable.take().unwrap_or_else(all);
@@ -289,7 +289,7 @@ impl<'a> Rows<'a> {
         self.points.len()
     }
 
-    /// The range has no rows.
+    /// Whether the range has no rows.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }

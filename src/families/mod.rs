@@ -67,12 +67,12 @@ impl BlockBonds {
         with!(self, bonds => bonds.bytes())
     }
 
-    /// Make unbreakable every bond with an end (local index) for which `protected` holds.
+    /// Make unbreakable every bond with an end (local index) for which `protected` is true.
     pub fn protect(&mut self, protected: impl Fn(usize) -> bool) {
         with!(self, bonds => bonds.protect(protected));
     }
 
-    /// Break the bonds ij for which `selected(i)` and `cut(i, j)` hold; i and j are local indices.
+    /// Break the bonds ij for which `selected(i)` and `cut(i, j)` are true; i and j are local indices.
     pub fn cut(&mut self, selected: impl Fn(usize) -> bool, cut: impl Fn(usize, usize) -> bool) {
         with!(self, bonds => bonds.cut(selected, cut));
     }
@@ -100,7 +100,7 @@ impl BlockBonds {
         with!(self, bonds => bonds.for_each_broken(visit));
     }
 
-    /// Allocate `width` history numbers per bond, set to 0.
+    /// Allocate `width` history values per bond, set to 0.
     pub fn allocate_history(&mut self, width: usize) {
         with!(self, bonds => bonds.store.allocate_history(width));
     }

@@ -1,8 +1,8 @@
 //! Compressed neighbour indices of list families, in groups of eight.
 //!
-//! Points close in space mostly have close indices. A compact group stores its lowest index and eight
-//! 16-bit differences. A group with a wider range, such as owned points with ghosts, stores eight full
-//! indices in a second array.
+//! Points close in space usually have close indices. A compact group stores its lowest index and eight
+//! 16-bit differences. If the range of indices is too wide, for example for owned points with ghosts, the
+//! group stores eight full indices in a second array.
 
 use std::ops::Range;
 
@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use crate::lanes::WIDTH;
 
-/// Flag of [`Compact::first`]: the other bits are an index into the full groups. Local indices are
-/// below it.
+/// Flag of [`Compact::first`]. If it is set, the other bits are an index into the full groups. Local
+/// indices are smaller than the flag.
 const IN_FULL: u32 = 1 << 31;
 
 /// A group of eight indices.
@@ -19,7 +19,7 @@ const IN_FULL: u32 = 1 << 31;
 struct Compact {
     /// The lowest index.
     first: u32,
-    /// The differences from it.
+    /// Differences from the lowest index.
     differences: [u16; WIDTH],
 }
 

@@ -14,13 +14,14 @@ use super::fault::{Fault, MOST_NEIGHBOURS};
 use super::list::BondList;
 use super::neighbours::Neighbours;
 
-/// Relative tolerance of the cutoff: round-off must not decide on a bond as long as the horizon.
+/// Relative tolerance of the cutoff, so that round-off does not decide whether a bond as long as the
+/// horizon exists.
 const HORIZON_TOLERANCE: f64 = 1e-9;
 
 /// Points searched by one task.
 const CHUNK: usize = 512;
 
-/// Chunks searched before their rows are appended; bounds the buffer memory.
+/// Number of chunks that are searched before their rows are appended; it limits the buffer memory.
 const WAVE: usize = 32;
 
 /// The longest bond (m) for a horizon (m).
@@ -33,10 +34,10 @@ pub fn cutoff(horizon: f64) -> f64 {
 struct Order {
     /// Local index of each sorted index.
     local: Vec<u32>,
-    /// First sorted index of each block, then the number of points.
+    /// Sorted index of the first point of each block, followed by the number of points.
     first: Vec<u32>,
-    /// Bins of each block, by sorted index relative to the block's first. One set of bins per block: where
-    /// few points have bonds to a block, the others search no bins of it.
+    /// Bins of each block, by sorted index relative to the block's first. There is one set of bins per
+    /// block, so points without bonds to a block do not search its bins.
     bins: Vec<Bins>,
 }
 
@@ -55,7 +56,7 @@ impl Order {
         drop(keys);
         let bins = first.windows(2).enumerate().map(|(block_j, ends)| {
             let cutoffs = cutoffs.iter().skip(block_j).step_by(blocks).copied();
-            // Most points search this block with the shortest cutoff, so it sets the bin size.
+            // Most points search this block with the shortest cutoff, so the bin size follows from it.
             let shortest = cutoffs.filter(|cutoff| *cutoff > 0.0).reduce(f64::min);
             let searched = &local[ends[0] as usize..ends[1] as usize];
             let sorted = shortest.map_or(&[][..], |_| searched).iter();
@@ -69,7 +70,7 @@ impl Order {
         }
     }
 
-    /// Another point of a block with the position of point `index`.
+    /// Find another point of a block at the position of point `index`.
     fn other_at(&self, domain: &Domain, block: usize, index: usize) -> Point {
         let sorted = self.first[block] as usize..self.first[block + 1] as usize;
         let points = self.local[sorted].iter().map(|k| *k as usize);
@@ -135,7 +136,8 @@ pub fn search(domain: &Domain, blocks: usize, cutoffs: &[f64]) -> Result<Vec<Bon
     Ok(lists)
 }
 
-/// Extrapolate the memory of the lists from the fraction `done` of points; fail if it does not fit.
+/// Extrapolate the memory of the lists from the fraction `done` of the points. Return an error if it does
+/// not fit.
 fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
     let bytes: usize = lists.iter().map(BondList::bytes).sum();
     let remaining = bytes as f64 * (1.0 / done - 1.0);
@@ -147,7 +149,7 @@ fn fits(lists: &[BondList], done: f64) -> Result<(), Fault> {
 }
 
 impl Chunk {
-    /// Replaces the rows by those of a range of points.
+    /// Replace the rows by those of a range of points.
     fn search(
         &mut self,
         domain: &Domain,

@@ -1,5 +1,5 @@
-//! The state of bonds in groups of eight: intact bits, breakable bits and the history history of the law.
-//! A group is eight neighbours of one point in a list, and eight points at one offset in a lattice.
+//! The state of bonds in groups of eight: intact bits, breakable bits and the bond history of the law. In a
+//! list, a group contains eight neighbours of one point; in a lattice, eight points at one offset.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ pub struct Store {
     pub(super) intact: Vec<u8>,
     /// One bit per bond, clear if the bond is unbreakable; `None` if all bonds can break.
     pub(super) breakable: Option<Vec<u8>>,
-    /// History history per bond.
+    /// Number of history values per bond.
     width: usize,
     /// `width` vectors per group.
     history: Vec<Lanes>,
@@ -29,13 +29,13 @@ pub struct Groups<'a> {
 }
 
 impl Store {
-    /// Allocate `width` history history per bond, set to 0.
+    /// Allocate `width` history values per bond, set to 0.
     pub fn allocate_history(&mut self, width: usize) {
         self.width = width;
         self.history = vec![Lanes::splat(0.0); width * self.intact.len()];
     }
 
-    /// Memory of `width` history history per bond, bytes.
+    /// Memory of `width` history values per bond, bytes.
     pub fn history_bytes(&self, width: usize) -> u64 {
         (width * self.intact.len() * size_of::<Lanes>()) as u64
     }
@@ -120,7 +120,7 @@ impl<'a> Groups<'a> {
         }
     }
 
-    /// The history history of a group.
+    /// The history values of a group.
     #[inline(always)]
     pub fn history(&mut self, group: usize) -> &mut [Lanes] {
         &mut self.history[self.width * group..self.width * (group + 1)]

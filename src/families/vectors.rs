@@ -8,7 +8,7 @@ use super::grid::Grid;
 use super::offset::Offset;
 use super::store::Groups;
 
-/// Up to eight adjacent points: the slot, the local index and the line of the first.
+/// Up to eight adjacent points. The slot, the local index and the line are those of the first point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vector {
     pub(super) slot: u32,
@@ -26,13 +26,13 @@ pub struct VectorBonds<'a> {
     pub point: usize,
     /// Mask of the points that have neighbours.
     pub members: u8,
-    /// Range of its groups among those of all vectors.
+    /// Range of this vector's groups among the groups of all vectors.
     pub bits: Range<usize>,
     /// The offsets of the lattice.
     pub offsets: &'a [Offset],
-    /// State of the bonds: a group for each offset.
+    /// State of the bonds, with one group per offset.
     pub groups: Groups<'a>,
-    /// Some weights differ from 1; the weights of i and j differ.
+    /// Whether some weights differ from 1, and whether the weights of i and j differ.
     pub weighted: [bool; 2],
     shifts: &'a [i32],
 }
@@ -96,7 +96,7 @@ impl<'a> Vectors<'a> {
         self.vectors.len()
     }
 
-    /// The range has no vectors.
+    /// Whether the range has no vectors.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }
@@ -153,11 +153,11 @@ impl<'a> Vectors<'a> {
 }
 
 impl VectorBonds<'_> {
-    /// The slot of the first of eight consecutive neighbours at an offset. It is in bounds even if none
-    /// of the eight bonds exists.
+    /// The slot of the first of eight consecutive neighbours at an offset. It is in bounds even if none of
+    /// the eight bonds exists.
     ///
     /// # Safety
-    /// The offset must be one of [`Self::offsets`].
+    /// The offset must be an element of [`Self::offsets`].
     #[inline(always)]
     pub unsafe fn far(&self, offset: &Offset) -> usize {
         debug_assert!((offset.line as usize) < self.shifts.len());

@@ -1,10 +1,11 @@
 //! Volume correction of a lattice cell: the factor Ṽ_j/V_j of its volume in a family.
 //!
-//! - `linear` falls from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families hold points beyond the
-//!   horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). LAMMPS (Parks et al. 2008) ends the same
-//!   taper at δ.
-//! - `exact` is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl & Schweitzer
-//!   2016, eq. 2): a closed form in 1-D and 2-D, quadrature over slices in 3-D.
+//! - `linear`: the factor falls from 1 at |ξ| = δ − dx/2 to 0 at δ + dx/2, so families contain points
+//!   beyond the horizon (Hu, Ha & Bobaru 2010; PA-HHB in Seleson 2014). In LAMMPS (Parks et al. 2008), the
+//!   same taper ends at δ.
+//! - `exact`: the factor is the fraction of the cell within the horizon, |V_j ∩ B_δ(x_i)|/V_j (Diehl &
+//!   Schweitzer 2016, eq. 2). It has a closed form in 1-D and 2-D, and is computed by quadrature over slices
+//!   in 3-D.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -30,8 +31,8 @@ const MOST_MULTIPLES: usize = 1 << 17;
 /// Bit pattern of a table entry that has not been computed.
 const UNKNOWN: u64 = u64::MAX;
 
-/// The longest bond (m) with a positive factor if the factor is 0 at `length` (m). The tolerance keeps
-/// round-off from adding bonds of zero weight.
+/// The longest bond (m) with a positive factor, for a factor that is 0 at `length` (m). The tolerance
+/// excludes bonds whose weight is 0 except for round-off.
 fn inside(length: f64) -> f64 {
     length * (1.0 - 1e-9)
 }
@@ -76,7 +77,8 @@ impl CellShare {
         share
     }
 
-    /// The longest bond (m) with a positive factor; for `exact`, the ball touches a corner of the cell.
+    /// The longest bond (m) with a positive factor. For `exact`, the ball then touches a corner of the
+    /// cell.
     pub fn cutoff(&self) -> f64 {
         let half = 0.5 * self.edge;
         match self.correction {
@@ -86,7 +88,7 @@ impl CellShare {
         }
     }
 
-    /// The factor at an offset ξ (m); equal at ξ and −ξ.
+    /// The factor at an offset ξ (m). It is the same at ξ and −ξ.
     pub fn at(&self, offset: [f64; 3]) -> f64 {
         let squared = offset.iter().map(|x| x * x).sum::<f64>();
         let is_inside = squared <= cutoff(self.horizon).powi(2);
@@ -99,7 +101,7 @@ impl CellShare {
             VolumeCorrection::Exact if squared > self.reach_squared => 0.0,
             VolumeCorrection::Exact => match self.multiple(offset) {
                 Some((known, steps)) => {
-                    // Relaxed: threads that race compute the same value.
+                    // Relaxed ordering is sufficient, because racing threads compute the same value.
                     let bits = known.load(Ordering::Relaxed);
                     if bits != UNKNOWN {
                         return f64::from_bits(bits);
@@ -123,7 +125,7 @@ impl CellShare {
         }
     }
 
-    /// The table entry and the quarters of the edge of an offset, if the table holds it.
+    /// The table entry of an offset, and the offset in quarters of the edge, if the table contains it.
     #[inline]
     fn multiple(&self, offset: [f64; 3]) -> Option<(&AtomicU64, [i64; 3])> {
         let quarters = offset.map(|x| x.abs() * self.per_resolution / QUARTER as f64);
@@ -153,13 +155,13 @@ impl CellShare {
     }
 }
 
-/// Sort the components: the factor is symmetric in the axes, so fewer values are cached.
+/// Sort the components. The factor is symmetric in the axes, so fewer values are cached.
 fn ordered(mut steps: [i64; 3]) -> [i64; 3] {
     steps.sort_unstable_by(|a, b| b.cmp(a));
     steps
 }
 
-/// The volume of a unit cell within a ball; the ball is centred at the origin.
+/// The volume of a unit cell within a ball that is centred at the origin.
 fn overlap(centre: [f64; 3], radius: f64, dimension: usize) -> f64 {
     let range = |k: usize| [centre[k] - 0.5, centre[k] + 0.5];
     match dimension {
@@ -196,7 +198,7 @@ fn quadrant_in_disc(x: f64, y: f64, radius: f64) -> f64 {
     if radius == 0.0 {
         return 0.0;
     }
-    // The upper boundary is the edge y up to `a`, and the circle beyond.
+    // The upper boundary is the edge y up to `a`, and the circle from there on.
     let a = (radius * radius - y * y).max(0.0).sqrt().min(x);
     let under_circle = |u: f64| {
         let height = (radius * radius - u * u).max(0.0).sqrt();
@@ -210,7 +212,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// The sum over all offsets of a lattice, ξ = 0 included.
+    /// The sum over all offsets of a lattice, including ξ = 0.
     fn whole(correction: VolumeCorrection, dimension: usize, horizon: f64) -> f64 {
         let share = CellShare::new(correction, horizon, 1.0, dimension);
         let reach = horizon.ceil() as i32 + 1;
@@ -264,14 +266,16 @@ mod tests {
     fn cached_factors_are_those_of_their_offsets() {
         for horizon in [1.5, 3.0] {
             let share = CellShare::new(VolumeCorrection::Exact, horizon, 1.0, 3);
-            // On the twice-refined grid, off it, and beyond the cutoff; the second pass reads the cache.
+            // Offsets on and off the twice-refined grid, and beyond the cutoff; the second pass reads the
+            // cache.
             for step in [0.25, 0.3, 0.25, 0.3] {
                 let axis = || (0..16).map(|k| f64::from(k) * step);
                 for offset in axis().flat_map(|x| axis().map(move |y| [x, -y, 0.5])) {
                     let mut ordered = offset.map(f64::abs);
                     ordered.sort_by(|a, b| b.total_cmp(a));
                     let expected = overlap(ordered, horizon, 3);
-                    // The differences are round-off: all of these offsets have entries of their own.
+                    // All of these offsets have their own table entries, so the differences are only
+                    // round-off.
                     assert!((share.at(offset) - expected).abs() < 1e-12, "{offset:?}");
                 }
             }

@@ -1,21 +1,23 @@
-//! Columns of numbers that are read together.
+//! Columns of numbers that loops read at the same index.
 
 use std::ops::{Deref, DerefMut};
 
-/// Lines of 64 bytes that lie in as many different sets of a first-level cache.
+/// Number of sets of a first-level cache; consecutive 64-byte lines lie in different sets.
 const SETS: usize = 64;
 
-/// Each column starts so many lines after the one before it: of eighteen none is within two lines of another.
+/// Offset between the starts of consecutive columns, in lines: no two of eighteen columns are within two
+/// lines of each other.
 const STEP: usize = 27;
 
-/// LaneTuple in a line.
+/// Numbers in a line.
 const LINE: usize = 8;
 
-/// One of several columns of numbers that are read at the same index.
+/// One of several columns of numbers that loops read at the same index.
 ///
-/// Arrays that the allocator takes from the system one by one (from 1 MB on in the `fissure` command) all lie alike in
-/// their first page, so that one index of many such columns falls into the same set of the cache, which keeps eight
-/// or twelve lines. Here each begins some lines later than the one before.
+/// The allocator requests large arrays from the system one by one (from 1 MB on in the `fissure` command).
+/// All of them start at the same offset within a page. One index of many such columns would fall into the
+/// same set of the cache, which contains only eight or twelve lines. Therefore, each column starts some
+/// lines later than the previous one.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     values: Vec<f64>,
@@ -23,7 +25,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// The column of a number among those that are read together, with `count` times a value.
+    /// Create column `number` of those that are read together, with `count` entries of `value`.
     pub fn new(number: usize, count: usize, value: f64) -> Self {
         let lead = number * STEP % SETS * LINE;
         Self {

@@ -1,6 +1,6 @@
-//! Vector instructions of the loops over bonds: the best set that all ranks have, found at run time.
+//! Instruction sets of the loops over bonds. The best set that all ranks have is selected at run time.
 //!
-//! All sets round a product and a sum once and give the same bits, see [`super::simd`].
+//! All sets round a product and a sum once and give bitwise the same results, see [`super::simd`].
 
 use crate::comm::{self, Communicator, agree};
 use crate::error::{Error, Result};
@@ -8,13 +8,13 @@ use crate::error::{Error, Result};
 #[cfg(target_arch = "x86_64")]
 use super::simd::{Avx2, Avx512};
 
-/// A set of vector instructions that this machine has.
+/// An instruction set that this machine has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Instructions {
-    /// What the program was built for.
+    /// Instruction set for which the program was built.
     #[cfg(not(target_arch = "x86_64"))]
     Portable,
-    /// AVX2 with fused multiplication and addition.
+    /// AVX2 with fused multiply-add.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
     /// AVX-512.
@@ -22,7 +22,7 @@ pub enum Instructions {
     Avx512(Avx512),
 }
 
-/// The environment variable that names the largest set to use, for tests.
+/// Environment variable with the name of the largest set to use, for tests.
 pub const VARIABLE: &str = "FISSURE_INSTRUCTIONS";
 
 /// Names of the sets that the program was built for, the smallest first.
@@ -35,10 +35,11 @@ pub const BUILT: &[&str] = if cfg!(target_arch = "x86_64") {
 };
 
 impl Instructions {
-    /// The largest set that all ranks have, limited by [`VARIABLE`]; collective.
+    /// Select the largest set that all ranks have, limited by [`VARIABLE`]. Collective.
     ///
     /// # Errors
-    /// When the variable names no set, or a rank has none of them; the same on all ranks.
+    /// If the variable does not name a set, or a rank has none of the sets; the error is the same on all
+    /// ranks.
     pub fn of_all(comm: &dyn Communicator) -> Result<Self> {
         let allowed = match std::env::var(VARIABLE) {
             Ok(name) if !name.is_empty() => named(&name),
@@ -56,7 +57,7 @@ impl Instructions {
         Self::up_to(BUILT.len() - 1)
     }
 
-    /// The largest set of this machine up to a level.
+    /// The largest set of this machine that is not above a level.
     #[cfg(target_arch = "x86_64")]
     fn up_to(level: usize) -> Option<Self> {
         match Avx512::detect() {
@@ -83,7 +84,7 @@ impl Instructions {
         }
     }
 
-    /// Its name, as a summary shows it.
+    /// Name of the set, as in the summary.
     pub fn name(self) -> &'static str {
         BUILT[self.level()]
     }
@@ -95,7 +96,7 @@ fn unsupported() -> Error {
     )
 }
 
-/// The level of a name.
+/// Level of a name.
 fn named(name: &str) -> Result<usize> {
     let short = |name: &str| name.replace('-', "").to_lowercase();
     let found = BUILT.iter().position(|known| short(known) == short(name));

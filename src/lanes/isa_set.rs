@@ -1,23 +1,24 @@
-//! For which vector instructions a loop is compiled.
+//! Instruction sets for which a loop is compiled.
 
-/// The versions of a loop on x86-64; other processors have one. All give the same bits.
+/// The compiled versions of a loop on x86-64; other processors have one version. All versions give bitwise
+/// the same results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IsaSet {
     /// AVX-512 and AVX2.
     Each,
-    /// AVX2, which is not much slower.
+    /// Only AVX2, which is not much slower than AVX-512.
     Avx2,
     /// No vector instructions and no fused multiply-adds.
     One,
 }
 
 impl IsaSet {
-    /// Whether there is one for each set of instructions.
+    /// Whether there is a version for each instruction set.
     pub const fn is_each(self) -> bool {
         matches!(self, Self::Each)
     }
 
-    /// Whether there is one only.
+    /// Whether there is only one version.
     pub const fn is_one(self) -> bool {
         matches!(self, Self::One)
     }

@@ -1,55 +1,55 @@
-//! A fixed number of [`Lanes`], and the columns of plain numbers that they are read from and added to.
+//! Tuples of [`Lanes`], and the columns of numbers from which they are read and to which they are added.
 
 use std::ops::{Deref, DerefMut};
 
 use super::{Lanes, WIDTH};
 
-/// Several quantities of eight bonds or points: `[Lanes; N]`, or a pair of such.
+/// Several quantities of eight bonds or points: `[Lanes; N]`, or a pair of such arrays.
 pub trait LaneTuple: Copy + Send + Sync {
-    /// How many.
+    /// Number of quantities.
     const COUNT: usize;
 
-    /// Whether quantities without a column are 0; else every quantity has a column.
+    /// Whether quantities without a column are 0. Otherwise, every quantity has a column.
     const PADDED: bool = false;
 
-    /// One column of numbers for each, to read.
+    /// One column per quantity, to read.
     type Columns<'a>: Copy + Send + Sync;
 
-    /// One column of numbers for each, to add to.
+    /// One column per quantity, to add to.
     type ColumnsMut<'a>: Send;
 
-    /// From a function of the number of each quantity.
+    /// Create the tuple by calling `value` with the index of each quantity.
     fn each(value: impl FnMut(usize) -> Lanes) -> Self;
 
-    /// One of the quantities.
+    /// Get a quantity.
     fn get(&self, quantity: usize) -> Lanes;
 
-    /// One of the quantities, to change it.
+    /// Get a quantity for writing.
     fn get_mut(&mut self, quantity: usize) -> &mut Lanes;
 
-    /// The first columns of several.
+    /// Select the first [`Self::COUNT`] columns.
     ///
     /// # Panics
-    /// When there are fewer.
+    /// If there are fewer columns.
     fn columns(all: &[impl Deref<Target = [f64]>]) -> Self::Columns<'_>;
 
-    /// The first columns of several, to add to.
+    /// Select the first [`Self::COUNT`] columns, to add to.
     ///
     /// # Panics
-    /// When there are fewer.
+    /// If there are fewer columns.
     fn columns_mut(all: &mut [impl DerefMut<Target = [f64]>]) -> Self::ColumnsMut<'_>;
 
-    /// One of the columns.
+    /// The column of a quantity.
     fn column<'a>(columns: &Self::Columns<'a>, quantity: usize) -> &'a [f64];
 
-    /// The columns before an entry, and those from it on.
+    /// Split all columns before an entry.
     fn split_at(columns: Self::ColumnsMut<'_>, middle: usize) -> [Self::ColumnsMut<'_>; 2];
 
-    /// One of the columns.
+    /// The column of a quantity, to add to.
     fn column_mut<'a>(columns: &'a mut Self::ColumnsMut<'_>, quantity: usize) -> &'a mut [f64];
 
-    /// Whether every column has at least so many entries; one that is missing because of [`Self::PADDED`] counts as long
-    /// enough.
+    /// Whether every column has at least `entries` entries. Columns that are missing because of
+    /// [`Self::PADDED`] count as long enough.
     fn covers(columns: &Self::Columns<'_>, entries: usize) -> bool {
         (0..Self::COUNT).all(|k| {
             let column = Self::column(columns, k);
@@ -57,7 +57,7 @@ pub trait LaneTuple: Copy + Send + Sync {
         })
     }
 
-    /// Load each quantity from its column with `take`; one without a column is 0.
+    /// Load each quantity from its column with `take`. Quantities without a column are 0.
     #[inline(always)]
     fn load(columns: &Self::Columns<'_>, take: impl Fn(&[f64]) -> Lanes) -> Self {
         Self::each(|k| {
@@ -70,7 +70,7 @@ pub trait LaneTuple: Copy + Send + Sync {
         })
     }
 
-    /// The same value everywhere.
+    /// Create a tuple with the same value in all lanes.
     #[inline(always)]
     fn splat(value: f64) -> Self {
         Self::each(|_| Lanes::splat(value))
@@ -131,7 +131,7 @@ impl<const N: usize> LaneTuple for [Lanes; N] {
     }
 }
 
-/// Row by row.
+/// Quantities are numbered row by row.
 impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     const COUNT: usize = N * M;
     type Columns<'a> = [[&'a [f64]; N]; M];
@@ -191,7 +191,7 @@ impl<const N: usize, const M: usize> LaneTuple for [[Lanes; N]; M] {
     }
 }
 
-/// At most `N` quantities; those without a column to read are 0. For laws that are known at run time only.
+/// At most `N` quantities; those without a column to read are 0. For laws that are known only at run time.
 #[derive(Debug, Clone, Copy)]
 pub struct UpTo<const N: usize>([Lanes; N]);
 
@@ -302,7 +302,7 @@ impl<A: LaneTuple, B: LaneTuple> LaneTuple for (A, B) {
     }
 }
 
-/// Eight numbers of a column.
+/// Load eight consecutive numbers of a column.
 ///
 /// # Safety
 /// The column must have eight entries from `first` on.
@@ -313,7 +313,7 @@ pub unsafe fn eight(column: &[f64], first: usize) -> Lanes {
     Lanes(unsafe { column.as_ptr().add(first).cast::<[f64; WIDTH]>().read() })
 }
 
-/// The numbers of a column at eight indices.
+/// Load the numbers of a column at eight indices.
 ///
 /// # Safety
 /// The column must be longer than every index.

@@ -1,7 +1,7 @@
-//! Eight numbers that are worked on together: the same quantity of eight bonds.
+//! Vectors of eight numbers: the same quantity of eight bonds or points.
 //!
-//! Plain arrays and IEEE operations without contraction: whatever instructions the compiler picks,
-//! the bits are the same. Operations of which this does not hold are in [`simd`].
+//! The operations are IEEE operations on plain arrays without contraction, so all instruction sets give
+//! bitwise the same results. Operations for which this is not guaranteed are in [`simd`].
 
 mod column;
 pub mod instructions;
@@ -17,7 +17,7 @@ pub use simd::Simd;
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// Bonds that are evaluated together.
+/// Number of bonds that are evaluated together.
 pub const WIDTH: usize = 8;
 
 /// One number for each of eight bonds.
@@ -32,14 +32,14 @@ impl Lanes {
         Self([value; WIDTH])
     }
 
-    /// Applies a function to each lane; written out, for a compiler that meets very many of these.
+    /// Apply a function to each lane. It is written out, because the compiler processes very many of these.
     #[inline(always)]
     fn map(self, of: impl Fn(f64) -> f64) -> Self {
         let [a, b, c, d, e, f, g, h] = self.0;
         Self([of(a), of(b), of(c), of(d), of(e), of(f), of(g), of(h)])
     }
 
-    /// Applies a function to each pair of lanes.
+    /// Apply a function to each pair of lanes.
     #[inline(always)]
     fn zip(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         let (a, b) = (self.0, other.0);
@@ -61,31 +61,31 @@ impl Lanes {
         self.map(f64::sqrt)
     }
 
-    /// Exponential; a call for each lane, the same on every processor.
+    /// Exponential. It is a call per lane, with the same result on every processor.
     #[inline(always)]
     pub fn exp(self) -> Self {
         self.map(libm::exp)
     }
 
-    /// The smaller of each pair of lanes; of a NaN and a number, the number in `other`.
+    /// The smaller of each pair of lanes. If either is NaN, the result is the lane of `other`.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
     }
 
-    /// The larger of each pair of lanes; of a NaN and a number, the number in `other`.
+    /// The larger of each pair of lanes. If either is NaN, the result is the lane of `other`.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
 
-    /// Without sign.
+    /// Absolute value.
     #[inline(always)]
     pub fn abs(self) -> Self {
         self.map(f64::abs)
     }
 
-    /// A bit for each lane that is larger than a number.
+    /// A bit for each lane that is larger than `limit`.
     #[inline(always)]
     pub fn above(self, limit: f64) -> u8 {
         let mut bits = 0;

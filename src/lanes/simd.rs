@@ -1,12 +1,12 @@
-//! The operations that a compiler does not find by itself, or that machines carry out differently.
+//! Operations for which compilers do not select the vector instructions, or that depend on the machine.
 //!
-//! All others on [`Lanes`] are plain loops over eight numbers, which the compiler turns into vector
-//! instructions. Every operation here is correctly rounded or moves numbers only, so that all kinds
-//! but [`Portable`] without fused multiplication and addition give the same bits.
+//! All other operations on [`Lanes`] are plain loops over eight numbers, which the compiler vectorizes.
+//! Every operation here is correctly rounded or only moves numbers. So all types give bitwise the same
+//! results, except [`Portable`] without fused multiply-add.
 
 use super::Lanes;
 
-/// Proof that the machine has a set of instructions, and the operations that depend on it.
+/// Proof that the machine has an instruction set, and the operations that depend on it.
 pub trait Simd: Copy + Send + Sync + 'static {
     /// a b + c, rounded once.
     fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes;
@@ -21,7 +21,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
         bits
     }
 
-    /// The lanes whose bit is set; those of `otherwise` in the others.
+    /// Select the lanes of `a` whose bit is set, and the other lanes of `otherwise`.
     #[inline(always)]
     fn select(self, a: Lanes, bits: u8, otherwise: Lanes) -> Lanes {
         let mut result = otherwise;
@@ -33,16 +33,17 @@ pub trait Simd: Copy + Send + Sync + 'static {
         result
     }
 
-    /// The lanes whose bit is set; 0 in the others.
+    /// The lanes of `a` whose bit is set; 0 in the other lanes.
     #[inline(always)]
     fn keep(self, a: Lanes, bits: u8) -> Lanes {
         self.select(a, bits, Lanes::splat(0.0))
     }
 
-    /// Run a task that is rarely needed out of line: it takes no registers from the hot loop.
+    /// Run a rarely needed task out of line, so it uses no registers of the hot loop.
     fn aside<T: Task>(self, task: T) -> T::Output;
 
-    /// The same value, as one opaque vector to the compiler, which may else split operations by lane.
+    /// The same value, as one vector that is opaque to the compiler. Otherwise, the compiler may split
+    /// operations by lane.
     #[inline(always)]
     fn whole(self, a: Lanes) -> Lanes {
         a
@@ -55,15 +56,15 @@ pub trait Simd: Copy + Send + Sync + 'static {
     }
 }
 
-/// Work that can run out of line with a set of instructions.
+/// Work that can run out of line with an instruction set.
 ///
-/// [`Self::run`] must be `#[inline(always)]`. A closure would not do: it is a function without these instructions, and a
-/// large one that the compiler does not inline calls every vector operation.
+/// [`Self::run`] must be `#[inline(always)]`. A closure is not sufficient: it is a function without these
+/// instructions. If the compiler does not inline a large closure, every vector operation in it is a call.
 pub trait Task {
     /// The result.
     type Output;
 
-    /// Runs it.
+    /// Run the task.
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
@@ -100,16 +101,16 @@ mod x86 {
 
     use super::{Lanes, Simd, Task};
 
-    /// AVX2 with fused multiplication and addition. Only [`Avx2::detect`] makes it.
+    /// AVX2 with fused multiply-add. Only [`Avx2::detect`] creates it.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub struct Avx2(());
 
-    /// AVX-512. Only [`Avx512::detect`] makes it.
+    /// AVX-512. Only [`Avx512::detect`] creates it.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub struct Avx512(());
 
     impl Avx2 {
-        /// If this machine has it.
+        /// Create the proof if this machine has the instructions.
         pub fn detect() -> Option<Self> {
             let has = is_x86_feature_detected!("avx2")
                 && is_x86_feature_detected!("bmi2")
@@ -119,7 +120,7 @@ mod x86 {
     }
 
     impl Avx512 {
-        /// If this machine has it.
+        /// Create the proof if this machine has the instructions.
         pub fn detect() -> Option<Self> {
             let has = Avx2::detect().is_some()
                 && is_x86_feature_detected!("avx512f")
@@ -138,13 +139,13 @@ mod x86 {
     impl Simd for Avx2 {
         #[inline(always)]
         fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
-            // SAFETY: the machine has AVX2 and FMA, as `self` shows.
+            // SAFETY: `self` proves that the machine has AVX2 and FMA.
             unsafe { multiply_add_avx2(a, b, c) }
         }
 
         #[inline(always)]
         fn at_least(self, a: Lanes, b: Lanes) -> u8 {
-            // SAFETY: the machine has AVX2, as `self` shows.
+            // SAFETY: `self` proves that the machine has AVX2.
             unsafe { at_least_avx2(a, b) }
         }
 
@@ -182,13 +183,13 @@ mod x86 {
     impl Simd for Avx512 {
         #[inline(always)]
         fn multiply_add(self, a: Lanes, b: Lanes, c: Lanes) -> Lanes {
-            // SAFETY: the machine has AVX-512, as `self` shows.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { multiply_add_avx512(a, b, c) }
         }
 
         #[inline(always)]
         fn at_least(self, a: Lanes, b: Lanes) -> u8 {
-            // SAFETY: the machine has AVX-512, as `self` shows.
+            // SAFETY: `self` proves that the machine has AVX-512.
             unsafe { at_least_avx512(a, b) }
         }
 
@@ -237,32 +238,32 @@ mod x86 {
         task.run(simd)
     }
 
-    /// The halves of eight numbers.
+    /// The two halves of a vector of eight numbers.
     #[inline(always)]
     fn halves(a: Lanes) -> [__m256d; 2] {
-        // SAFETY: eight numbers either way.
+        // SAFETY: both types are eight numbers.
         unsafe { std::mem::transmute(a) }
     }
 
     #[inline(always)]
     fn joined(halves: [__m256d; 2]) -> Lanes {
-        // SAFETY: eight numbers either way.
+        // SAFETY: both types are eight numbers.
         unsafe { std::mem::transmute(halves) }
     }
 
     #[inline(always)]
     fn vector(a: Lanes) -> __m512d {
-        // SAFETY: eight numbers either way.
+        // SAFETY: both types are eight numbers.
         unsafe { std::mem::transmute(a) }
     }
 
     #[inline(always)]
     fn lanes(a: __m512d) -> Lanes {
-        // SAFETY: eight numbers either way.
+        // SAFETY: both types are eight numbers.
         unsafe { std::mem::transmute(a) }
     }
 
-    /// For each four bits the numbers with all bits set where they are.
+    /// Masks of four lanes by their four bits; all bits of a selected lane are set.
     static MASKS: [[u64; 4]; 16] = {
         let mut masks = [[0; 4]; 16];
         let mut bits = 0;
@@ -282,7 +283,7 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx2")]
     fn masks(bits: u8) -> [__m256d; 2] {
-        // SAFETY: each row has four numbers of 64 bits.
+        // SAFETY: each row contains four numbers of 64 bits.
         let mask = |row: u8| unsafe { _mm256_loadu_pd(MASKS[row as usize].as_ptr().cast()) };
         [mask(bits & 15), mask(bits >> 4)]
     }
@@ -331,7 +332,7 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx2")]
     fn transpose_avx2(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-        // Four blocks of four by four.
+        // Transpose four blocks of four by four numbers.
         let block = |first: usize, column: usize| -> [__m256d; 4] {
             let load = |k: usize| {
                 let row: &[f64; 4] = rows[first + k][column..column + 4]
@@ -384,7 +385,8 @@ mod x86 {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn transpose_avx512(rows: [&[f64; 8]; 8]) -> [Lanes; 8] {
-        // Four numbers from `first` on of two rows; the second half comes from memory, which is no shuffle.
+        // Four numbers of two rows, from `first` on. The second half is loaded from memory, which needs no
+        // shuffle.
         let halves = |a: usize, b: usize, first: usize| {
             // SAFETY: each row has eight numbers, and `first` is 0 or 4.
             let [a, b] =
@@ -394,7 +396,7 @@ mod x86 {
         let columns = |first: usize| {
             let [a, b] = [halves(0, 2, first), halves(1, 3, first)];
             let [c, d] = [halves(4, 6, first), halves(5, 7, first)];
-            // Rows 0, 1 | 2, 3 of two columns, and those of 4, 5 | 6, 7.
+            // Rows 0, 1 | 2, 3 of two columns, and rows 4, 5 | 6, 7.
             let [ab, cd] = [_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d)];
             let [ab_next, cd_next] = [_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d)];
             [
@@ -408,24 +410,25 @@ mod x86 {
         [a, b, c, d, e, f, g, h].map(|column| lanes(opaque(column)))
     }
 
-    /// A value that the compiler knows nothing of: it keeps operations before and after in whole vectors instead of
-    /// splitting them by lane. With rustc 1.95 on AMD Zen 3 (AVX2), PMB in lists runs at 0.68 and LPS in lattices at 0.75
-    /// of the rate without it; PMB in lattices does not need it, and correspondence is faster without.
+    /// Make a value opaque to the compiler. The compiler then keeps the operations before and after it in
+    /// whole vectors instead of splitting them by lane. Without it, with rustc 1.95 on AMD Zen 3 (AVX2),
+    /// PMB in lists reaches only 0.68 of its rate with it, and LPS in lattices 0.75. PMB in lattices does
+    /// not need it, and correspondence is faster without it.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn opaque_half(mut a: __m256d) -> __m256d {
-        // SAFETY: does nothing.
+        // SAFETY: the assembly has no instructions.
         unsafe {
             std::arch::asm!("/* {0} */", inout(ymm_reg) a, options(pure, nomem, nostack, preserves_flags));
         }
         a
     }
 
-    /// As [`opaque_half`].
+    /// Same as [`opaque_half`], for AVX-512.
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn opaque(mut a: __m512d) -> __m512d {
-        // SAFETY: does nothing.
+        // SAFETY: the assembly has no instructions.
         unsafe {
             std::arch::asm!("/* {0} */", inout(zmm_reg) a, options(pure, nomem, nostack, preserves_flags));
         }
@@ -467,9 +470,9 @@ mod tests {
         }
     }
 
-    /// Of a kind that is fused.
+    /// Check that an implementation uses fused multiply-add.
     fn rounds_once(simd: impl Simd) {
-        // (1 + e)² − 1 − 2e = e², which two roundings lose.
+        // (1 + e)² − 1 − 2e = e², which is lost when the result is rounded twice.
         let a = Lanes::splat(1.0 + f64::EPSILON);
         let c = Lanes::splat(-1.0 - 2.0 * f64::EPSILON);
         let e = f64::EPSILON;

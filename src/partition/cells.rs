@@ -4,14 +4,14 @@ use crate::comm::{self, Communicator};
 use crate::points::Point;
 use crate::points::bins::boxes;
 
-/// Number of cells that any rank count may use.
+/// Number of cells that is allowed for any number of ranks.
 const ALWAYS_ALLOWED: usize = 100_000;
 
-/// Cells per rank beyond which borders get no smoother.
+/// Number of cells per rank above which borders do not get smoother.
 const SUFFICIENT_PER_RANK: usize = 2000;
 
-/// Number of cells above which ranks get fewer: one rank partitions all cells, and every rank stores
-/// all owners.
+/// Number of cells above which there are fewer cells per rank, because one rank partitions all cells, and
+/// every rank stores all owners.
 const LARGE_TOTAL: usize = 4_000_000;
 
 /// Cells per rank needed for an even partition.
@@ -42,7 +42,7 @@ pub struct Cells {
 pub struct CellLoads {
     /// Measured time of the points of each cell, ns.
     pub costs: Vec<u64>,
-    /// A rank that owns points of each cell, −1 without points.
+    /// A rank that owns points of each cell; −1 if the cell has no points.
     pub ranks: Vec<f64>,
 }
 
@@ -96,20 +96,21 @@ impl Cells {
         })
     }
 
-    /// The cell that holds a position (m).
+    /// The cell that contains a position (m).
     pub fn of(&self, position: [f64; 3]) -> usize {
         let [x, y, z] = self.box_of(position).map(|at| at / self.boxes);
         x + self.counts[0] * (y + self.counts[1] * z)
     }
 
-    /// Sort key of a position (m) by cell, then by box, so points close in space are close in memory.
+    /// Sort key of a position (m), by cell, then by box. Points close in space then are close in memory.
     pub fn order(&self, position: [f64; 3]) -> u64 {
         let [x, y, z] = self.box_of(position).map(|at| at % self.boxes);
         let within = x + self.boxes * (y + self.boxes * z);
         (self.of(position) * self.boxes.pow(3) + within) as u64
     }
 
-    /// The adjacent cells across faces, edges and corners, and the directions in which each is displaced.
+    /// The cells adjacent across faces, edges and corners, and the directions in which each of them is
+    /// displaced.
     pub fn adjacent(&self, cell: usize) -> impl Iterator<Item = (usize, [bool; 3])> + '_ {
         let [nx, ny, nz] = self.counts;
         let position = [cell % nx, cell / nx % ny, cell / nx / ny];
@@ -119,7 +120,7 @@ impl Cells {
             let displaced = offset.map(|steps| steps != 1);
             let mut other = [0; 3];
             for k in 0..3 {
-                // Offsets 0, 1, 2 mean −1, 0, +1.
+                // The offsets 0, 1, 2 mean −1, 0, +1.
                 other[k] = (position[k] + offset[k]).checked_sub(1)?;
                 if other[k] >= counts[k] {
                     return None;
@@ -140,8 +141,7 @@ impl Cells {
         occupation
     }
 
-    /// Costs and current owners of the cells; `each` is the cost of each point of this rank, ns.
-    /// Collective.
+    /// Costs and present owners of the cells. `each` is the cost per point on this rank, ns. Collective.
     pub fn loads(&self, comm: &dyn Communicator, points: &[Point], each: u64) -> CellLoads {
         let mut costs = vec![0; self.count()];
         let mut ranks = vec![-1.0; self.count()];

@@ -6,7 +6,7 @@ use crate::points::Point;
 /// The local points of a rank, in the order of local indices:
 ///
 /// 1. interior points, which have no bonds to ghosts, sorted by cell, box and id;
-/// 2. border points, sorted likewise;
+/// 2. border points, sorted in the same way;
 /// 3. ghosts, grouped by owner and sorted by id.
 #[derive(Debug, Default)]
 pub struct Domain {
@@ -33,7 +33,7 @@ impl Domain {
             new_index[*old as usize] = new;
         }
         self.halo.renumber(&new_index);
-        // In new_index: a copy of all points would raise the peak memory.
+        // The permutation is applied in place, because a copy of all points would raise the peak memory.
         for k in 0..new_index.len() {
             while new_index[k] as usize != k {
                 let other = new_index[k] as usize;

@@ -1,7 +1,7 @@
 //! The ghosts and the halo plan of a rank.
 //!
-//! Ranks exchange the points of cells adjacent to each other's cells. Each then requests the points
-//! within the cutoff of one of its own.
+//! Ranks exchange the points of cells adjacent to each other's cells. Each rank then requests the points
+//! within the cutoff of one of its own points.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -16,13 +16,13 @@ use super::domain::Domain;
 use super::graph::NO_OWNER;
 use super::received;
 
-/// Most components per point in a halo exchange.
+/// Maximum number of components per point in a halo exchange.
 const HALO_WIDTH: usize = 3;
 
 /// Find the ghosts, sort the owned points and build the halo plan. Collective.
 ///
-/// `owned` are this rank's points after migration, `owner` the rank of each cell, `cutoff` (m) the
-/// longest bond.
+/// `owned` are this rank's points after migration, `owner` is the rank of each cell, and `cutoff` (m) is
+/// the longest bond.
 pub fn domain(
     comm: &dyn Communicator,
     cells: &Cells,
@@ -78,8 +78,8 @@ pub fn domain(
     }
 }
 
-/// For each rank, the points in cells adjacent to its cells; and the indices of all points offered to
-/// some rank, the only ones that can have ghosts as neighbours. `owned` is sorted by cell.
+/// For each rank, the points in cells adjacent to its cells. Also the indices of all points that are
+/// offered to any rank; only these can have ghosts as neighbours. `owned` is sorted by cell.
 fn offers(
     comm: &dyn Communicator,
     cells: &Cells,

@@ -6,24 +6,26 @@ use crate::error::{Error, Result};
 
 use super::cells::{CellLoads, Cells};
 
-/// Largest total weight; METIS sums weights in 32 bits.
+/// Largest total weight, because METIS sums weights in 32-bit integers.
 const LARGEST_TOTAL: f64 = (1_i64 << 30) as f64;
 
-/// Extra edge weight of bonds along x, because lane groups lie along x.
+/// Additional factor on the edge weight of bonds along x, because lane groups lie along x.
 const ALONG_X: f64 = 1.5;
 
 /// Owner of cells without points.
 pub const NO_OWNER: u32 = u32::MAX;
 
-/// Below this many cells per part, recursive bisection is used: the k-way method leaves parts empty.
+/// Below this number of cells per part, recursive bisection is used, because the k-way method leaves parts
+/// empty.
 const FEW_CELLS_PER_PART: usize = 30;
 
-/// Partition the cells: the rank of each cell, or [`NO_OWNER`] without points.
+/// Partition the cells. Return the rank of each cell, or [`NO_OWNER`] for cells without points.
 ///
 /// - `occupation` is the number of points in each cell.
-/// - The weight of a cell is the number of its points' bonds; the weight of an edge, the bonds across.
-/// - Given measured loads, cell weights are scaled by the cost per point, and parts are numbered so
-///   that few points migrate.
+/// - The weight of a cell is the number of bonds of its points. The weight of an edge is the number of
+///   bonds across it.
+/// - With measured loads, cell weights are scaled by the cost per point, and parts are numbered so that few
+///   points migrate.
 ///
 /// # Errors
 /// If METIS fails.
@@ -58,7 +60,7 @@ pub fn partition(
             if occupation[other] == 0 {
                 continue;
             }
-            // The fraction of bonded pairs falls with the number of directions of displacement.
+            // The fraction of bonded pairs decreases with the number of directions of displacement.
             let directions = displaced.iter().filter(|displaced| **displaced).count();
             let across = count * occupation[other] as f64 * 0.4_f64.powi(directions as i32);
             sum += across;
@@ -95,7 +97,7 @@ pub fn partition(
     Ok(owner)
 }
 
-/// Renumber parts so that few points migrate: `current(cell)` is the rank and number of points.
+/// Renumber parts so that few points migrate. `current(cell)` is the present rank and the number of points.
 fn renumber(part: &mut [metis::Idx], ranks: usize, current: impl Fn(usize) -> (usize, u64)) {
     let mut shared: HashMap<(usize, usize), u64> = HashMap::new();
     for (k, part) in part.iter().enumerate() {
@@ -139,7 +141,7 @@ fn to_integers(weights: &[f64]) -> Vec<metis::Idx> {
         .collect()
 }
 
-/// Give each empty part a cell of the largest part.
+/// Move a cell of the largest part to each empty part.
 fn fill_empty_parts(part: &mut [metis::Idx], ranks: usize) {
     let mut sizes = vec![0_usize; ranks];
     for rank in part.iter() {

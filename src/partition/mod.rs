@@ -1,4 +1,4 @@
-//! Domain decomposition: cells, METIS, migration, ghosts.
+//! Domain decomposition: cells, graph partitioning with METIS, migration and ghosts.
 
 mod cells;
 mod domain;
@@ -15,7 +15,7 @@ use cells::{CellLoads, Cells, max_cells};
 
 /// Partition the points, migrate them to their owners and find the ghosts. Collective.
 ///
-/// `total` is the number of points of all ranks, `cutoff` (m) the longest bond.
+/// `total` is the number of points of all ranks, and `cutoff` (m) is the longest bond.
 ///
 /// # Errors
 /// If METIS fails; equal on all ranks.
@@ -28,11 +28,11 @@ pub fn distribute(
     distribute_by_cost(comm, pieces, total, cutoff, None)
 }
 
-/// As [`distribute`], with the measured cost of this rank's points: cells are weighted by it, and few
-/// points migrate.
+/// Same as [`distribute`], with the measured cost of this rank's points. Cells are weighted by cost, and
+/// few points migrate.
 ///
 /// # Errors
-/// As [`distribute`].
+/// Same as for [`distribute`].
 pub fn distribute_by_cost(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
@@ -52,7 +52,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// The cost of points that took `time`, ns.
+    /// Create the cost of `points` points from their total time `time`, ns.
     pub fn of(time: u64, points: usize) -> Self {
         Self {
             each: (time / points.max(1) as u64).max(1),
@@ -60,7 +60,7 @@ impl Cost {
     }
 }
 
-/// As [`distribute_by_cost`], with at most `most` cells.
+/// Same as [`distribute_by_cost`], with at most `most` cells.
 fn distribute_by_cells(
     comm: &dyn Communicator,
     pieces: Vec<Point>,
@@ -158,7 +158,7 @@ mod tests {
                 let piece = all[start(comm.rank())..start(comm.rank() + 1)].to_vec();
                 let total = all.len() as u64;
                 let mut domain = distribute_by_cells(comm, piece, total, 1.0, most, None).unwrap();
-                // The exchange must set each ghost's entry to its id.
+                // The exchange must set the entry of each ghost to its id.
                 let mut ids: Vec<f64> = domain.points.iter().map(|p| p.id as f64).collect();
                 ids[domain.owned..].fill(-1.0);
                 domain.halo.pack([&ids[..]].into_iter());

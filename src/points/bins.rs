@@ -2,8 +2,8 @@
 
 use super::distance_squared;
 
-/// Boxes over a cloud of positions, with an edge of at least half the search radius. Compared with
-/// boxes of the full radius, a search reads fewer points that are out of range.
+/// Boxes over a cloud of positions, with an edge of at least half the search radius. With boxes of the full
+/// radius, a search would read more points that are out of range.
 pub struct Bins {
     lower: [f64; 3],
     inverse_edge: f64,
@@ -63,7 +63,7 @@ impl Bins {
     }
 
     /// Call `visit` with the index and the squared distance (m²) of every point within the radius of a
-    /// position, points at the position included.
+    /// position, including points at the position itself.
     pub fn within(&self, position: [f64; 3], mut visit: impl FnMut(u32, f64)) {
         let square = self.radius_squared;
         self.for_each_run(position, square, |entries| {
@@ -76,15 +76,15 @@ impl Bins {
         });
     }
 
-    /// Append to `found` the index of every point with 0 < distance² ≤ `square` (m²) from a position;
-    /// return the number of points at the position itself.
+    /// Append the index of every point with 0 < distance² ≤ `square` (m²) from a position to `found`.
+    /// Return the number of points at the position itself.
     pub fn collect(&self, position: [f64; 3], square: f64, found: &mut Vec<u32>) -> usize {
         let mut coincident = 0;
         self.for_each_run(position, square, |entries| {
             let start = found.len();
             found.resize(start + entries.len(), 0);
             let mut end = start;
-            // Branch-free: the comparison is hard to predict.
+            // The loop has no branches, because the comparison is hard to predict.
             for (index, other) in entries {
                 let squared = distance_squared(position, *other);
                 found[end] = *index;
@@ -107,12 +107,12 @@ impl Bins {
         if self.entries.is_empty() {
             return;
         }
-        // In box edges. The tolerance keeps points exactly at the radius despite round-off.
+        // In box edges. The tolerance keeps points that are exactly at the radius despite round-off.
         let radius_squared = square * (self.inverse_edge * self.inverse_edge);
         let radius_squared = radius_squared * (1.0 + 1e-6);
         let centre: [f64; 3] =
             std::array::from_fn(|k| (position[k] - self.lower[k]) * self.inverse_edge);
-        // Squared radius left in the other directions, after the gap to a layer of boxes.
+        // Squared radius that remains for the other directions, after the gap to a layer of boxes.
         let remaining = |radius_squared: f64, k: usize, layer: isize| {
             let [below, above] = [layer as f64 - centre[k], centre[k] - (layer + 1) as f64];
             let gap = below.max(above).max(0.0);
@@ -140,8 +140,8 @@ impl Bins {
     }
 }
 
-/// Edge (m) of boxes, at least `min_edge` (m), and their number per direction, of the order of `points`
-/// in total.
+/// Edge (m) of boxes, at least `min_edge` (m), and number of boxes per direction. The total number is of
+/// the order of `points`.
 pub fn boxes(lower: [f64; 3], upper: [f64; 3], min_edge: f64, points: usize) -> (f64, [usize; 3]) {
     let mut edge = min_edge * (1.0 + 1e-6);
     loop {
@@ -177,7 +177,7 @@ mod tests {
                     .filter(|k| distance_squared(*centre, positions[*k]) <= radius * radius)
                     .collect();
                 prop_assert_eq!(&found, &expected);
-                // With another radius, and without points at the position.
+                // Search with another radius, excluding points at the position.
                 let square = (0.3 * radius).powi(2);
                 let mut found = Vec::new();
                 let at_position = bins.collect(*centre, square, &mut found);

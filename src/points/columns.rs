@@ -24,7 +24,7 @@ pub const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 /// Maximum length of a row, bytes.
 pub const LONGEST_ROW: u64 = 1 << 16;
 
-/// Where the columns of a point stand in a row.
+/// Positions of the columns of a point in a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns {
     /// All columns of a row, by name.
@@ -33,12 +33,12 @@ pub struct Columns {
     pub position: Vec<usize>,
     /// Column of the volume.
     pub volume: usize,
-    /// Column of the block number; without it all rows have block 0.
+    /// Column of the block number; without it, all rows have block 0.
     pub block: Option<usize>,
 }
 
 impl Columns {
-    /// The default order: coordinates, volume, block.
+    /// Create columns in the default order: coordinates, volume, block.
     pub fn default_order(dimension: usize) -> Self {
         let coordinates = COORDINATES[..dimension].iter().copied();
         let names = coordinates.chain(["volume", "block"]);
@@ -50,7 +50,7 @@ impl Columns {
         }
     }
 
-    /// Columns by name; upper and lower case are equal.
+    /// Find columns by name; upper and lower case are equivalent.
     ///
     /// # Errors
     /// If a coordinate or the volume is missing, or a name occurs twice.
@@ -98,30 +98,30 @@ impl Columns {
     }
 }
 
-/// How the rows of a file are read.
+/// Layout of the rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     /// The columns.
     pub columns: Columns,
-    /// First byte of the heading, which holds no point.
+    /// Offset of the heading in bytes; the heading contains no point.
     pub heading: Option<u64>,
 }
 
 /// An invalid heading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HeadingError {
-    /// Its line, from 1.
+    /// Line of the heading, from 1.
     pub line: u64,
-    /// What is wrong.
+    /// Description of the error.
     pub message: String,
 }
 
-/// The layout of a file; `given` are the columns that the deck names.
+/// Find the layout of a file. `given` are the columns that the deck names.
 ///
-/// A heading with a column `x` names the columns. Another one is skipped.
+/// A heading with a column `x` names the columns. Any other heading is skipped.
 ///
 /// # Errors
-/// If the file cannot be read; within, if its heading names too few columns.
+/// If the file cannot be read; in the inner result, if its heading names too few columns.
 pub fn layout(
     path: &Path,
     given: Option<&Columns>,
@@ -152,14 +152,14 @@ pub fn layout(
     Ok(Ok(layout))
 }
 
-/// The heading of a file: its first row, if that has no number.
+/// The heading of a file: its first row, if that contains no number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
-    /// Its entries, without quotes.
+    /// Entries of the heading, without quotes.
     pub names: Vec<String>,
-    /// Its first byte.
+    /// Offset of its first byte.
     pub offset: u64,
-    /// Its line, from 1.
+    /// Line of the heading, from 1.
     pub line: u64,
 }
 
@@ -187,7 +187,7 @@ pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
             0 => row.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&row),
             _ => &row[..],
         };
-        // A row that is too long or not text is reported where it is read.
+        // A row that is too long or not text is reported later, when the rows are read.
         let Some(text) = std::str::from_utf8(bytes).ok().map(str::trim) else {
             return Ok(None);
         };
@@ -202,12 +202,12 @@ pub fn heading(path: &Path) -> std::io::Result<Option<Heading>> {
     }
 }
 
-/// Test whether a row holds no point: one that starts with `#`, or with `/` or `*` as in Peridigm.
+/// Test whether a row contains no point because it starts with `#`, or with `/` or `*` as in Peridigm.
 pub fn is_comment(row: &str) -> bool {
     row.trim_start().starts_with(['#', '/', '*'])
 }
 
-/// The names of a heading; `None` of a row with numbers.
+/// The names of a heading; `None` if the row contains numbers.
 fn names(row: &str) -> Option<Vec<String>> {
     let row = row.strip_prefix(PERILAB_HEADER).unwrap_or(row);
     let entries = entries(row).ok()?;
@@ -219,7 +219,7 @@ fn names(row: &str) -> Option<Vec<String>> {
 /// Split a row into entries.
 ///
 /// # Errors
-/// If there is nothing between two separators.
+/// If an entry between two separators is empty.
 pub fn entries(row: &str) -> Result<Vec<&str>, String> {
     let row = row.trim();
     let mut entries = Vec::new();

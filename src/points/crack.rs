@@ -8,14 +8,14 @@ use crate::problem::Crack;
 
 type Vector = Vector3<f64>;
 
-/// Relative tolerance at the rim of a crack: a bond through the rim is cut, despite round-off.
+/// Relative tolerance at the rim of a crack: a bond through the rim is cut in spite of round-off.
 const RIM: f64 = 1e-9;
 
 /// Test whether the bond between two positions (m) crosses the crack.
 ///
-/// - Without width, a point in the plane of the crack counts to its positive side.
-/// - With width, every bond that touches the slot between the faces crosses it.
-/// - Pass the end with the lower id first, so both ends of a bond get the same result.
+/// - For a crack without width, a point in its plane counts as on the positive side.
+/// - For a slot, every bond that touches the volume between its faces crosses it.
+/// - Pass the end with the lower id first, so that both ends of a bond get the same result.
 pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     let bond = [from, to].map(Vector::from);
     match crack {
@@ -70,7 +70,8 @@ pub fn crosses(crack: &Crack, from: [f64; 3], to: [f64; 3]) -> bool {
     }
 }
 
-/// Test with bounding boxes whether a bond of a length (m) from a position (m) can cross the crack; false positives occur.
+/// Test with bounding boxes whether a bond of a length (m) from a position (m) can cross the crack. False
+/// positives occur.
 pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     let (corners, width) = match crack {
         Crack::Segment { from, to, width } => ([*from, *to, *from, *to], width),
@@ -102,8 +103,8 @@ pub fn is_in_reach(crack: &Crack, position: [f64; 3], length: f64) -> bool {
     })
 }
 
-/// The part of a bond between the faces of a crack with mid-plane through `origin`. Without width, the
-/// point where the bond crosses the plane, twice.
+/// The part of a bond between the faces of a crack with mid-plane through `origin`. Without width, both
+/// ends are the point where the bond crosses the plane.
 fn between_faces(
     origin: Vector,
     normal: Vector,
@@ -213,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_slot_cuts_every_bond_that_touches_it() {
-        // From (1, 1) towards (4, 5), 5 long and 0.8 wide.
+        // A segment from (1, 1) towards (4, 5), 5 m long and 0.8 m wide.
         let band = Crack::Segment {
             from: [1.0, 1.0, 0.0],
             to: [4.0, 5.0, 0.0],
@@ -251,7 +252,7 @@ mod tests {
         assert!(crosses(&rectangle, [1.5, 0.5, 0.2], [1.6, 0.5, 0.25]));
         assert!(crosses(&rectangle, [1.5, 0.5, 0.2], [1.6, 0.5, 2.0]));
         assert!(!crosses(&rectangle, [1.5, 0.5, 0.31], [1.6, 0.5, 2.0]));
-        // Past the slanted edge x = y, into it or not.
+        // Bonds that pass the slanted edge x = y, inside or outside.
         assert!(crosses(&rectangle, [0.2, 0.5, 0.1], [0.9, 0.5, 0.1]));
         assert!(!crosses(&rectangle, [0.2, 0.5, 0.1], [0.45, 0.5, 0.1]));
         let disc = Crack::Disc {
@@ -262,7 +263,7 @@ mod tests {
         };
         assert!(crosses(&disc, [0.6, 0.7, 0.2], [0.6, 0.7, 0.25]));
         assert!(!crosses(&disc, [0.8, 0.7, 0.2], [0.8, 0.7, 0.25]));
-        // Ends outside, the middle within; and a bond that passes over the rim.
+        // A bond with ends outside and its middle inside, and a bond that passes over the rim.
         assert!(crosses(&disc, [-1.2, 0.3, 0.1], [1.2, 0.3, 0.1]));
         assert!(!crosses(&disc, [-1.2, 0.3, 0.31], [1.2, 0.3, 0.31]));
         assert!(!crosses(&disc, [1.5, 0.0, 0.3], [0.9, 0.0, 0.9]));

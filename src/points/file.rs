@@ -1,7 +1,8 @@
-//! Points from a text file; each rank reads its share of the bytes.
+//! Points from a text file; each rank reads a part of the bytes.
 //!
-//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space, or has the columns that the
-//! deck or a heading names. Skipped are empty rows, comments, and a heading: a first row without any number.
+//! A row is `x [y [z]] volume block`, separated by commas, semicolons or white space. Otherwise, it has the
+//! columns that the deck or a heading names. Empty rows, comments and a heading are skipped. A heading is a
+//! first row without any number.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -14,7 +15,7 @@ use crate::problem::{PointSource, Problem};
 use super::Point;
 use super::columns::{BYTE_ORDER_MARK, Columns, LONGEST_ROW, Layout, entries, is_comment, layout};
 
-/// The bodies that use a file: their index and the block number they select.
+/// The bodies that use a file: index, and the block number that they select.
 pub fn users(problem: &Problem, file: &Path) -> Vec<(usize, Option<u32>)> {
     problem
         .bodies
@@ -32,13 +33,13 @@ const PIECE: u64 = 1 << 16;
 /// Number of samples of a long file.
 const SAMPLED: u64 = 256;
 
-/// Largest absolute coordinate, m; squared distances stay far from overflow.
+/// Largest absolute coordinate, m; squared distances then cannot overflow.
 const FARTHEST: f64 = 1e30;
 
-/// An invalid row: its line within the share, from 0, and the message.
+/// An invalid row: its line within the rank's part, from 0, and the message.
 type RowError = (u64, String);
 
-/// The parsed share of one rank.
+/// The parsed part of one rank.
 #[derive(Default)]
 struct Share {
     points: Vec<Point>,
@@ -47,7 +48,7 @@ struct Share {
     error: Option<RowError>,
 }
 
-/// The columns that the deck names for a file; equal for all bodies that use it.
+/// The columns that the deck names for a file. They are equal for all bodies that use the file.
 fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
     match &problem.bodies[user].points {
         PointSource::File { columns, .. } => columns.as_ref(),
@@ -55,10 +56,10 @@ fn columns(problem: &Problem, user: usize) -> Option<&Columns> {
     }
 }
 
-/// The layout of a file.
+/// Find the layout of a file.
 ///
 /// # Errors
-/// As [`layout`].
+/// Same as for [`layout`].
 pub fn layout_of(problem: &Problem, path: &Path) -> std::io::Result<Result<Layout>> {
     let given = users(problem, path)
         .first()
@@ -70,7 +71,7 @@ pub fn layout_of(problem: &Problem, path: &Path) -> std::io::Result<Result<Layou
     }))
 }
 
-/// Read this rank's share of a file's points, for all bodies that use it. Collective.
+/// Read this rank's part of a file's points, for all bodies that use the file. Collective.
 ///
 /// # Errors
 /// If the file cannot be read or a row is invalid; the message gives file and line.
@@ -101,10 +102,10 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     agree(comm, checked)
 }
 
-/// Sample the points of a file; return them and the number of points that each represents.
+/// Sample the points of a file. Return them and the number of points that each sample represents.
 ///
-/// Of a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot
-/// be read.
+/// From a long file, evenly spaced pieces are read. Invalid rows are skipped. `None` if the file cannot be
+/// read.
 pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     let users = users(problem, path);
     let layout = layout_of(problem, path).ok()?.ok()?;
@@ -126,7 +127,7 @@ pub fn sample(problem: &Problem, path: &Path) -> Option<(Vec<Point>, f64)> {
     Some((points, pieces as f64 / SAMPLED as f64))
 }
 
-/// Read the rows that start within a rank's share of the file's bytes.
+/// Read the rows that start within a rank's part of the file's bytes.
 fn read_share(
     path: &Path,
     layout: &Layout,
@@ -144,12 +145,12 @@ fn read_share(
     let mut reader = if start == 0 {
         BufReader::new(file)
     } else {
-        // A row that spans `start` belongs to the previous share.
+        // A row that crosses `start` belongs to the previous part.
         file.seek(SeekFrom::Start(start - 1))?;
         let mut reader = BufReader::new(file);
         let skipped = (&mut reader).take(LONGEST_ROW + 1).skip_until(b'\n')? as u64;
         if skipped > LONGEST_ROW {
-            // The share with the start of this row reports the error.
+            // The rank whose part contains the start of this row reports the error.
             return Ok(share);
         }
         at = start - 1 + skipped;
@@ -267,8 +268,8 @@ mod tests {
     use crate::elastic::Isotropic;
     use crate::problem::{Law, Material, Shape};
 
-    /// Read a 2-D file; return the x of its points by id, or the error. Asserts that the result is equal on
-    /// any number of ranks.
+    /// Read a 2-D file. Return the x coordinates of its points by id, or the error. Asserts that the result
+    /// is equal on any number of ranks.
     fn read(name: &str, text: &[u8]) -> std::result::Result<Vec<f64>, String> {
         let folder = std::env::temp_dir().join(format!("fissure-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
@@ -384,7 +385,7 @@ mod tests {
                 vec![5.0],
             ),
             ("\u{feff}z\tx\ty\tvol\n9\t5\t0\t2\n", vec![5.0]),
-            // No column x: the default order.
+            // Without a column x, the default order applies.
             ("a,b,c,d\n5,0,2,1\n", vec![5.0]),
         ] {
             assert_eq!(read("columns", text.as_bytes()), Ok(expected), "{text}");
@@ -414,7 +415,7 @@ mod tests {
         let long = [b"0 0 1 1\n".to_vec(), vec![b'0'; 1 << 17]].concat();
         let expected = "points.csv:2: is longer than 65536 bytes; is this a point file?";
         assert_eq!(read("long", &long), Err(expected.to_owned()));
-        // A row of maximum length; shares start within it.
+        // A row of maximum length; parts start within it.
         let spaces = |count: usize| [&b"0 0 1 1"[..], &vec![b' '; count], b"\n1 0 1 1\n"].concat();
         assert_eq!(read("longest", &spaces(65_528)), Ok(vec![0.0, 1.0]));
         let expected = "points.csv:1: is longer than 65536 bytes; is this a point file?";

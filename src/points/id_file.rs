@@ -1,4 +1,4 @@
-//! Sets of points from a text file of their numbers, as Peridigm and PeriLab have for node sets.
+//! Sets of points from a text file of point numbers, like the node sets of Peridigm and PeriLab.
 
 use std::path::Path;
 
@@ -8,12 +8,14 @@ use crate::error::excerpt;
 /// Maximum length of a file, bytes.
 const LONGEST: u64 = 1 << 32;
 
-/// Read ids from a file: from 0, sorted, without repeats. `first` is the number of the first point in the file.
+/// Read ids from a file. The returned ids start from 0, are sorted, and have no repeats. `first` is the
+/// number of the first point in the numbering of the file.
 ///
-/// Numbers are separated by white space or commas. Skipped are comments and a heading.
+/// Numbers are separated by white space or commas. Comments and a heading are skipped.
 ///
 /// # Errors
-/// If the file cannot be read, has no number, or an entry is none; the message names file and line.
+/// If the file cannot be read, has no number, or has an entry that is not a number. The message names file
+/// and line.
 pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     let name = path.display();
     let unreadable = |error: std::io::Error| format!("cannot read {name}: {error}");

@@ -1,5 +1,5 @@
-//! Points of lattice bodies: one at the centre of each cell, or one at each Gauss point of the cell,
-//! ±√3/3 of half the edge per direction (Emmrich & Weckner 2006, §4).
+//! Points of lattice bodies: one at the centre of each cell, or one at each Gauss point of the cell. Gauss
+//! points are at ±√3/3 of half the edge per direction (Emmrich & Weckner 2006, §4).
 
 use crate::comm::Communicator;
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use crate::problem::{Body, PointSource, Problem, Quadrature, Shape};
 use super::region::{Region, TOLERANCE};
 use super::{MAX_PER_RANK, Point, distance_squared, shape};
 
-/// Binary logarithm of the maximum number of cells per rank, which take some minutes.
+/// Binary logarithm of the maximum number of cells per rank; so many cells need some minutes.
 const LOG2_CELLS_PER_RANK: u32 = 33;
 
 /// Number of cells sampled to estimate the fraction of a region within a body.
@@ -170,7 +170,7 @@ impl<'a> LatticeBody<'a> {
         (0..self.dimension).map(width).product()
     }
 
-    /// Number of the body's points in cells whose centres lie within a distance (m) of a position (m).
+    /// Number of the body's points in cells whose centres are within a distance (m) of a position (m).
     pub fn count_near(&self, position: [f64; 3], distance: f64) -> u64 {
         let range = |k: usize| {
             let all = self.region.range(k);
@@ -197,13 +197,14 @@ impl<'a> LatticeBody<'a> {
         count * self.points_of_cell()
     }
 
-    /// Estimate the volume (m³) of the shape without later bodies from evenly distributed positions.
+    /// Estimate the volume (m³) of the shape without the parts that later bodies occupy, from evenly
+    /// distributed positions.
     pub fn shape_volume(&self) -> f64 {
         let (region, all) = (&self.overlap, self.overlap.total() as f64);
         let samples = (SAMPLES / region.total().max(1) + 1) * region.total().min(SAMPLES);
         let mut within = 0;
         for k in 0..samples {
-            // Of few cells, sample each equally often; of many, sample some once.
+            // With few cells, sample each one equally often. With many cells, sample some of them once.
             let index = if region.total() <= SAMPLES {
                 k % region.total()
             } else {
@@ -227,8 +228,8 @@ fn even_samples(samples: u64, count: u64) -> impl Iterator<Item = u64> {
     (0..if count == 0 { 0 } else { samples }).map(at)
 }
 
-/// Generate this rank's piece of a body's points, with ids of 0. Cells are ordered with x fastest;
-/// each rank takes a consecutive range.
+/// Generate this rank's piece of a body's points, with ids of 0. Cells are ordered with x fastest. Each
+/// rank generates a consecutive range.
 ///
 /// # Errors
 /// If cells are too far from the origin to be numbered.
@@ -265,7 +266,7 @@ pub(super) fn piece(problem: &Problem, body: usize, comm: &dyn Communicator) -> 
 /// Check the number of cells and points of a body against the limits per rank.
 ///
 /// # Errors
-/// Names the body; equal on all ranks.
+/// The message names the body; the error is the same on all ranks.
 pub fn is_feasible(problem: &Problem, body: usize, ranks: usize) -> Result<()> {
     let Some(lattice) = LatticeBody::new(problem, body)? else {
         return Ok(());

@@ -1,7 +1,7 @@
 //! Points from the elements of a mesh.
 //!
-//! Rank 0 reads the file, makes the points and sends each rank an equal share, so it holds the mesh only for that
-//! long. Points are in the order of the elements, on any number of ranks.
+//! Rank 0 reads the file, generates the points and sends each rank an equal part. It stores the mesh only
+//! during this time. The order of points is that of the elements, for any number of ranks.
 
 use std::ops::Range;
 use std::path::Path;
@@ -19,7 +19,7 @@ const NO_BODY: u16 = u16::MAX;
 /// Mark of an element without a point.
 const NO_POINT: u32 = u32::MAX;
 
-/// Most corners of an element.
+/// Maximum number of corners of an element.
 const MOST_CORNERS: usize = 8;
 
 /// Largest distance of an element from the plane of a plane mesh, relative to its size.
@@ -33,7 +33,7 @@ struct User<'a> {
     block_span: &'a Range<usize>,
 }
 
-/// The points of a mesh, and those of them in each of the problem's sets.
+/// The points of a mesh, and the ids of the points in each of the problem's sets.
 pub struct Found {
     /// The points, with ids from 0.
     pub points: Vec<Point>,
@@ -43,7 +43,7 @@ pub struct Found {
     pub names: Vec<String>,
 }
 
-/// Index of the first body that has its points from a mesh.
+/// Index of the first body whose points come from a mesh.
 pub fn first_user(problem: &Problem, path: &Path) -> usize {
     let users = users(problem, path);
     users.first().expect("a body names the mesh").body
@@ -69,10 +69,10 @@ fn users<'a>(problem: &'a Problem, file: &Path) -> Vec<User<'a>> {
     of_file.collect()
 }
 
-/// Read a mesh on rank 0; return this rank's share of its points, for all bodies that use it. Collective.
+/// Read a mesh on rank 0. Return this rank's part of its points, for all bodies that use it. Collective.
 ///
 /// # Errors
-/// If the file cannot be read or an element is invalid; the same on all ranks.
+/// If the file cannot be read or an element is invalid; the error is the same on all ranks.
 pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> Result<Found> {
     let read = if comm.rank() == 0 {
         read(problem, path).map(Some)
@@ -101,7 +101,7 @@ pub(super) fn piece(problem: &Problem, path: &Path, comm: &dyn Communicator) -> 
     })
 }
 
-/// The number of ranges of each set, plus 1, or 0 for a set that is not there; then all ranges.
+/// Serialize sets: first the number of ranges of each set, plus 1, or 0 for a missing set; then all ranges.
 fn pack(sets: &[Option<Runs>]) -> Vec<u8> {
     let ranges = |set: &Option<Runs>| {
         set.as_ref()
@@ -126,7 +126,7 @@ fn unpack(packed: &[u8], sets: usize) -> Vec<Option<Runs>> {
     counts.iter().map(set).collect()
 }
 
-/// Read a mesh and make its points, on one rank.
+/// Read a mesh and generate its points, on one rank.
 ///
 /// # Errors
 /// If the file cannot be read or an element is invalid.
@@ -275,7 +275,7 @@ fn points(
                            element may be inverted";
             return Err(mesh.elements.fault(element, message));
         }
-        // A face or a line may be seen from either side.
+        // A face or a line may have either orientation.
         let size = if dimension < 3 {
             measure.size.abs()
         } else {
@@ -364,7 +364,8 @@ fn are_apart(mesh: &Mesh, points: &[Point], point_of: &[u32]) -> Result<()> {
     Err(mesh.elements.fault(second, message))
 }
 
-/// The first point whose key is that of an earlier one, after that one.
+/// Find the first point whose key equals that of an earlier point. Return both indices, the earlier one
+/// first.
 fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     let mut order: Vec<(Key, u32)> = keys.zip(0..).collect();
     order.sort_unstable();
@@ -373,8 +374,13 @@ fn first_equal<Key: Ord>(keys: impl Iterator<Item = Key>) -> Option<[u32; 2]> {
     Some([pair[0].1, pair[1].1])
 }
 
-/// The ids of the points of a group: of its own elements; of elements that have all corners of one of its faces,
-/// edges or points; of elements that have one of its nodes. `marks` has an entry a node, all false, also afterwards.
+/// The ids of the points of a group. They are the points of
+///
+/// - the elements of the group;
+/// - elements that have all corners of one of its faces, edges or points;
+/// - elements that have one of its nodes.
+///
+/// `marks` has one entry per node; all entries are false before and after the call.
 fn members(
     mesh: &Mesh,
     group: &Members,
@@ -383,7 +389,7 @@ fn members(
     marks: &mut [bool],
 ) -> Runs {
     let mut ids = Vec::new();
-    // Corners of faces, edges and points, the smallest first; it is marked.
+    // Corners of the faces, edges and points, the smallest corner first; this corner is marked.
     let mut faces: Vec<Vec<u32>> = Vec::new();
     match group {
         Members::Nodes(nodes) => faces.extend(nodes.iter().map(|node| vec![node as u32])),

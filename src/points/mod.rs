@@ -1,6 +1,6 @@
 //! Generation of points, and the geometry of shapes, sets and pre-cracks.
 //!
-//! Each rank generates or reads its own piece of the points; no rank holds all of them.
+//! Each rank generates or reads its own piece of the points; no rank stores all of them.
 
 pub mod bins;
 pub mod columns;
@@ -40,7 +40,7 @@ pub struct Point {
     pub position: [f64; 3],
     /// Volume, m³.
     pub volume: f64,
-    /// Index of its block; that of its body before refinement.
+    /// Index of its block; before refinement, the block of its body.
     pub block: u32,
     /// Explicit padding, as `Pod` requires.
     pub unused: u32,
@@ -65,13 +65,13 @@ pub fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     difference.dot(&difference)
 }
 
-/// Generate this rank's piece of the points; return it with the number of points of all ranks.
+/// Generate this rank's piece of the points. Return it with the number of points of all ranks.
 ///
 /// The ids of a piece are contiguous per body. Collective.
 ///
 /// # Errors
-/// A body without points, an unreadable or invalid file, a set with an unknown id or group of a mesh, too many
-/// points on a rank; equal on all ranks.
+/// If a body has no points, a file is unreadable or invalid, a set has an unknown id or mesh group, or a
+/// rank has too many points. The error is the same on all ranks.
 pub fn generate(problem: &Problem, comm: &dyn Communicator) -> Result<(Vec<Point>, u64)> {
     let mut points = Vec::new();
     let mut total = 0;
@@ -137,10 +137,11 @@ fn scatter(points: &mut [Point], jitter: Jitter, spacing: &[f64]) {
     }
 }
 
-/// Give the sets that name groups of meshes their points; `meshes` have the id of their first point.
+/// Resolve the sets that name groups of meshes. `meshes` also contains the id of the first point of each
+/// mesh.
 ///
 /// # Errors
-/// If no mesh has a group of that name, on rank 0, or if the points are not those of an earlier call.
+/// On rank 0, if no mesh has a group of that name, or if the points differ from those of an earlier call.
 fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result<()> {
     for (index, set) in problem.sets.iter().enumerate() {
         let Selector::Mesh(group) = &set.selector else {

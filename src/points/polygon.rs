@@ -1,4 +1,4 @@
-//! Polygons with an index of their edges by strip, so a containment test reads few edges.
+//! Polygons with an index of their edges by strips, so that a containment test reads few edges.
 
 use std::ops::RangeInclusive;
 
@@ -20,14 +20,14 @@ pub struct Polygon {
     axis: usize,
     /// Strips per m.
     strips_per_length: f64,
-    /// Start of each strip in `edges`, then the end of the last.
+    /// Index in `edges` of the first entry of each strip, followed by the number of entries.
     starts: Vec<u32>,
     /// The edges that touch each strip; edge k starts at vertex k.
     edges: Vec<u32>,
 }
 
 impl Polygon {
-    /// The polygon with these vertices in order; the last is joined to the first.
+    /// Create a polygon from its vertices in order. The last vertex is joined to the first.
     pub fn new(vertices: Vec<[f64; 2]>) -> Self {
         let extreme = |k: usize, select: fn(f64, f64) -> f64| {
             let entries = vertices.iter().map(|vertex| vertex[k]);
@@ -51,7 +51,7 @@ impl Polygon {
     /// Build the index along the axis with the smaller total length of edges.
     fn index_edges(&mut self) {
         let count = self.vertices.len();
-        // Total length of all edges over the extent of the polygon, per axis.
+        // For each axis, the total length of all edges divided by the extent of the polygon.
         let turns = [0, 1].map(|k| {
             let all: f64 = (0..count)
                 .map(|edge| {
@@ -59,7 +59,7 @@ impl Polygon {
                     (b[k] - a[k]).abs()
                 })
                 .sum();
-            // max also replaces the NaN of a polygon without extent along an axis.
+            // `max` also replaces the NaN of a polygon without extent along an axis.
             (all / (self.upper[k] - self.lower[k])).max(1.0)
         });
         self.axis = usize::from(turns[1] <= turns[0]);
@@ -90,8 +90,8 @@ impl Polygon {
         (self.lower, self.upper)
     }
 
-    /// Test a position by the even-odd rule. Positions closer to an edge than |tolerance| (m) are inside
-    /// for a positive tolerance and outside for a negative one.
+    /// Test a position by the even-odd rule. Positions that are closer to an edge than |tolerance| (m)
+    /// count as inside if the tolerance is positive, and as outside if it is negative.
     pub fn contains(&self, position: [f64; 2], tolerance: f64) -> bool {
         let (along, across) = (self.axis, 1 - self.axis);
         let at = position[along];
@@ -105,7 +105,7 @@ impl Polygon {
         if near.any(|strip| self.edges_of(strip).iter().any(is_near)) {
             return tolerance > 0.0;
         }
-        // Every edge that crosses the line through the position is in the line's strip.
+        // Every edge that crosses the line through the position is in the strip of this line.
         let crossings = self.edges_of(self.strip(at)).iter().filter(|edge| {
             let [a, b] = self.edge(**edge as usize);
             let spans = (a[along] > at) != (b[along] > at);
@@ -144,7 +144,7 @@ fn distance_to_segment(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
     let [a, b, p] = [a, b, p].map(Vector2::from);
     let (edge, offset) = (b - a, p - a);
     let along = edge.dot(&offset) / edge.dot(&edge);
-    // A repeated vertex makes an edge of zero length: use the distance to the vertex.
+    // A repeated vertex creates an edge of zero length. Its distance is that of the vertex.
     let along = if along.is_nan() {
         0.0
     } else {
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The containment test with all edges.
+    /// The containment test with all edges, without the index.
     fn by_all_edges(vertices: &[[f64; 2]], position: [f64; 2], tolerance: f64) -> bool {
         let edges = || {
             let next = vertices.iter().cycle().skip(1);
@@ -178,8 +178,8 @@ mod tests {
             == 1
     }
 
-    /// Assert that the index gives the result of all edges at positions of a half-unit grid, which includes
-    /// vertices and positions on edges.
+    /// Assert that the index gives the same results as all edges, at positions of a half-unit grid. The
+    /// positions include vertices and positions on edges.
     #[track_caller]
     fn assert_same(vertices: &[[f64; 2]], tolerance: f64) {
         let polygon = Polygon::new(vertices.to_vec());

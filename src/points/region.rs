@@ -1,5 +1,5 @@
-//! The candidate cells of a lattice, whose centres can lie within a shape, ordered with x fastest, then y
-//! and z.
+//! The candidate cells of a lattice: cells whose centres can lie within a shape. They are ordered with x
+//! fastest, then y and z.
 //!
 //! The cells between distant parts of a union are excluded.
 
@@ -15,7 +15,7 @@ pub(super) const TOLERANCE: f64 = 1e-9;
 /// Largest cell number per direction; an `f64` represents it exactly.
 const FARTHEST: f64 = 1e15;
 
-/// Above this number of parts, overlapping parts are merged per direction, to bound the number of spans.
+/// Above this number of parts, overlapping parts are merged per direction, to limit the number of spans.
 const MANY_PARTS: usize = 32;
 
 /// The cells whose centres can lie within a shape.
@@ -33,21 +33,21 @@ struct CellBox {
     end: [i64; 3],
 }
 
-/// A range of layers along one direction, with equal cells in the lower directions.
+/// A range of layers along one direction with the same cells in the lower directions.
 #[derive(Debug)]
 struct Span {
     first: i64,
-    /// Cells per layer.
+    /// Number of cells per layer.
     each: u64,
-    /// Cells of all layers.
+    /// Number of cells of all layers.
     all: u64,
     /// Spans of each layer in the next lower direction.
     within: Vec<Span>,
 }
 
 impl Region {
-    /// The candidate cells of a lattice with a cell corner at `origin` (m), enlarged by `margin` edges;
-    /// `None` if some are too far from the origin to be numbered.
+    /// Find the candidate cells of a lattice with a cell corner at `origin` (m), enlarged by `margin`
+    /// edges. `None` if some are too far from the origin to be numbered.
     pub fn new(
         shape: &Shape,
         spacing: [f64; 3],

@@ -1,23 +1,24 @@
-//! Detection of nodes with coarser nodes within reach.
+//! Detection of nodes that have coarser nodes within a given distance.
 
 use super::grid_index::{GridIndex, around, between};
 use super::grid_index_set::{EDGE, GridIndexSet, PER_WORD, join, split};
 use super::pattern::Pattern;
 
-/// Tests whether nodes of a level have coarser nodes within reach.
+/// Tests whether nodes of a level have coarser nodes within a given distance.
 pub struct AtCoarser<'a> {
     pattern: &'a Pattern,
     level: u32,
     /// The nodes of the level that are not of level 0.
     finer: GridIndexSet,
-    /// The bits of a word on the grid of level 0, for words that touch it.
+    /// The bits of a word that are on the grid of level 0, for words that touch this grid.
     coarsest: u64,
-    /// For each bit of a word: the neighbouring words and their bits within reach.
+    /// For each bit of a word, the neighbouring words and their bits within the distance.
     reach: Vec<Vec<(GridIndex, u64)>>,
 }
 
 impl<'a> AtCoarser<'a> {
-    /// For a level above 0 with the spacing `edges` and the radius `reach`, in the same unit.
+    /// Create the test for a level above 0 with the spacing `edges` and the radius `reach`, in the same
+    /// unit.
     pub fn new(pattern: &'a Pattern, level: u32, edges: [f64; 3], reach: f64) -> Self {
         let dimension = pattern.dimension();
         let mut finer = GridIndexSet::default();
@@ -61,7 +62,8 @@ impl<'a> AtCoarser<'a> {
         }
     }
 
-    /// Test whether some index of the level's grid within reach of `index` has no node but could have one.
+    /// Test whether the level's grid has an index within the distance of `index` at which a node is
+    /// possible but does not exist.
     ///
     /// `body` tests whether a cell belongs to the body.
     pub fn has(&self, body: &impl Fn(GridIndex) -> bool, index: GridIndex) -> bool {
@@ -78,7 +80,7 @@ impl<'a> AtCoarser<'a> {
         })
     }
 
-    /// The bits of a word with nodes, wherever nodes are possible.
+    /// The bits of a word at which nodes exist. Bits at which no node is possible have no meaning.
     fn occupied(&self, word: GridIndex) -> u64 {
         let steps = (1 << self.level).max(EDGE);
         let on_coarsest = word.iter().all(|x| x * EDGE % steps == 0);
@@ -91,7 +93,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// [`AtCoarser::has`], one index at a time.
+    /// Same as [`AtCoarser::has`], one index at a time.
     fn is_at_coarser(
         pattern: &Pattern,
         body: &impl Fn(GridIndex) -> bool,

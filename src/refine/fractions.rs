@@ -5,17 +5,18 @@ use rustc_hash::FxHashMap;
 use super::Grids;
 use super::grid_index::GridIndex;
 
-/// Computes the fraction with which points belong to a set of level-0 points.
+/// Computes the fraction of points that belongs to a set of level-0 points.
 ///
-/// The fraction of a level-0 point is 0 or 1; that of a finer point is the mean of its parents'. A point
-/// takes its volume in equal parts from its parents. So refinement does not change the set's volume.
+/// The fraction of a level-0 point is 0 or 1. The fraction of a finer point is the mean over its parents. A
+/// point takes its volume in equal parts from its parents, so refinement does not change the volume of the
+/// set.
 pub struct SetFractions<'a, 'b> {
     grids: &'b Grids<'a>,
     cache: FxHashMap<(usize, GridIndex), f64>,
 }
 
 impl<'a, 'b> SetFractions<'a, 'b> {
-    /// A calculator for one set.
+    /// Create a calculator for one set.
     pub fn new(grids: &'b Grids<'a>) -> Self {
         Self {
             grids,
@@ -23,8 +24,8 @@ impl<'a, 'b> SetFractions<'a, 'b> {
         }
     }
 
-    /// The fraction of a point, given its body, id and reference position (m); `selected` tests a body and
-    /// a reference position of level 0.
+    /// The fraction of a point, given its body, id and reference position (m). `selected` tests a body and
+    /// a level-0 reference position.
     pub fn of(
         &mut self,
         (body, id, position): (usize, u64, [f64; 3]),

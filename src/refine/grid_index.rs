@@ -13,16 +13,16 @@ pub(super) fn between(low: GridIndex, high: GridIndex) -> impl Iterator<Item = G
     })
 }
 
-/// The parents of an index, in steps of the next coarser level: 1, 2, 4 or 8 for an index half-way
-/// between them in 0, 1, 2 or 3 directions.
+/// The parents of an index, in steps of the next coarser level. An index that lies half-way between coarser
+/// indices in 0, 1, 2 or 3 directions has 1, 2, 4 or 8 parents.
 pub(super) fn parents(index: GridIndex) -> impl Iterator<Item = GridIndex> {
     let low = index.map(|x| x.div_euclid(2));
     let high = index.map(|x| (x + 1).div_euclid(2));
     between(low, high)
 }
 
-/// The indices at half-spacing offsets around an index, in steps of the next finer level: 2 in 1-D, 8 in
-/// 2-D, 26 in 3-D.
+/// The indices at half-spacing offsets around an index, in steps of the next finer level: 2 in 1-D, 8 in 2-D,
+/// 26 in 3-D.
 pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item = GridIndex> {
     let middle = index.map(|x| 2 * x);
     let step = |k: usize| i64::from(k < dimension);
@@ -31,8 +31,8 @@ pub(super) fn around(index: GridIndex, dimension: usize) -> impl Iterator<Item =
     between(low, high).filter(move |other| *other != middle)
 }
 
-/// The index number `number` of a cell of level 0, in steps of a level, x fastest; `origin`, the cell's
-/// centre, has number 0.
+/// The index with a given number in a cell of level 0, in steps of a level, x fastest. `origin`, the centre
+/// of the cell, has number 0.
 pub(super) fn numbered(origin: GridIndex, level: u32, number: u64) -> GridIndex {
     let mask = (1 << level) - 1;
     std::array::from_fn(|k| origin[k] + (number >> (k as u32 * level) & mask) as i64)

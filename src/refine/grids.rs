@@ -41,8 +41,8 @@ fn finest_first([body, level, x, y, z]: &NodeKey) -> NodeKey {
 }
 
 impl<'a> Grids<'a> {
-    /// Unrefined grids, or none for a problem without refinement; `coarsest` is the number of level-0 points
-    /// of all ranks.
+    /// Create unrefined grids; there are none for a problem without refinement. `coarsest` is the number of
+    /// level-0 points of all ranks.
     ///
     /// # Errors
     /// If the cells of a body are too far from the origin to be numbered.
@@ -70,16 +70,16 @@ impl<'a> Grids<'a> {
         })
     }
 
-    /// Number of level-0 points of all ranks, the lower bound of the ids of finer points.
+    /// Number of level-0 points of all ranks; ids of finer points are not below it.
     pub fn coarsest(&self) -> u64 {
         self.coarsest
     }
 
-    /// Refine the regions of the problem permanently, and suppress nodes whose parents a pre-crack
-    /// separates. `coarse` are this rank's level-0 points. Collective.
+    /// Refine the regions of the problem permanently. Suppress nodes whose parents a pre-crack separates.
+    /// `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
-    /// If a region has no point; equal on all ranks.
+    /// If a region has no point; the error is the same on all ranks.
     pub fn refine_regions(&mut self, comm: &dyn Communicator, coarse: &[Point]) -> Result<()> {
         let problem = self.problem;
         let Some(refinement) = &problem.refinement else {
@@ -134,13 +134,13 @@ impl<'a> Grids<'a> {
         changed
     }
 
-    /// Coarsen nodes, except permanent ones and parents of refined nodes.
+    /// Coarsen nodes, except permanent nodes and parents of refined nodes.
     ///
-    /// Return the removed nodes once each, finest level first: body, canonical level and index of the
+    /// Return each removed node once, finest level first: body, canonical level, and index in steps of the
     /// finest level.
     pub fn coarsen(&mut self, keys: &[NodeKey]) -> Vec<NodeKey> {
         let mut coarse: Vec<NodeKey> = keys.to_vec();
-        // Finer nodes first, because they block the coarsening of their parents.
+        // Finer nodes come first, because they block the coarsening of their parents.
         coarse.sort_unstable_by_key(finest_first);
         coarse.retain(|[body, level, x, y, z]| {
             let grid = self.bodies[*body as usize].as_mut();
@@ -167,8 +167,8 @@ impl<'a> Grids<'a> {
         Some([body as i64, i64::from(level), x, y, z])
     }
 
-    /// Suppress the nodes created since `earlier` that have two parents, at positions in m, for which
-    /// `separated` holds.
+    /// Suppress the nodes created since `earlier` whose two parents are separated. `separated` gets the
+    /// positions (m) of both parents.
     pub fn suppress_separated(
         &mut self,
         earlier: &Self,
@@ -193,8 +193,8 @@ impl<'a> Grids<'a> {
         }
     }
 
-    /// The faces between adjacent nodes at suppressed nodes: centre (m), edges of the nodes' cells (m) and
-    /// axis of the normal.
+    /// The faces at suppressed nodes, between adjacent nodes: centre (m), edges of the nodes' cells (m),
+    /// and axis of the normal.
     pub fn suppressed_faces(&self) -> Vec<([f64; 3], [f64; 3], usize)> {
         let mut faces = Vec::new();
         for (body, grid) in self.bodies.iter().enumerate() {
@@ -229,7 +229,7 @@ impl<'a> Grids<'a> {
         state
     }
 
-    /// Refine to a [`Self::state`]. Return true if any node was not refined before.
+    /// Refine to a state returned by [`Self::state`]. Return true if any node was not refined before.
     pub fn refine_to(&mut self, [refined, suppressed]: &[Vec<NodeKey>; 2]) -> bool {
         for [body, level, x, y, z] in suppressed {
             if let Some(Some(grid)) = self.bodies.get_mut(*body as usize) {
@@ -286,8 +286,8 @@ impl<'a> Grids<'a> {
         points.map(unrefined).collect()
     }
 
-    /// The points of the cells of `coarse`, which are level-0 points as without refinement: first these with
-    /// updated volumes and blocks, then the finer points.
+    /// The points in the cells of `coarse`, which are unrefined level-0 points. First come these points
+    /// with updated volumes and blocks, then the finer points.
     pub fn points(&self, mut coarse: Vec<Point>) -> Vec<Point> {
         let bodies = self.bodies.iter().enumerate().map(|(body, grid)| {
             let grid = grid.as_ref()?;
@@ -332,12 +332,12 @@ impl<'a> Grids<'a> {
         coarse
     }
 
-    /// For each level from 1: the detection of coarser nodes within the horizon. Empty if horizons are not
+    /// For each level from 1 on, the test for coarser nodes within the horizon. Empty if horizons are not
     /// enlarged at interfaces.
     fn interfaces<'p>(&self, body: usize, pattern: &'p Pattern) -> Vec<AtCoarser<'p>> {
         let is_enlarged = |refinement: &Refinement| refinement.interface_factor != 1.0;
         if !self.problem.refinement.as_ref().is_some_and(is_enlarged) {
-            // Nodes at interfaces can then share a lattice with the others.
+            // In this case, nodes at interfaces can share a lattice with the other nodes.
             return Vec::new();
         }
         let of_level = |level| {
@@ -373,8 +373,8 @@ impl<'a> Grids<'a> {
         self.problem.block_number(body, node.level, kind)
     }
 
-    /// The cells of a body whose points can differ from those without refinement; `None` for a body without
-    /// a shape.
+    /// The cells of a body whose points can differ from the unrefined points; `None` for a body without a
+    /// shape.
     pub fn changed(&self, body: usize) -> Option<GridIndexSet> {
         let grid = self.bodies.get(body)?.as_ref()?;
         Some(grid.pattern.changed())

@@ -1,4 +1,4 @@
-//! The refined nodes of a body, and all nodes that follow from them.
+//! The refined nodes of a body, and all nodes that result from the refinement.
 
 use std::sync::Arc;
 
@@ -10,19 +10,19 @@ use super::grid_index_set::GridIndexSet;
 /// A node of a refined grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// The level of its block: the spacing of its neighbours.
+    /// The level of its block, which determines the spacing of its neighbours.
     pub level: u32,
-    /// Volume over that of a cell of level 0.
+    /// Ratio of its volume to that of a level-0 cell.
     pub volume_fraction: f64,
-    /// The volume is exactly that of a cell of its level.
+    /// Whether the volume is exactly that of a cell of its level.
     pub whole: bool,
 }
 
 /// The refined nodes of a body, by level, as grid indices of their level.
 ///
-/// - `body` arguments test whether a cell belongs to the body.
+/// - The `body` arguments test whether a cell belongs to the body.
 /// - The parents of a refined node are refined, so neighbouring nodes differ by at most one level.
-/// - Where a crack separates the parents of a new node, the node is suppressed: crack faces act as the
+/// - If a crack separates the parents of a new node, the node is suppressed. Crack faces then act like the
 ///   boundary of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pattern {
@@ -36,7 +36,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// A pattern without refined nodes and with the finest level `finest`.
+    /// Create a pattern without refined nodes; the finest level is `finest`.
     pub fn new(dimension: usize, finest: u32) -> Self {
         Self {
             dimension,
@@ -91,7 +91,8 @@ impl Pattern {
         self.permanent = self.refined.as_slice().into();
     }
 
-    /// The finest level at which an index of the finest level is a refined node, if it is not permanent.
+    /// The finest level at which an index of the finest level is a refined node, and the index in its
+    /// steps. `None` if that node is permanent.
     pub fn refined_at(&self, index: GridIndex) -> Option<(u32, GridIndex)> {
         let finest = self.finest();
         let (coarsest, _) = canonical(finest, index);
@@ -129,7 +130,7 @@ impl Pattern {
         self.is_taken(level, index) && self.is_possible(body, level, index)
     }
 
-    /// Test whether a node exists at an index of a level where one is possible.
+    /// Test whether a node exists at an index of a level at which a node is possible.
     fn is_taken(&self, level: u32, index: GridIndex) -> bool {
         let (level, index) = canonical(level, index);
         level == 0 || {
@@ -138,7 +139,7 @@ impl Pattern {
         }
     }
 
-    /// Test whether a cell, numbered from its centre, can contain nodes beside the one at number 0.
+    /// Test whether a cell, numbered from its centre, can contain nodes other than number 0.
     pub fn touches(&self, cell: GridIndex) -> bool {
         let Some(refined) = self.refined.first() else {
             return false;
@@ -147,7 +148,7 @@ impl Pattern {
         !refined.is_empty() && between(cell, high).any(|corner| refined.contains(&corner))
     }
 
-    /// The cells whose nodes can differ from those without refinement, or that can contain finer nodes.
+    /// The cells whose nodes can differ from the unrefined ones, or that can contain finer nodes.
     pub fn changed(&self) -> GridIndexSet {
         let step = |k: usize| i64::from(k < self.dimension);
         let mut changed = GridIndexSet::default();
@@ -181,7 +182,7 @@ impl Pattern {
                 all += 1;
                 if self.is_taken(coarse + 1, other) {
                     taken += 1;
-                    // Eq. 12: subtract half of the finer volume on an axis, a quarter on a diagonal.
+                    // Eq. 12: subtract half of the finer volume on an axis, and a quarter on a diagonal.
                     volume -= cell(coarse + 1) >> halves(other);
                 }
             }
@@ -274,7 +275,7 @@ mod tests {
 
     #[test]
     fn volumes_at_interfaces_are_those_of_the_paper() {
-        // Volume taken from the node (0, 0), in volumes of the finer level.
+        // Volume removed from the node (0, 0), in volumes of the finer level.
         let taken = |bottom: i64, refined: &[[i64; 2]]| {
             let body = |cell: GridIndex| cell[1] >= bottom;
             let mut pattern = Pattern::new(2, 1);
@@ -286,12 +287,12 @@ mod tests {
         };
         assert_eq!(taken(-9, &[]), 0.0);
         assert_eq!(taken(-9, &[[1, 1]]), 0.25);
-        // At an edge of the body, the node has two finer neighbours, then four.
+        // At an edge of the body, the node first has two finer neighbours, then four.
         assert_eq!(taken(0, &[[1, 0]]), 0.75);
         assert_eq!(taken(-9, &[[1, 0]]), 1.0);
         assert_eq!(taken(0, &[[1, 0], [0, 1]]), 1.5);
         assert_eq!(taken(-9, &[[1, 0], [0, 1]]), 1.75);
-        // With all eight, a cell of the finer level remains.
+        // With all eight finer neighbours, the node has the volume of a cell of the finer level.
         assert_eq!(taken(-9, &[[0, 0]]), 3.0);
     }
 

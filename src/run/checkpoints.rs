@@ -19,15 +19,15 @@ pub struct CheckpointWriter {
     fingerprint: u64,
     /// Number of checkpoints written.
     pub written: u64,
-    /// Time spent on them.
+    /// Time spent on writing them.
     pub spent: Duration,
 }
 
 impl CheckpointWriter {
-    /// For a new run; removes existing checkpoints from the folder. Collective.
+    /// Create the writer for a new run, and remove existing checkpoints from the folder. Collective.
     ///
     /// # Errors
-    /// If one cannot be removed.
+    /// If a checkpoint cannot be removed.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         files: &Files,
@@ -42,7 +42,7 @@ impl CheckpointWriter {
         Ok(Self::after(checkpoints, physics, fingerprint(simulation)))
     }
 
-    /// For a restarted run, with the checkpoints of its folder.
+    /// Create the writer for a restarted run, with the checkpoints of its folder.
     pub fn after(checkpoints: Checkpoints, physics: String, fingerprint: u64) -> Self {
         Self {
             checkpoints,

@@ -8,7 +8,7 @@ use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::solver::observers::Branch;
 
-/// Write `crack_NAME.csv` for each crack, replacing that of an earlier output. Collective.
+/// Write `crack_NAME.csv` for each crack, and replace the file of an earlier output. Collective.
 ///
 /// Each row is a vertex of a branch, with the length of the crack up to it.
 ///
@@ -18,7 +18,7 @@ pub fn write(comm: &dyn Communicator, folder: &Path, cracks: &[(&str, Vec<Branch
     let write_all = || {
         for (name, branches) in cracks {
             let path = folder.join(format!("crack_{name}.csv"));
-            // A rename, so readers never see a partial file.
+            // The file is renamed when complete, so readers never see a partial file.
             let part = folder.join(format!("crack_{name}.csv.part"));
             let written = fs::write(&part, table(branches)).and_then(|()| fs::rename(&part, &path));
             written.map_err(|error| {

@@ -4,7 +4,7 @@ use crate::comm;
 use crate::problem::{Body, StepRule};
 use crate::solver::Simulation;
 
-/// Names and values of the automatic choices; equal on all ranks. Collective.
+/// Names and values of the automatic choices; the same on all ranks. Collective.
 pub fn decisions<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<(&'static str, String)> {
     let problem = simulation.problem;
     let lower = |rule: &dyn std::fmt::Debug| format!("{rule:?}").to_lowercase();
@@ -64,7 +64,7 @@ fn partition<const D: usize>(simulation: &Simulation<'_, D>) -> String {
     )
 }
 
-/// The quadrature of all bodies, or that of each where they differ.
+/// The quadrature of all bodies, or of each body if they differ.
 fn quadrature(bodies: &[Body]) -> String {
     let name = |body: &Body| format!("{:?}", body.quadrature()).to_lowercase();
     if bodies

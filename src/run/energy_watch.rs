@@ -8,17 +8,17 @@ use crate::solver::Simulation;
 use crate::solver::motion::Clock;
 use crate::solver::observers::HistoryRow;
 
-/// Gain over energy input above which a warning is printed. Near the stable step, the energy of the
-/// shortest waves at full steps oscillates by several times its mean.
+/// Ratio of energy gain to energy input above which a warning is printed. Near the stable step, the energy
+/// of the shortest waves at full steps oscillates by several times its mean.
 const WARNING_GAIN: f64 = 1.0;
 
-/// Gain over energy input that ends the run, if found at two consecutive rows.
+/// Ratio of energy gain to energy input that ends the run, if it is exceeded in two consecutive rows.
 const FATAL_GAIN: f64 = 100.0;
 
-/// Gain over energy input that ends the run at once.
+/// Ratio of energy gain to energy input that ends the run at once.
 const CERTAIN_GAIN: f64 = 1e9;
 
-/// Energy added by breaking bonds, over energy input, above which a warning is printed.
+/// Ratio of the energy that breaking bonds added to the energy input, above which a warning is printed.
 const MAX_ADDED_FRACTION: f64 = 0.01;
 
 /// Strain whose energy may be round-off.
@@ -26,23 +26,23 @@ const ROUNDOFF_STRAIN: f64 = 1e-9;
 
 /// Compares the energy of a run with the energy input.
 pub struct EnergyWatch {
-    /// Bound on round-off, J.
+    /// Upper bound of round-off, J.
     floor: f64,
-    /// Maximum energy input so far, initially and by loads and supports, J.
+    /// Maximum energy input so far, J: initial energy, and work of loads and supports.
     input: f64,
-    /// The growth has been reported.
+    /// Whether the growth has been reported.
     warned: bool,
     /// Maximum energy freed by breaking bonds at any row, J.
     max_freed: f64,
-    /// The energy added by breaking bonds has been reported.
+    /// Whether the energy added by breaking bonds has been reported.
     warned_of_breaking: bool,
-    /// The gain was fatal at the last row.
+    /// Whether the gain was fatal in the last row.
     suspected: bool,
     steps: String,
 }
 
 impl EnergyWatch {
-    /// For a run before its first step. Collective.
+    /// Create the watch for a run before its first step. Collective.
     pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (problem, model) = (simulation.problem, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
@@ -63,13 +63,14 @@ impl EnergyWatch {
         }
     }
 
-    /// Check a row of the history; return a warning at the first growth. Equal on all ranks.
+    /// Check a row of the history. Return a warning when the energy grows for the first time; the same on
+    /// all ranks.
     ///
     /// # Errors
     /// If the growth is fatal or the energy is not finite.
     pub fn check(&mut self, row: &HistoryRow, clock: &Clock) -> Result<Option<String>> {
         let (start, work) = (row.first_energy, row.energies.work);
-        // Bonds that added energy when they broke hide part of the gain.
+        // If bonds added energy when they broke, this would hide part of the gain.
         let gain = row.energies.error - row.energies.fracture.min(0.0);
         let input = start.abs() + work.abs() + row.step_energy;
         self.input = self.input.max(input);
@@ -97,8 +98,8 @@ impl EnergyWatch {
         Ok(Some(format!("{} ({})", text(), self.steps)))
     }
 
-    /// Check a row of the history; return a warning the first time that breaking bonds have added energy. A
-    /// correspondence law can store more energy with fewer bonds.
+    /// Check a row of the history. Return a warning when breaking bonds have added energy for the first
+    /// time. A correspondence law can store more energy with fewer bonds.
     pub fn check_breaking(&mut self, row: &HistoryRow, clock: &Clock) -> Option<String> {
         let freed = row.energies.fracture;
         self.max_freed = self.max_freed.max(freed);

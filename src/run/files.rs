@@ -86,7 +86,7 @@ impl Files {
         let begin = Instant::now();
         loop {
             match file.try_lock() {
-                // The ranks of a killed run take a moment to end.
+                // After a kill, the ranks of a run need a moment to exit.
                 Err(fs::TryLockError::WouldBlock) if begin.elapsed() < LOCK_TIMEOUT => {
                     std::thread::sleep(Duration::from_millis(100));
                 }
@@ -96,13 +96,14 @@ impl Files {
                         self.folder.display()
                     )));
                 }
-                // Some network file systems have no locks.
+                // Some network file systems do not support locks.
                 Ok(()) | Err(fs::TryLockError::Error(_)) => return Ok(file),
             }
         }
     }
 
-    /// Rename existing files, so new ones can be created; return the new names. For rank 0.
+    /// Rename an existing result and history, so that new ones can be created. Return the new names. For
+    /// rank 0.
     ///
     /// # Errors
     /// If a file cannot be renamed.

@@ -24,7 +24,7 @@ pub struct ResultLayout<'a> {
 }
 
 impl<'a> ResultLayout<'a> {
-    /// Redistribute the static data of an output by id; `rows` are those in the result. Collective.
+    /// Redistribute the static data by id. `rows` are the rows of the result. Collective.
     pub fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         output: &Output,
@@ -98,7 +98,7 @@ impl<'a> ResultLayout<'a> {
     }
 }
 
-/// Select rows of `values`, which has `width` numbers per row; `None` selects all.
+/// Select rows of `values`, which has `width` numbers per row; `None` selects all rows.
 pub fn select<T: Copy>(rows: &Option<Vec<usize>>, values: Vec<T>, width: usize) -> Vec<T> {
     let Some(rows) = rows else {
         return values;

@@ -81,7 +81,8 @@ pub struct Outcome {
     pub files: Files,
     /// Figures of the run.
     pub summary: Summary,
-    /// Causes of non-collective writes to the result, as HDF5's bits; 0 if all were collective.
+    /// Causes of non-collective writes to the result, as bits defined by HDF5; 0 if all writes were
+    /// collective.
     pub no_collective_cause: u32,
 }
 
@@ -100,7 +101,7 @@ pub fn start_mpi() -> Result<World> {
 /// Threads are those of Rayon's global pool. Without MPI, there must be one rank.
 ///
 /// # Errors
-/// Equal on all ranks:
+/// The error is the same on all ranks. There is an error if:
 ///
 /// - the problem cannot be run;
 /// - a signal stopped the run before the first step;
@@ -121,7 +122,7 @@ pub fn run(
     })
 }
 
-/// As [`run`]; errors name places in the deck by spans.
+/// Same as [`run`], but errors contain positions in the deck as spans.
 fn run_unlocated(
     problem: &Problem,
     comm: &dyn Communicator,
@@ -268,7 +269,7 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // Energy that changing temperatures put in is not counted.
+        // The energy input from changing temperatures is not counted, so such runs are not checked.
         let is_closed = !self.problem.is_quasi_static() && !self.problem.temperature_changes();
         let mut energy = is_closed.then(|| EnergyWatch::new(simulation));
         while !stepper.is_over() {

@@ -52,30 +52,30 @@ pub enum Message {
     Continued {
         /// Number of the checkpoint's step.
         number: u64,
-        /// Its time, s.
+        /// Time of the checkpoint, s.
         time: f64,
-        /// That was the last step.
+        /// Whether that was the last step.
         complete: bool,
     },
     /// The existing result cannot be continued, and a new one is created.
     SetAside {
-        /// Why it cannot be continued.
+        /// Reason why it cannot be continued.
         reason: String,
         /// New names of the existing files.
         renamed: Vec<PathBuf>,
     },
     /// The grid was refined or coarsened.
     Refined {
-        /// Number of the last step before.
+        /// Number of the last step before the refinement.
         number: u64,
-        /// Numbers of added and removed points.
+        /// Number of added and removed points.
         regridded: Regridded,
         /// New number of points.
         points: u64,
     },
     /// The points were rebalanced between the ranks.
     Repartitioned {
-        /// Number of the last step before.
+        /// Number of the last step before the rebalance.
         number: u64,
         /// Imbalance and migrated points.
         repartition: Repartition,

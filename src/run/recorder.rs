@@ -123,7 +123,7 @@ impl<'a> Recorder<'a> {
     /// Update after a rebalancing or refinement. Collective.
     ///
     /// # Errors
-    /// As [`HistoryObserver::new`].
+    /// Same as for [`HistoryObserver::new`].
     pub fn update_points<const D: usize>(&mut self, simulation: &Simulation<'a, D>) -> Result<()> {
         self.order = simulation.id_order();
         for file in &mut self.files {
@@ -205,7 +205,7 @@ impl<'a> Recorder<'a> {
         } else {
             Snapshot::without_energies(simulation)
         };
-        // The time of a shared snapshot counts as output.
+        // If output and row share a snapshot, its time counts as output.
         let rows_start = if output { Instant::now() } else { start };
         if row {
             let row = self.observer.row(simulation, &snapshot);
@@ -247,7 +247,7 @@ impl<'a> Recorder<'a> {
         self.sync()
     }
 
-    /// Close the results; `will_resume` keeps their unused space. Collective.
+    /// Close the result. With `will_resume`, its unused space is retained. Collective.
     ///
     /// # Errors
     /// If the disk is full, or an earlier write failed.

@@ -22,7 +22,8 @@ pub struct Restart {
 /// Restore a simulation from the newest intact checkpoint. Collective.
 ///
 /// # Errors
-/// If there is none, or it is of another deck or other points; the message lists the differences.
+/// If there is no checkpoint, or it belongs to another deck or other points; the message lists the
+/// differences.
 pub fn restart<const D: usize>(
     simulation: &mut Simulation<'_, D>,
     files: &Files,

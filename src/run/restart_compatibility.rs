@@ -7,7 +7,7 @@ use crate::problem::{Interval, Output, Problem};
 /// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
 
-/// Separator between its physics and its history definitions.
+/// Separator between the physics and the history definitions of this description.
 const HISTORY: &str = "# its history\n";
 
 /// Maximum length of a line in a message.
@@ -22,7 +22,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
         return deck.to_owned();
     }
     let mut problem = problem.clone();
-    // Clear all that may change at a restart.
+    // Clear everything that may change at a restart.
     problem.warnings.clear();
     problem.title.clear();
     if let Some(last) = problem.stages.last_mut() {

@@ -59,12 +59,12 @@ impl Signals {
         Ok(signals)
     }
 
-    /// A stop was requested.
+    /// Whether a stop was requested.
     pub(super) fn stop(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// A checkpoint was requested since the last call.
+    /// Whether a checkpoint was requested since the last call.
     pub(super) fn take_request(&self) -> bool {
         self.request.swap(false, Ordering::Relaxed)
     }

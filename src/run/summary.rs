@@ -56,8 +56,8 @@ pub struct Phases {
 }
 
 impl Summary {
-    /// Gather the figures of a run. The durations are those of output, history, checkpoints and the total.
-    /// Collective.
+    /// Collect the figures of a run from all ranks. The durations are those of output, history, checkpoints
+    /// and the total. Collective.
     pub(super) fn new<const D: usize>(
         simulation: &Simulation<'_, D>,
         steps: u64,

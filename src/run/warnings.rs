@@ -10,11 +10,11 @@ use crate::solver::observers::Contact;
 use crate::solver::steps::choose_steps;
 use crate::solver::{Simulation, Stepper};
 
-/// Kinetic over strain energy above which loading is not quasi-static.
+/// Ratio of kinetic to strain energy above which loading is not quasi-static.
 const MAX_INERTIA: f64 = 0.05;
 
-/// Overshoot over fracture energy above which a warning is printed. A branching crack at `safety = 0.8` has 0.4, and a
-/// fracture energy that a quarter of the step changes by 1 %.
+/// Ratio of overshoot to fracture energy above which a warning is printed. A branching crack at `safety =
+/// 0.8` has a ratio of 0.4. With a quarter of the step, its fracture energy changes by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
 /// Initial fraction of a run that is not checked, because its strain energy is small.
@@ -39,7 +39,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Tell that steps become shorter because of contact. The next ones have this size (s).
+    /// Report that contact shortens the steps. The next steps have this size (s).
     pub(super) fn warn_of_stiff_contact(&mut self, clock: &Clock, step: f64) {
         let text = format!(
             "after step {} (t = {:.4e} s) contact is too stiff for a time step of {:.4e} s; the step is now \
@@ -51,8 +51,8 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn of a fixed step that refinement has made unstable; `before` is the stable step before the
-    /// refinement (s). Return the stable step, s.
+    /// Warn of a fixed step that refinement has made unstable. `before` is the stable step before the
+    /// refinement (s). Returns the stable step, s.
     pub(super) fn warn_of_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,
@@ -95,7 +95,7 @@ impl<'a> Job<'a> {
         true
     }
 
-    /// Warn of steps of the equation of motion that are too long for breaking bonds.
+    /// Warn of explicit steps that are too long for breaking bonds.
     pub(super) fn warn_of_overshoot(&mut self, recorder: &Recorder<'a>) {
         let Some(row) = recorder.last_row.as_ref() else {
             return;
@@ -120,7 +120,7 @@ impl<'a> Job<'a> {
         self.observer.message(&Message::Warning(text));
     }
 
-    /// Warn if a restarted run retains another step than a new run to the same end would have.
+    /// Warn if a restarted run continues with a step that differs from that of a new run to the same end.
     pub(super) fn warn_of_resumed_step<const D: usize>(
         &mut self,
         simulation: &Simulation<'a, D>,

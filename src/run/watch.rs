@@ -73,7 +73,8 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// `limit` is a wall-clock limit and its start; the default inside a Slurm job is the job's limit.
+    /// Create the watch. `limit` is a wall-clock limit and its start. The default inside a Slurm job is the
+    /// job's limit.
     pub fn new(
         signals: Option<&'a Signals>,
         rule: CheckpointRule,
@@ -99,7 +100,8 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Count an iteration; return true if a decision is due. `step` is the clock if the iteration ended a step.
+    /// Count an iteration. Returns true if a decision is due. `step` is the clock if the iteration ended a
+    /// step.
     pub fn end_iteration(&mut self, step: Option<&Clock>) -> bool {
         self.iterations += 1;
         self.iterations >= self.next_decision || self.is_scheduled(step)

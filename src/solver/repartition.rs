@@ -14,7 +14,7 @@ use crate::problem::Balance;
 use super::model::Model;
 use super::{Simulation, Stepper};
 
-/// A repartition; the same on all ranks.
+/// Result of a rebalance; the same on all ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repartition {
     /// Bond time of the slowest rank before the rebalance, relative to the mean.
@@ -25,7 +25,7 @@ pub struct Repartition {
     pub seconds: f64,
 }
 
-/// Schedule of the checks of rank loads, and the loads at the last check.
+/// Schedule of the checks of rank loads, and this rank's bond time at the last check.
 pub struct BalanceWatch {
     rule: Option<Balance>,
     seen: Duration,

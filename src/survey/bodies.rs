@@ -24,11 +24,12 @@ pub struct BodyFigures {
     pub mass: f64,
     /// Centre of mass, m.
     pub centre: [f64; 3],
-    /// Volume of the shape without later bodies, m³; `None` for points from a file.
+    /// Volume of the shape without the parts that later bodies occupy, m³; `None` for points from a file.
     pub shape_volume: Option<f64>,
-    /// Mean distance to the nearest neighbour for points from a file, m; 0 without neighbours.
+    /// Mean distance to the nearest neighbour for points from a file, m; 0 if there are no neighbours.
     pub spacing: f64,
-    /// Least, median and largest number of neighbours of a point that does not lie on a lattice, without pre-cracked bonds.
+    /// Smallest, median and largest number of neighbours per point, without pre-cracked bonds, for bodies
+    /// that do not lie on a lattice.
     pub neighbours: Option<[u64; 3]>,
 }
 
@@ -41,7 +42,7 @@ pub fn figures<const D: usize>(
     let nearest = nearest_neighbours(simulation);
     let neighbours = neighbours(simulation);
     let mut counts = vec![0; 2 * problem.bodies.len()];
-    // Volume, its first moments, and the distance to the nearest neighbour.
+    // Sums of volume, first moments of volume, and distance to the nearest neighbour.
     let mut sums = vec![ExactSum::ZERO; 5 * problem.bodies.len()];
     for point in 0..model.owned() {
         let body = problem.body_of(usize::from(model.block[point]));
@@ -98,7 +99,8 @@ fn is_from_file(body: &Body) -> bool {
     !matches!(body.points, PointSource::Lattice { .. })
 }
 
-/// Least, median and largest number of neighbours of the points of each body that do not lie on a lattice. Collective.
+/// Smallest, median and largest number of neighbours per point of each body that does not lie on a lattice.
+/// Collective.
 fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64; 3]>> {
     let (problem, model) = (simulation.problem, &simulation.model);
     let bodies = problem.bodies.iter().enumerate();
@@ -115,7 +117,7 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     let mut largest = [counts.iter().copied().max().unwrap_or(0) as f64];
     simulation.comm.max(&mut largest);
     let width = largest[0] as usize + 1;
-    // Numbers of points by body and number of neighbours.
+    // Number of points by body and number of neighbours.
     let mut histogram = vec![0; scattered.len() * width];
     for (point, count) in counts.iter().enumerate() {
         let body = problem.body_of(usize::from(model.block[point]));
@@ -126,7 +128,7 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     simulation.comm.sum(&mut histogram);
     for (body, row) in scattered.iter().zip(histogram.chunks_exact(width)) {
         let last = row.iter().sum::<u64>().saturating_sub(1);
-        // Number of neighbours of a point by its position among all points sorted by that number.
+        // Number of neighbours of the point at a position in the order of this number.
         let sorted = |position: u64| {
             let mut below = 0;
             let count = row.iter().position(|points| {
@@ -140,7 +142,7 @@ fn neighbours<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<Option<[u64
     found
 }
 
-/// The warning of a body whose points have another volume than its shape or spacing.
+/// Warning for a body whose points have a volume that differs from its shape or spacing.
 fn volume_warning(problem: &Problem, index: usize, figures: &BodyFigures) -> Option<Warning> {
     let body = &problem.bodies[index];
     let message = if let Some(volume) = figures.shape_volume {

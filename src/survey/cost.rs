@@ -12,24 +12,25 @@ use crate::solver::refinement::may_coarsen;
 /// Static bytes per point in a result: position, id, block, volume and VTK cell.
 const FIXED: f64 = 24.0 + 8.0 + 4.0 + 8.0 + (8.0 + 8.0 + 1.0);
 
-/// Bytes of a result or checkpoint beside its points.
+/// Bytes of a result or checkpoint in addition to its points.
 const OVERHEAD: f64 = 64.0 * 1024.0;
 
-/// Bytes of a bond in a list: an eighth of a compact group, and a bit.
+/// Bytes of a bond in a list: an eighth of a compact group, and one bit.
 const LISTED: f64 = 20.0 / 8.0 + 1.0 / 8.0;
 
-/// Bytes of a bond in a lattice: a bit.
+/// Bytes of a bond in a lattice: one bit.
 const ON_LATTICE: f64 = 1.0 / 8.0;
 
-/// Memory of a rank without points, bytes: alone, and under a launcher (with MPI buffers).
+/// Memory of a rank without points, bytes: without and with a launcher (which needs MPI buffers).
 const BASE: [f64; 2] = [34.0 * MEBI, 40.0 * MEBI];
 const MEBI: f64 = 1048576.0;
 
 /// Bytes per point and per list bond at the peak of the set-up, if not measured. The set-up of lattices
-/// takes less memory than the time loop.
+/// needs less memory than the time loop.
 const LIST_SET_UP: [f64; 2] = [265.0, 11.0];
 
-/// Bytes per point of contact, if not measured: measured on a block of 512 000 points that nothing touches.
+/// Bytes per point of contact, if not measured. The value was measured on a block of 512 000 points without
+/// contacts.
 const CONTACT: f64 = 280.0;
 
 /// Vectors of Newton's method, which are allocated in the first iteration.
@@ -55,8 +56,8 @@ pub struct Measured {
 pub struct Cost {
     /// Total memory of all ranks at the peak of the set-up, without ghosts, bytes.
     pub set_up: f64,
-    /// Total memory of all ranks in the time loop at its peak during output, without ghosts, bytes: on one
-    /// rank, and on several.
+    /// Peak memory of all ranks in the time loop, during output, without ghosts, bytes: for one rank, and
+    /// for several ranks.
     pub time_loop: [f64; 2],
     /// The main result, with the history, and the further ones.
     pub results: Vec<ResultCost>,
@@ -86,13 +87,13 @@ struct Counts {
     bonds: f64,
     /// Columns of the history.
     columns: f64,
-    /// Numbers per point in a checkpoint.
+    /// Number of saved values per point in a checkpoint.
     saved: usize,
 }
 
 impl Cost {
-    /// The cost of a run that is set up on one rank, with `columns` history columns and `output_points` in
-    /// each result. Memory is estimated if not measured.
+    /// The cost of a run that is set up on one rank, with `columns` history columns and `output_points`
+    /// points in its result. Memory is estimated if not measured.
     pub fn of<const D: usize>(
         simulation: &Simulation<'_, D>,
         columns: usize,
@@ -169,8 +170,8 @@ fn history_bytes(problem: &Problem, body: &Body) -> f64 {
 /// Estimate the memory during and after the set-up.
 fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measured {
     let dimension = problem.dimension.count();
-    // Position, displacement, velocity, force; energy of broken bonds; palette indices of the volumes of
-    // the point and its family; id, block.
+    // Position, displacement, velocity and force; energy of broken bonds; palette indices of the volumes of
+    // point and family; id and block.
     let state = 4 * 8 * dimension + 8 + 2 + 8 + 2;
     let contact = if problem.has_contact() { CONTACT } else { 0.0 };
     let resident = bonds + (state as f64 + contact) * points;
@@ -182,8 +183,8 @@ fn estimated(problem: &Problem, points: f64, bonds: f64, listed: f64) -> Measure
     Measured { peak, resident }
 }
 
-/// Ghosts over owned points of a rank, for a box with these edges (m) that is divided along its longest
-/// edges.
+/// Number of ghosts per owned point of a rank, for a box with these edges (m) that is divided along its
+/// longest edges.
 pub fn ghost_share(edges: &[f64], horizon: f64, ranks: u32) -> f64 {
     let mut parts = vec![1_u32; edges.len()];
     let (mut remaining, mut factor) = (ranks, 2);
@@ -247,7 +248,7 @@ fn saved_width(problem: &Problem) -> usize {
         0
     };
     let triggered = usize::from(may_coarsen(problem));
-    // Friction, damping, and what they have taken.
+    // Friction, damping, and the energies that they dissipated.
     let contact = if problem.has_contact() {
         2 * dimension + 2
     } else {
@@ -295,7 +296,8 @@ fn cost(problem: &Problem, counts: Counts, clock: &Clock) -> Cost {
     let offsets = counts.points * 24.0;
     let checkpoint =
         CHECKPOINT_COPIES.map(|copies| copies * bonds.max(counts.points * 8.0) + offsets);
-    // At a restart: all columns; then bonds are redistributed, with two more numbers for lengths and offsets.
+    // At a restart, all columns are in memory. Then bonds are redistributed, with two more numbers for
+    // lengths and offsets.
     let restart = counts.points * 8.0 * (counts.saved as f64 + 2.0) + 2.0 * bonds;
     let vectors = if problem.has_newton() {
         let numbers = NEWTON_VECTORS * problem.dimension.count();
@@ -322,7 +324,7 @@ mod tests {
         let share = |ranks| ghost_share(&[4.0, 1.0], 0.1, ranks);
         assert_eq!(share(1), 0.0);
         assert!((share(2) - 0.05).abs() < 1e-12);
-        // Three cuts of the long edge: the inner ranks have ghosts on both sides.
+        // With three cuts of the long edge, the inner ranks have ghosts on both sides.
         assert!((share(4) - 0.2).abs() < 1e-12);
         assert!((ghost_share(&[3.0], 0.1, 3) - 0.2).abs() < 1e-12);
     }

@@ -41,10 +41,10 @@ pub struct DryRun {
     pub seconds: Option<f64>,
 }
 
-/// Dry-run a problem for a number of ranks; `measure` measures the time per step.
+/// Dry-run a problem for a number of ranks. With `measure`, the time per step is measured.
 ///
 /// # Errors
-/// As a run before its first step.
+/// Same as for a run before its first step.
 pub fn dry_run(problem: &Problem, ranks: u32, measure: bool) -> Result<DryRun> {
     match problem.dimension.count() {
         1 => dry_run_in::<1>(problem, ranks, measure),

@@ -14,8 +14,8 @@ use crate::solver::conditions::members;
 /// Names of the components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Ratio between the thickness of a loaded layer and the load's depth above which a warning is printed.
-/// A curved layer of one cell is up to π/2 cells thick.
+/// Ratio of the thickness of a loaded layer to the depth of the load above which a warning is printed. A
+/// curved layer of one cell is up to π/2 cells thick.
 const MAX_THICKNESS_RATIO: f64 = 1.8;
 
 /// Maximum number of points of a layer that is checked.
@@ -58,7 +58,7 @@ fn motion(condition: &Condition) -> Option<&[Option<Expression>]> {
     }
 }
 
-/// Warn of prescribed motions that a later, different one overrides.
+/// Warn of prescribed motions that a later one with different values overrides.
 fn twice_prescribed<const D: usize>(
     simulation: &Simulation<'_, D>,
     points: &[Vec<u32>],
@@ -204,8 +204,8 @@ fn edges(problem: &Problem, body: usize, default: f64) -> [f64; 3] {
     }
 }
 
-/// Thickness of a layer, m: the mean length of rows of adjacent cells in the direction of shortest rows.
-/// Of several bodies, the thickness farthest from `depth` (m); `None` without cells.
+/// Thickness of a layer, m: the mean length of rows of adjacent cells in the direction with the shortest
+/// rows. For several bodies, it is the thickness farthest from `depth` (m). `None` if there are no cells.
 fn thickness<const D: usize>(
     problem: &Problem,
     cells: &HashSet<[i64; 4]>,

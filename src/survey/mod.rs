@@ -1,5 +1,5 @@
 //! Checks before the first step: figures of bodies, cracks, probes and sets, and warnings of likely
-//! mistakes. `check` and the start of a run print the same.
+//! mistakes. `check` and the start of a run print the same figures and warnings.
 
 mod bodies;
 mod cost;
@@ -29,8 +29,8 @@ use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
 use crate::solver::observers::{Nearest, nearest};
 
-/// Number of intact bonds, by dimension, below which a point is weakly bonded: half of a family at a
-/// horizon of two spacings.
+/// Number of intact bonds, by dimension, below which a point is weakly bonded. The numbers are half of a
+/// family at a horizon of two spacings.
 const FEW_NEIGHBOURS: [f64; 3] = [2.0, 6.0, 16.0];
 
 /// Common horizons, in spacings.
@@ -64,7 +64,7 @@ pub struct Survey {
     pub probes: Vec<Nearest>,
     /// Number of points of each set.
     pub sets: Vec<u64>,
-    /// Warnings of likely mistakes, most with a place in the deck.
+    /// Warnings of likely mistakes, most of them with a position in the deck.
     pub warnings: Vec<Warning>,
 }
 
@@ -208,8 +208,8 @@ fn safeties(problem: &Problem) -> Vec<f64> {
     moving.filter_map(safety).collect()
 }
 
-/// Stiffness of a family with bonds stretched by s, over that assumed by the stable step. A stretched bond
-/// resists rotation with s/(1 + s) of its stiffness.
+/// Ratio of the stiffness of a family with bonds stretched by s to the stiffness that the stable step
+/// assumes. A stretched bond resists rotation with s/(1 + s) of its stiffness.
 fn stretched_stiffness(stretch: f64, dimension: usize) -> f64 {
     1.0 + (dimension as f64 - 1.0) * stretch / (1.0 + stretch)
 }
@@ -283,7 +283,7 @@ fn probes<const D: usize>(
     problem.history.probes.iter().map(follow).collect()
 }
 
-/// Warn of points of different bodies at the same position, between which contact cannot act.
+/// Warn of points of different bodies at the same position. Contact cannot act between them.
 fn coincident<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let (problem, model) = (simulation.problem, &simulation.model);
     let contact = simulation.contact.as_ref();

@@ -6,7 +6,7 @@ use crate::points::{LatticeBody, file, mesh, set};
 use crate::problem::{PointSource, Problem, Selector};
 use crate::solver::assign::cutoffs;
 
-/// Maximum number of cells read to count neighbours, over all samples.
+/// Maximum number of cells that are read to count neighbours, over all samples.
 const MAX_CELLS_READ: f64 = 4e6;
 
 /// Maximum number of sampled points per body.
@@ -19,7 +19,8 @@ pub struct Size {
     pub cells: f64,
     /// Number of points of each body.
     pub points: Vec<f64>,
-    /// Number of neighbours of all points of each body; their sum counts each bond twice.
+    /// Number of neighbours summed over all points of each body. The total over all bodies counts each bond
+    /// twice.
     pub bonds: Vec<f64>,
     /// Number of points in each result, the main one first.
     pub output_points: Vec<f64>,
@@ -72,7 +73,7 @@ pub fn size(problem: &Problem) -> Result<Size> {
                 (family_volume(problem, index) / volume).min(all) - 1.0
             }
         };
-        // max also replaces the NaN of a body without points.
+        // `max` also replaces the NaN of a body without points.
         size.bonds.push(size.points[index] * neighbours.max(0.0));
     }
     let outputs = problem.outputs().enumerate();

@@ -34,17 +34,17 @@ pub struct Speed {
     pub times: Times,
     /// Messages of the steps.
     pub sent: Traffic,
-    /// Messages of as many halo exchanges of displacements without overlap.
+    /// Messages of the same number of halo exchanges without overlap.
     pub sent_without_overlap: Traffic,
     /// Memory after the steps.
     pub memory: Resident,
 }
 
-/// Measure `steps` steps after `warm_up` steps, in which caches, page tables and clock rates settle.
+/// Measure `steps` steps after `warm_up` steps, during which caches, page tables and clock rates settle.
 /// Collective.
 ///
 /// # Errors
-/// As a run; or if the motion of a point is not finite.
+/// Same as for a run; also if the motion of a point is not finite.
 pub fn speed(
     problem: &Problem,
     comm: &dyn Communicator,

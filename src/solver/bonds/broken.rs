@@ -195,7 +195,7 @@ impl<const D: usize> Forces<D> {
         changed
     }
 
-    /// Recompute the forces on some points, and record the change.
+    /// Recompute the forces on some points, and record the force densities that they lose.
     fn find_forces(&mut self, points: Range<usize>, force: &mut [Vec<f64>; D]) {
         let before = force
             .each_ref()

@@ -25,7 +25,7 @@ use super::{Forces, Pass};
 const CHUNK: usize = 4096;
 
 /// Interior points per thread between two calls that advance the messages; a few tenths of a millisecond of
-/// work in 3D.
+/// work in 3-D.
 const PIECE: usize = 4096;
 
 /// Maximum number of columns of [`Forces::changing_columns`].
@@ -51,7 +51,7 @@ pub(super) enum HaloContent {
 pub struct ForceTimes {
     /// Sums over bonds.
     pub bonds: Duration,
-    /// Packing, waiting for and unpacking messages.
+    /// Packing and unpacking of messages, and waiting for them.
     pub halo: Duration,
 }
 

@@ -36,9 +36,14 @@ impl BondUpdate {
     }
 }
 
-/// Sum the forces of the intact bonds: force density by component, N/m³. Bonds that break in this sweep are
-/// excluded. For the breaking bonds, it sums their number, the energy that they release at the point (J),
-/// the part of this energy above the criterion (J), and their forces (N/m³).
+/// Kernel that sums the forces of the intact bonds: force density by component, N/m³.
+///
+/// Bonds that break in this sweep are excluded. For these bonds, it sums
+///
+/// - their number;
+/// - the energy that they release at the point, J;
+/// - the part of this energy above the criterion, J;
+/// - their forces, N/m³.
 #[derive(Clone, Copy)]
 pub struct Force<L> {
     /// Laws of points i and j.

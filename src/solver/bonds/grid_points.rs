@@ -19,7 +19,7 @@ use super::list_points::load_history;
 pub struct GridValues<const D: usize> {
     grid: Arc<Grid>,
     displacement: [Column; D],
-    /// Empty in runs without temperatures.
+    /// Thermal stretches by slot; empty in runs without temperatures.
     thermal_stretch: Column,
     /// The point numbers that bonds read.
     numbers: Vec<Column>,
@@ -227,7 +227,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// As for [`Self::numbers`].
+    /// Same as for [`Self::numbers`].
     #[inline(always)]
     unsafe fn thermal_stretch(&self, place: usize) -> Lanes {
         match self.thermal_stretch {
@@ -238,7 +238,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// As for [`Self::numbers`].
+    /// Same as for [`Self::numbers`].
     #[inline(always)]
     unsafe fn far_numbers(&self, place: usize) -> K::Point {
         if K::READS_FAR {
@@ -250,7 +250,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// As for [`Self::numbers`].
+    /// Same as for [`Self::numbers`].
     #[inline(always)]
     unsafe fn limits<const FAST_PATH: bool>(&self, place: usize) -> Limits {
         if FAST_PATH {
@@ -261,7 +261,7 @@ impl<'a, K: Kernel<D>, const D: usize> GridPoints<'a, K, D> {
     }
 
     /// # Safety
-    /// As for [`Self::numbers`].
+    /// Same as for [`Self::numbers`].
     #[inline(always)]
     unsafe fn rotations<const FAST_PATH: bool>(&self, place: usize) -> K::Rotation {
         if FAST_PATH {

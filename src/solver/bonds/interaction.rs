@@ -26,7 +26,7 @@ pub struct BlockLaws {
     pub damage: Option<DamageLaw>,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
-    /// Data that bonds to other bodies read, if such a pair of bodies has its own damage law.
+    /// Data that bonds to other bodies read, for pairs of bodies with their own damage law.
     pub pairs: PairReads,
 }
 

@@ -41,7 +41,7 @@ pub struct LimitColumns {
     pub thresholds: Column,
     /// Truncation factors, with the same index.
     pub truncation_factors: Column,
-    /// Rotations by component; in 2D only q_z and q₀ are stored.
+    /// Rotations by component; in 2-D only q_z and q₀ are stored.
     pub rotations: [Column; 4],
 }
 
@@ -174,7 +174,7 @@ impl<'a, R: LaneTuple> ReadRotations<'a, R> {
     }
 }
 
-/// Index of the first stored component of rotations: in 2D, q_x and q_y are 0 and not stored.
+/// Index of the first stored component of rotations: in 2-D, q_x and q_y are 0 and not stored.
 const fn first_component<const D: usize>() -> usize {
     if D < 3 { 2 } else { 0 }
 }

@@ -20,7 +20,7 @@ use super::sweep::{PointData, sweep, sweep_from};
 pub struct Stored {
     /// Strain energy density W, J/m³; empty if energies were not requested.
     pub energy: Vec<f64>,
-    /// Volume of the intact neighbours in the point's own family, m³.
+    /// Volume of the intact neighbours within the horizon of the point, m³.
     pub volume: Vec<f64>,
     /// Sum of V_j times the fraction of its stiffness that bond ij has lost, m³; empty if no law softens or
     /// if it was not requested.

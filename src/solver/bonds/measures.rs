@@ -65,8 +65,8 @@ impl<const D: usize> Kernel<D> for Stored {
     }
 }
 
-/// Sum the volume of the intact neighbours within the horizon of point i (m³), and count the intact bonds
-/// as in [`Stored`].
+/// Kernel that sums the volume of the intact neighbours within the horizon of point i (m³), and counts the
+/// intact bonds as in [`Stored`].
 #[derive(Clone, Copy)]
 pub struct IntactFamilies;
 
@@ -91,8 +91,8 @@ impl<const D: usize> Kernel<D> for IntactFamilies {
     }
 }
 
-/// Sum over the intact neighbours within the horizon of point i: V_j times the fraction of its stiffness
-/// that bond ij has lost, m³.
+/// Kernel that sums over the intact neighbours within the horizon of point i: V_j times the fraction of its
+/// stiffness that bond ij has lost, m³.
 #[derive(Clone, Copy)]
 pub struct Softened {
     /// The law of point i.
@@ -133,8 +133,8 @@ fn add_tensor<S: Simd, const D: usize>(
     }
 }
 
-/// Sum D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy, zz, xy, yz,
-/// xz. C is the sum of [`Law::stiffness`] of both ends.
+/// Kernel that sums D = Σ V C n⊗n over the intact bonds in the reference configuration (N/m⁴), as xx, yy,
+/// zz, xy, yz, xz. C is the sum of [`Law::stiffness`] of both ends.
 #[derive(Clone, Copy)]
 pub struct Stiffness {
     /// Laws of points i and j.
@@ -183,7 +183,7 @@ impl<const D: usize> Kernel<D> for Stiffness {
     }
 }
 
-/// Sum the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
+/// Kernel that sums the stress Σ T⊗Y Ṽ over the intact bonds (Pa) as xx, yy, zz, xy, yz, xz.
 ///
 /// Silling & Lehoucq 2008 give the first Piola–Kirchhoff stress of a homogeneous motion as Σ T⊗ξ Ṽ.
 /// Multiplied by Fᵀ, it is this sum: the Kirchhoff stress, which is symmetric and rotates with the body.
@@ -216,7 +216,7 @@ impl<const D: usize> Kernel<D> for Stress {
     }
 }
 
-/// Sum of [`Law::bond_stress_across`] over the intact bonds, Pa.
+/// Kernel that sums [`Law::bond_stress_across`] over the intact bonds, Pa.
 #[derive(Clone, Copy)]
 pub struct StressAcross {
     /// Law of point i.
@@ -244,8 +244,8 @@ impl<const D: usize> Kernel<D> for StressAcross {
     }
 }
 
-/// Sum the tensors of the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ, diagonal entries first,
-/// and Σ ω η⊗ξ Ṽ row by row.
+/// Kernel that sums the tensors of the intact bonds of a point, m⁵: the shape tensor Σ ω ξ⊗ξ Ṽ, diagonal
+/// entries first, and Σ ω η⊗ξ Ṽ row by row.
 #[derive(Clone, Copy)]
 pub struct FamilyTensors {
     /// Exclude thermal stretches.
@@ -275,8 +275,8 @@ impl<const D: usize> Kernel<D> for FamilyTensors {
     }
 }
 
-/// Sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of the whole family
-/// (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
+/// Kernel with the sums for the dilatation θ = (d/m) Σ ω|ξ|εṼ: first the weighted volume m = Σ ω|ξ|²Ṽ of
+/// the whole family (m⁵), then Σ ω|ξ|εṼ over the intact bonds (m⁵).
 #[derive(Clone, Copy)]
 pub struct Dilatation {
     /// Whether ε is linear in η.

@@ -249,7 +249,7 @@ impl<const D: usize> Forces<D> {
         (self.numbers).set_constants(points, model, &self.blocks, &sums, truncation_factors);
     }
 
-    /// Set the thresholds of the points that do not depend on a stretch. Collective.
+    /// Set the thresholds of the points, if no threshold follows the smallest stretch. Collective.
     fn set_thresholds(&mut self, comm: &dyn Communicator, model: &Model<D>) {
         let Self {
             limits,

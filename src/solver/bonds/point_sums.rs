@@ -16,7 +16,7 @@ const fn extension_only(linear: bool) -> Wanted {
     }
 }
 
-/// Sum pass `N` of a law over the intact bonds.
+/// Kernel of point sum `N` of a law over the intact bonds.
 #[derive(Clone, Copy)]
 pub struct PassSum<L, const N: usize> {
     /// The law of point i.
@@ -68,9 +68,9 @@ impl<L: Law<D>, const N: usize, const D: usize> Kernel<D> for PassSum<L, N> {
     }
 }
 
-/// Sum the data for a point's constants over the undeformed family. The sum contains intact bonds only,
-/// without those that pre-cracks cut. A law with a shape tensor compares the intact family with the whole
-/// family, so for such laws the cut bonds count, too.
+/// Kernel that sums the data for a point's constants over the undeformed family. The sum contains intact
+/// bonds only, without those that pre-cracks cut. A law with a shape tensor compares the intact family with
+/// the whole family, so for such laws the cut bonds count, too.
 #[derive(Clone, Copy)]
 pub struct FamilySum<const D: usize> {
     /// The law of point i.
@@ -117,7 +117,7 @@ impl<const D: usize> Kernel<D> for FamilySum<D> {
     }
 }
 
-/// The smallest stretch s_min of the intact bonds within the horizon of each point, as x of
+/// Kernel of the smallest stretch s_min of the intact bonds within the horizon of each point, as x of
 /// [`crate::material::bond`]; +∞ if there is none.
 #[derive(Clone, Copy)]
 pub struct SmallestStretch;

@@ -38,7 +38,7 @@ pub struct PointData<'a, const D: usize> {
     pub limits: &'a LimitColumns,
     /// Point data for lattices (numbers, limits and geometry), by grid.
     pub grids: &'a [GridValues<D>],
-    /// Points have thermal stretches.
+    /// Whether points have thermal stretches.
     pub is_thermal: bool,
     /// Instruction set.
     pub instructions: Instructions,
@@ -367,7 +367,7 @@ impl FastPathGate {
         }
     }
 
-    /// Sums over the bonds of a vector and the bits of those that break.
+    /// Sum over the bonds of a vector. Return the sums and the bits of the breaking bonds.
     #[inline(always)]
     fn sum<K: Kernel<D>, S: Simd, const D: usize>(
         &mut self,
@@ -395,7 +395,7 @@ impl FastPathGate {
 struct Known<N>(FxHashMap<Box<[u8]>, N>);
 
 impl<N: LaneTuple> Known<N> {
-    /// Stores the sums of a vector.
+    /// Store the sums of a vector.
     fn insert(&mut self, vector: &VectorBonds<'_>, sums: N) {
         if self.0.len() == CACHE_CAPACITY {
             self.0.clear();
@@ -430,7 +430,7 @@ unsafe fn fast_vector<K: Kernel<D>, S: Simd, const D: usize>(
     Some(sums)
 }
 
-/// Sums over all bonds of a vector, with the bits of those that break.
+/// Sums over all bonds of a vector, with the bits of the breaking bonds.
 struct WholeVector<'t, 'v, 'p, K: Kernel<D>, const D: usize> {
     kernel: K,
     /// Points of the grid of the vector.
@@ -600,7 +600,7 @@ impl<'b, K: Kernel<D>, const D: usize> Runner<Vectors<'b>> for OverVectors<'_, K
         mut results: Results<'_, K, D>,
     ) -> Vec<BrokenSums> {
         let mut broken_sums = Vec::new();
-        // Copies, which the loop can keep in registers.
+        // The loop can keep these copies in registers.
         let (kernel, points, whole) = (*self.kernel, self.points, &self.whole);
         let mut gate = FastPathGate::new(&kernel, &points);
         let is_undeformed = kernel.is_undeformed();

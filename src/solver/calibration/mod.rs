@@ -9,7 +9,7 @@ use crate::problem::{Calibration, DamageRule, Problem};
 
 pub use separation::separation_energy_ratio;
 
-/// The problem with the separation energy ratios of all bodies with `calibration = "opening"`.
+/// Return the problem with the separation energy ratios of all bodies with `calibration = "opening"`.
 ///
 /// # Errors
 /// If the ratio of a body cannot be computed.

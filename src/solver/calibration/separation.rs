@@ -9,7 +9,7 @@ use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, cutoffs, laws_are_possible};
 use crate::solver::bonds::BondUpdate;
 
-/// Maximum number of bonds of a block, which takes some seconds.
+/// Maximum number of bonds of a block; such a block needs some seconds.
 const MAX_BONDS: f64 = 1e6;
 
 /// Relative growth of the separation per step. It limits how late bonds break. The overshoot energy is
@@ -31,7 +31,7 @@ const CHECK_INTERVAL: u32 = 20;
 /// Compute the separation energy per area over the fracture energy. The upper half moves at an angle (rad)
 /// to the normal of the plane.
 ///
-/// The normal is y (in 1D, x); the tangential part of the motion is along x. The overshoot energy of bonds
+/// The normal is y (in 1-D, x); the tangential part of the motion is along x. The overshoot energy of bonds
 /// at breaking is subtracted.
 ///
 /// The result is `None` for a body without a fracture energy, for points from a file, for families that are
@@ -147,7 +147,7 @@ impl Separation {
     }
 }
 
-/// Test that no intact bond of the middle points crosses the plane.
+/// Whether no intact bond of the middle points crosses the plane.
 fn is_separated<const D: usize>(
     simulation: &Simulation<'_, D>,
     middle: &[bool],

@@ -11,7 +11,7 @@ use crate::solver::model::Model;
 
 use super::members;
 
-/// Subjects of messages on vectors.
+/// Subjects of the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
 /// Check that every condition is finite at all of its points at a time (s), and every initial value at the

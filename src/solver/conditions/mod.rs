@@ -46,17 +46,18 @@ pub struct OnPart<const D: usize> {
 
 /// Work of loads and supports from a stored state 0 to the present state.
 ///
-/// f is the force density of a load or a reaction, V the volume of a point. A load step in which bonds break has a first
-/// equilibrium 1 and a last equilibrium 2. From 0 to 1 the work is ½ (f₀ + f₁)·(u₁ − u₀) V. From 1 to 2 supports do not
-/// move, and loads keep f₁. Only u₀ is stored, so the work of loads is written as
+/// f is the force density of a load or a reaction, and V is the volume of a point. A load step in which bonds
+/// break has a first equilibrium 1 and a last equilibrium 2. From 0 to 1, the work is ½ (f₀ + f₁)·(u₁ − u₀) V.
+/// From 1 to 2, supports do not move, and the force density of loads remains f₁. Only u₀ is stored, so the
+/// work of loads is computed as
 /// ½ (f₀ − f₁)·(u₁ − u₀) V + f₁·(u₂ − u₀) V.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
     /// ½ (f₀ + f)·(u − u₀) V.
     Trapezoid,
-    /// At the first of several equilibria: ½ (f₀ + f₁)·(u₁ − u₀) V of supports, the first term of loads.
+    /// At the first of several equilibria: for supports, ½ (f₀ + f₁)·(u₁ − u₀) V; for loads, the first term.
     FirstEquilibrium,
-    /// At the last of several equilibria: the second term of loads.
+    /// At the last of several equilibria: for loads, the second term; for supports, nothing.
     LastEquilibrium,
 }
 
@@ -74,7 +75,7 @@ pub struct All<'a, const D: usize> {
     temperatures: &'a Temperatures,
 }
 
-/// Local indices of the owned points of a set, by index.
+/// Local indices of the owned points of a set, which is given by its index.
 pub fn members<const D: usize>(problem: &Problem, model: &Model<D>, set: usize) -> Vec<u32> {
     let chosen = |point: usize| {
         let body = problem.body_of(usize::from(model.block[point]));

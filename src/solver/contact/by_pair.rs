@@ -5,7 +5,7 @@ use crate::comm::sum::{ExactSum, reduce};
 use crate::problem::Problem;
 use crate::solver::Simulation;
 
-/// Contact at one moment; the same on all ranks.
+/// Contact at one time; the same on all ranks.
 #[derive(Debug, Clone, Default)]
 pub struct ContactNow {
     /// Potential energy, J.

@@ -241,7 +241,7 @@ impl Response {
     }
 
     /// Contact force for an overlap (m) and a stiffness (N/m). `normal` points from the point towards the
-    /// other object, `velocity` (m/s) is the velocity of the point relative to it, and `mass` is the
+    /// other object. `velocity` (m/s) is the velocity of the point relative to this object. `mass` is the
     /// reduced mass, kg.
     pub fn touch<const D: usize>(
         &self,

@@ -25,12 +25,12 @@ pub(super) struct StepDemand {
     calm: u64,
 }
 
-/// The contact state that is not in the fields of the points; the same on all ranks.
+/// The contact state that is not in the fields of the points; the same on all ranks, except `at_rigid`.
 #[derive(Debug, Clone, Default)]
 pub struct ContactState {
     rigid: Vec<RigidState>,
     demand: StepDemand,
-    /// Owned points that touch a rigid body.
+    /// Owned points of this rank that touch a rigid body.
     at_rigid: Vec<u32>,
 }
 

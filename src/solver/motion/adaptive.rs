@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! N_b > most broken, Δt > smallest        undo the step, Δt ← Δt · reduce
-//! N_b ≤ stable broken, so many steps      Δt ← Δt · raise, up to the largest
+//! N_b ≤ stable broken in `steps` steps    Δt ← Δt · raise, up to the largest
 //! ```
 //!
 //! N_b is the largest number of bonds of a point that break in a step, over all ranks. So all ranks make the

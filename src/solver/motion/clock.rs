@@ -99,7 +99,7 @@ impl Clock {
         self.end = end;
     }
 
-    /// Number of the step that reaches the end, if the step keeps its size.
+    /// Number of the step that reaches the end, if the step does not change.
     pub fn last(&self) -> u64 {
         let (time, number) = self.since;
         number + steps_to(self.end - time, self.step) as u64

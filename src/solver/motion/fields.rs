@@ -102,12 +102,12 @@ macro_rules! fields {
         }
 
         impl<const D: usize> Fields<D> {
-            /// Every field with its components.
+            /// Iterate over all fields with their components.
             pub fn each(&self) -> impl Iterator<Item = (Description, &[Vec<f64>])> {
                 [$(($description, self.$name.columns()),)+].into_iter()
             }
 
-            /// Every field with its components.
+            /// Iterate over all fields with their components.
             pub fn each_mut(&mut self) -> impl Iterator<Item = (Description, &mut [Vec<f64>])> {
                 [$(($description, self.$name.columns_mut()),)+].into_iter()
             }
@@ -592,9 +592,9 @@ impl<const D: usize> Fields<D> {
         }
     }
 
-    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s), and book the
-    /// energy that they dissipated in this step by the trapezoidal rule. Velocities are those in the middle
-    /// of the step.
+    /// Record friction and contact damping (N/m³) on an owned point at the end of a step (s). Book the
+    /// energy that they dissipated in this step, by the trapezoidal rule. Velocities are those in the
+    /// middle of the step.
     pub fn book_dissipation(
         &mut self,
         point: usize,

@@ -47,8 +47,8 @@ pub struct LoadStep {
     pub residual: f64,
     /// Damping c of a relaxation; NaN at rest.
     pub(super) damping: f64,
-    /// Largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N. It keeps the tolerance of a body that is
-    /// unloaded or broken the same as under load.
+    /// Largest ‖loads‖ + ‖reactions‖ of an equilibrium so far, N. The tolerance is relative to it, so it
+    /// does not shrink when a body is unloaded or breaks.
     pub(super) scale: f64,
     /// Whether bonds have broken at an equilibrium of this load step.
     pub(super) has_broken: bool,

@@ -4,11 +4,11 @@
 //!
 //! ```text
 //! solve K x = f to ‖f − K x‖ ≤ η ‖f‖       K v = −(f(u + ε v) − f(u))/ε, one force evaluation each
-//! u ← u + s x                              s = 1, or where x·f(u + s x) is small
-//! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: by how much the forces are not linear
+//! u ← u + s x                              s = 1, or a value at which x·f(u + s x) is small
+//! η ← | ‖f(u + x)‖ − ‖f − K x‖ | / ‖f‖     at most 0.1: nonlinearity of the forces
 //! ```
 //!
-//! (Eisenstat & Walker 1996 for η; Knoll & Keyes 2004 for the differences.) f includes the reactions, so it
+//! η follows Eisenstat & Walker 1996, the differences Knoll & Keyes 2004. f includes the reactions, so it
 //! is 0 for supported components. All differences use the history of the last equilibrium with its trial
 //! update, so K is the consistent tangent at points that yield. ε is limited so that no point moves by more
 //! than `SHIFT` horizons. The relative error of the difference is then of the order of `SHIFT` for bonds
@@ -19,7 +19,7 @@
 //! preconditioner is a sum of two parts: the diagonal, for short waves, and a coarse grid
 //! (`coarse_grid.rs`), for long waves.
 //!
-//! If the size of a load step differs from the last one, or if bonds broke in the last one, the first
+//! If a load step differs in size from the last one, or if bonds broke in the last one, the first
 //! iteration linearizes about the last equilibrium. The prescribed displacements are then part of the
 //! motion. Otherwise, the points first repeat their motion of the last load step.
 //!

@@ -17,7 +17,7 @@ pub struct GlobalState {
     pub energies: Energies,
     /// Momentum by component, kg m/s.
     pub momentum: Vec<f64>,
-    /// Angular momentum about the origin, kg m²/s: z in plane problems; x, y and z in 3D. Empty if the
+    /// Angular momentum about the origin, kg m²/s: z in plane problems; x, y and z in 3-D. Empty if the
     /// history does not contain it.
     pub angular_momentum: Vec<f64>,
     /// Number of bonds broken since the start.

@@ -67,9 +67,9 @@ pub struct Energies {
     pub work: f64,
     /// Energy dissipated by viscous damping, bonds that yield, friction and contact damping.
     pub dissipated: f64,
-    /// Error of the energy balance: kinetic (including rigid bodies) + strain + contact + fracture +
-    /// dissipated − work, minus its value at the start and minus the energy that refinements and changes of
-    /// the density scale have added. It is 0 for an exact integrator.
+    /// Error of the energy balance; 0 for an exact integrator. The balance is kinetic (including rigid
+    /// bodies) + strain + contact + fracture + dissipated − work. The error is its change since the start,
+    /// minus the energy that refinements and changes of the density scale have added.
     pub error: f64,
 }
 
@@ -570,7 +570,7 @@ pub(in crate::solver) fn point_sums<const D: usize>(
     sums_over(model.owned(), 3 + D, add)
 }
 
-/// Rotation axes of bodies: z in plane problems, all in 3D, none in 1D.
+/// Rotation axes of bodies: z in plane problems, all in 3-D, none in 1-D.
 fn rotation_axes(dimension: usize) -> std::ops::Range<usize> {
     match dimension {
         1 => 0..0,

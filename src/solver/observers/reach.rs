@@ -126,7 +126,7 @@ impl Course {
     }
 }
 
-/// The largest of some values; −∞ or the smallest number if there are none.
+/// The largest of some values; `f64::MIN` if there are none.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(f64::MIN, f64::max)
 }

@@ -47,7 +47,7 @@ impl Schedule {
             Some(Interval::Steps(steps)) => clock.number().is_multiple_of(steps),
             Some(Interval::Seconds(seconds)) => passed(seconds, before),
             Some(Interval::SecondsAtSteps { seconds, steps }) => {
-                // If steps change, the interval in time is that of the present step.
+                // The time of the previous check, computed with the present step even if steps have changed.
                 let before = clock.time() - steps as f64 * clock.step();
                 clock.number().is_multiple_of(steps) && passed(seconds, before)
             }

@@ -183,7 +183,7 @@ fn cauchy_stress<const D: usize>(
     kirchhoff
 }
 
-/// Green–Lagrange strain ½(FᵀF − I) in 3D, row by row: xx, yy, zz, xy, yz, xz.
+/// Green–Lagrange strain ½(FᵀF − I) in 3-D, row by row: xx, yy, zz, xy, yz, xz.
 fn strain<const D: usize>(simulation: &mut Simulation<'_, D>) -> Vec<f64> {
     let gradients = simulation.forces.deformation_gradient(&simulation.model);
     let mut rows = Vec::with_capacity(6 * gradients.len());
@@ -239,7 +239,7 @@ fn elastic<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> Isot
     simulation.problem.block(block).body.material.elastic
 }
 
-/// Trace of the 3D strain of an owned point, from the strain in the directions of the setting. Without
+/// Trace of the 3-D strain of an owned point, from the strain in the directions of the setting. Without
 /// out-of-plane stress, a plate has ε_zz = −ν/(1 − ν) (ε_xx + ε_yy), and a bar has ε_yy = ε_zz = −ν ε_xx.
 /// Thermal strain is added.
 fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_setting: f64) -> f64 {
@@ -261,7 +261,7 @@ fn trace<const D: usize>(simulation: &Simulation<'_, D>, point: usize, in_settin
 }
 
 /// Thermal stretch of an owned point, if the setting allows it to expand perpendicular to its directions.
-/// Otherwise 0, because the determinant of F is then that of the 3D deformation.
+/// Otherwise 0, because the determinant of F is then that of the 3-D deformation.
 fn free_stretch<const D: usize>(simulation: &Simulation<'_, D>, point: usize) -> f64 {
     match &simulation.fields.thermal_stretch {
         Some(stretch) if !simulation.problem.dimension.is_confined() => stretch[point],

@@ -98,8 +98,9 @@ impl<'a, const D: usize> Simulation<'a, D> {
         })
     }
 
-    /// Refine and coarsen as the triggers of the problem request. A point is coarsened if no trigger has
-    /// been near it for long enough. If the points changed, return their numbers. Collective.
+    /// Refine and coarsen as the triggers of the problem request. A point is coarsened if
+    /// neither a trigger nor a point with missing bonds has been near it for long enough. If points were
+    /// created or removed, return their numbers. Collective.
     ///
     /// # Errors
     /// If METIS fails; the error is the same on all ranks. The points are lost then.

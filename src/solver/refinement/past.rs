@@ -53,7 +53,7 @@ impl Past {
             column.resize(local, 0.0);
             simulation.forces.bring(comm, column);
         }
-        // New and removed points have their parents where one of the grids is refined.
+        // The parents of new and removed points lie where one of the grids is refined.
         let bodies = 0..problem.bodies.len();
         let changed =
             bodies.map(|body| [grids, &simulation.grids].map(|grids| grids.changed(body)));
