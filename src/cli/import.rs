@@ -98,12 +98,12 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
         .map_err(|error| file_error(&target, "write", &error))?;
     let name = target.display();
     if verbosity > Verbosity::Quiet {
-        errln!(
+        outln!(
             " line  what became of the keys of {}",
             arguments.deck.display()
         );
         for entry in &imported.entries {
-            errln!("{entry}");
+            outln!("{entry}");
         }
         outln!(
             "wrote {name} from a deck of {}: {} keys taken, {} approximated, {} left out",
@@ -117,12 +117,12 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
             Some(_) => outln!("next: correct {name}"),
         }
     }
+    if let Some(fault) = &imported.fault {
+        errln!("warning: the new deck is not valid yet: {fault}");
+    }
     let losses = imported.losses();
     if !losses.is_empty() {
         errln!("warning: {losses}");
-    }
-    if let Some(fault) = &imported.fault {
-        errln!("warning: the new deck is not valid yet: {fault}");
     }
     Ok(())
 }

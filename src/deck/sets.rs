@@ -90,11 +90,12 @@ fn selector(
             Some(first) => scope.whole(first, &format!("{key} first_id"))?,
             None => 0,
         };
-        let ids = id_file::read(&folder.join(file.get_ref()), first)
+        let path = folder.join(file.get_ref());
+        let ids = id_file::read(&path, first)
             .map_err(|message| scope.error(file.span(), format!("{key} file: {message}")))?;
         Ok(problem::Selector::Ids {
             ids,
-            key: "file",
+            file: Some(problem::IdFile { path, first }),
             largest: file.span(),
         })
     } else {
@@ -109,7 +110,7 @@ fn selector(
         let largest = given.iter().max_by_key(|id| *id.get_ref());
         Ok(problem::Selector::Ids {
             ids,
-            key: "ids",
+            file: None,
             largest: largest.map_or(table.span(), Spanned::span),
         })
     }

@@ -2,7 +2,9 @@
 
 use super::draft::{Section, Value};
 use super::elastic::Constants;
+use super::log::{Fate, UNUSED_DAMAGE};
 use super::translation::Translation;
+use super::tree::{Node, is_key};
 use crate::error::Result;
 
 /// A material of the new deck.
@@ -39,8 +41,23 @@ pub struct DamageModel {
     pub read: String,
     /// When bonds break.
     pub criterion: Criterion,
-    /// Line of the criterion's value.
-    pub node: super::tree::Node,
+    /// The criterion's value.
+    pub node: Node,
+}
+
+/// Note the damage models that no block names; `models` are the tables of models, `blocks` those of blocks.
+pub fn note_unused_damages(translation: &Translation, models: &Node, blocks: &Node) {
+    let used = |name: &str| {
+        blocks.tables().any(|(_, block)| {
+            let model = block.get("Damage Model").and_then(Node::text);
+            model.is_some_and(|model| is_key(model, name))
+        })
+    };
+    for (name, table) in models.tables() {
+        if !used(name) {
+            translation.log.replace(table, Fate::LeftOut, UNUSED_DAMAGE);
+        }
+    }
 }
 
 /// Laws whose bonds break by work only.

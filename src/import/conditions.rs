@@ -84,6 +84,8 @@ impl Conditions {
     ) -> Result<()> {
         let (name, node) = (given.name, given.node);
         let what = format!("the condition `{name}`");
+        let is_initial = matches!(given.quantity, Quantity::Initial(_));
+        let section = if is_initial { "initial" } else { "condition" };
         let component = match given.quantity {
             Quantity::Temperature(_) => None,
             _ => Some(component(translation, node, &what)?),
@@ -100,18 +102,17 @@ impl Conditions {
                     translation.log.taken(key, note.clone());
                 }
             } else {
-                translation.log.left_out(node, note);
+                translation.leave_out_load(node, section, name, &note);
             }
             return Ok(());
         }
         let value = translation.required(node, "Value", &what)?;
         let text = translation.text(value, "Value")?.to_owned();
-        let is_initial = matches!(given.quantity, Quantity::Initial(_));
         let expression = match translation.expression(&text, !is_initial) {
             Ok(expression) => expression,
             Err(message) => {
                 let note = format!("its value cannot be expressed: {message}");
-                translation.log.left_out(node, note);
+                translation.leave_out_load(node, section, name, &note);
                 return Ok(());
             }
         };
@@ -120,9 +121,8 @@ impl Conditions {
         let mut names = set_name.split('+').map(str::trim);
         let (first, others) = (names.next().unwrap_or(""), names.next());
         if others.is_some() {
-            translation
-                .log
-                .left_out(node, "a sum of node sets; write one condition for each");
+            let note = "a sum of node sets; write one condition for each";
+            translation.leave_out_load(node, section, name, note);
             return Ok(());
         }
         let set = sets.find(translation, set_node, first)?;
@@ -174,7 +174,7 @@ impl Conditions {
             Quantity::ForceOfPoint => {
                 let Some(count) = sets.size(translation, first) else {
                     let note = "a force on each point of a set whose number of points is not known";
-                    translation.log.left_out(node, note);
+                    translation.leave_out_load(node, section, name, note);
                     return Ok(());
                 };
                 let total = match &expression {

@@ -112,6 +112,8 @@ pub struct Section {
     /// Lines of comment in front of it.
     comments: Vec<String>,
     lines: Vec<(String, Value)>,
+    /// Only the comments are written.
+    is_left_out: bool,
 }
 
 impl Section {
@@ -121,7 +123,13 @@ impl Section {
             header: header.into(),
             comments: Vec::new(),
             lines: Vec::new(),
+            is_left_out: false,
         }
+    }
+
+    /// Test whether it is the section with a header.
+    fn is(&self, header: &str) -> bool {
+        !self.is_left_out && self.header == header
     }
 
     /// The header.
@@ -178,10 +186,7 @@ impl Draft {
 
     /// The section with a header, which is added if it is missing.
     pub fn section(&mut self, header: &str) -> &mut Section {
-        let found = self
-            .sections
-            .iter()
-            .position(|section| section.header == header);
+        let found = self.sections.iter().position(|section| section.is(header));
         let index = found.unwrap_or_else(|| {
             self.sections.push(Section::new(header));
             self.sections.len() - 1
@@ -191,7 +196,24 @@ impl Draft {
 
     /// Test whether a section exists.
     pub fn has(&self, header: &str) -> bool {
-        self.sections.iter().any(|section| section.header == header)
+        self.sections.iter().any(|section| section.is(header))
+    }
+
+    /// Test whether a condition prescribes displacement or velocity.
+    pub fn has_support(&self) -> bool {
+        let prescribes = |section: &Section, key: &str| section.get(key).is_some();
+        self.sections.iter().any(|section| {
+            section.header.starts_with("condition.")
+                && (prescribes(section, "displacement") || prescribes(section, "velocity"))
+        })
+    }
+
+    /// Write a comment in place of a section that is left out.
+    pub fn leave_out(&mut self, header: &str, why: &str) {
+        let mut section = Section::new(header);
+        section.comment(format!("left out: [{header}] {why}"));
+        section.is_left_out = true;
+        self.sections.push(section);
     }
 
     /// The text of the deck with comments in front: `heading`, then the list of keys.
@@ -222,6 +244,9 @@ impl Draft {
             text.push('\n');
             for line in &section.comments {
                 comment(&mut text, &printable(line));
+            }
+            if section.is_left_out {
+                continue;
             }
             let header = &section.header;
             let _ = match header.as_str() {

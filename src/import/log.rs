@@ -1,10 +1,10 @@
 //! What became of each key of an imported deck.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-use super::tree::{Content, Node};
+use super::tree::{Content, Node, is_key};
 use crate::error::excerpt;
 
 /// What became of a key.
@@ -62,17 +62,25 @@ impl fmt::Display for Entry {
 }
 
 /// Styles of the fixes of a script that are loads or supports.
-const LOADS_OF_SCRIPTS: [&str; 8] = [
+pub(super) const LOADS_OF_SCRIPTS: [&str; 8] = [
     "addforce", "aveforce", "efield", "gravity", "indent", "move", "setforce", "spring",
 ];
 
-/// Loads, supports and damage models that are left out, by their lines.
+/// The note of a damage model that no block names.
+pub(super) const UNUSED_DAMAGE: &str = "no block uses this damage model";
+
+/// The key of the bonds between blocks.
+pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
+
+/// What is left out and changes the results, by lines.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Lines of initial values, loads and supports.
     pub conditions: Vec<usize>,
-    /// Lines of damage models.
+    /// Lines of damage models that blocks use.
     pub damages: Vec<usize>,
+    /// Lines of unknown values of `Omit Bonds Between Blocks`.
+    pub bonds: Vec<usize>,
 }
 
 impl Losses {
@@ -81,7 +89,7 @@ impl Losses {
         let mut losses = Self::default();
         let lost = entries
             .iter()
-            .filter(|entry| entry.fate == Fate::LeftOut && entry.note != OF_ITS_TABLE);
+            .filter(|entry| entry.fate == Fate::LeftOut && entry.note != UNUSED_DAMAGE);
         for entry in lost {
             // A fix of a script: its name, group and style.
             let style = entry.value.split_whitespace().nth(2).unwrap_or("");
@@ -97,12 +105,15 @@ impl Losses {
             if below("Boundary Conditions") == Some(1) && entry.value.is_empty() {
                 losses.conditions.push(entry.line);
             }
-            let is_criterion =
-                ["Critical Stretch", "Critical Value"].contains(&words[words.len() - 1]);
+            let last = words[words.len() - 1];
+            let is_criterion = ["Critical Stretch", "Critical Value"].contains(&last);
             match below("Damage Models") {
                 Some(1) => losses.damages.push(entry.line),
                 Some(2) if is_criterion => losses.damages.push(entry.line),
                 _ => {}
+            }
+            if below("Discretization") == Some(1) && is_key(last, OMITTED_BONDS) {
+                losses.bonds.push(entry.line);
             }
         }
         losses
@@ -110,27 +121,47 @@ impl Losses {
 
     /// Test whether nothing is lost.
     pub fn is_empty(&self) -> bool {
-        self.conditions.is_empty() && self.damages.is_empty()
+        self.conditions.is_empty() && self.damages.is_empty() && self.bonds.is_empty()
     }
 }
 
 impl fmt::Display for Losses {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut lines: Vec<usize> = self
-            .conditions
-            .iter()
-            .chain(&self.damages)
-            .copied()
+        let (conditions, damages) = (self.conditions.len(), self.damages.len());
+        let counts = [
+            (conditions, "load or support", "loads or supports"),
+            (damages, "damage model", "damage models"),
+        ];
+        let counts: Vec<String> = counts
+            .into_iter()
+            .filter(|(count, ..)| *count > 0)
+            .map(|(count, one, several)| match count {
+                1 => format!("1 {one}"),
+                count => format!("{count} {several}"),
+            })
             .collect();
-        lines.sort_unstable();
-        let lines: Vec<String> = lines.iter().map(usize::to_string).collect();
-        write!(
-            formatter,
-            "{} loads or supports and {} damage models are left out: lines {}",
-            self.conditions.len(),
-            self.damages.len(),
-            lines.join(", ")
-        )
+        let mut parts = Vec::new();
+        if !counts.is_empty() {
+            let mut lines: Vec<usize> = self.conditions.clone();
+            lines.extend(&self.damages);
+            lines.sort_unstable();
+            let lines: Vec<String> = lines.iter().map(usize::to_string).collect();
+            let (verb, word) = match lines.len() {
+                1 => ("is", "line"),
+                _ => ("are", "lines"),
+            };
+            parts.push(format!(
+                "{} {verb} left out: {word} {}",
+                counts.join(" and "),
+                lines.join(", ")
+            ));
+        }
+        for line in &self.bonds {
+            parts.push(format!(
+                "the value of `{OMITTED_BONDS}` is not known: line {line}"
+            ));
+        }
+        formatter.write_str(&parts.join("; "))
     }
 }
 
@@ -138,6 +169,8 @@ impl fmt::Display for Losses {
 #[derive(Debug, Default)]
 pub(super) struct Log {
     fates: RefCell<HashMap<usize, (Fate, String)>>,
+    /// Tables whose fate is that of all their keys.
+    whole: RefCell<HashSet<usize>>,
 }
 
 impl Log {
@@ -158,6 +191,17 @@ impl Log {
                 fates.insert(node.id, (fate, note.into()));
             }
         }
+    }
+
+    /// Note what became of a node in place of what was noted before.
+    pub(super) fn replace(&self, node: &Node, fate: Fate, note: impl Into<String>) {
+        self.fates.borrow_mut().insert(node.id, (fate, note.into()));
+    }
+
+    /// Note what became of a table with all its keys, which are not listed one by one.
+    pub(super) fn whole(&self, table: &Node, fate: Fate, note: impl Into<String>) {
+        self.note(table, fate, note);
+        self.whole.borrow_mut().insert(table.id);
     }
 
     /// Note that the new deck says the same as a node.
@@ -206,34 +250,14 @@ impl Log {
             fate,
             note,
         });
-        for (name, child) in children {
-            let key = format!("{key} > {name}");
-            match fate {
-                Fate::LeftOut => self.leave_out(child, &key, entries),
-                _ => self.collect(child, &key, entries),
+        // A table that is left out as a whole is one line.
+        if fate != Fate::LeftOut && !self.whole.borrow().contains(&node.id) {
+            for (name, child) in children {
+                self.collect(child, &format!("{key} > {name}"), entries);
             }
         }
     }
-
-    /// List the keys of a table that is left out as a whole.
-    fn leave_out(&self, node: &Node, key: &str, entries: &mut Vec<Entry>) {
-        for (name, child) in node.entries() {
-            self.leave_out(child, &format!("{key} > {name}"), entries);
-        }
-        if node.entries().is_empty() {
-            entries.push(Entry {
-                line: node.line,
-                key: key.to_owned(),
-                value: value(node),
-                fate: Fate::LeftOut,
-                note: OF_ITS_TABLE.to_owned(),
-            });
-        }
-    }
 }
-
-/// The note of a key in a table that is left out as a whole.
-const OF_ITS_TABLE: &str = "its table is left out";
 
 /// Why keys that no translator reads are left out: a word of their keys, and the reason.
 const REASONS: [(&str, &str); 11] = [

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod bond_filters;
+mod computed;
 mod conditions;
 mod draft;
 mod elastic;
@@ -78,7 +79,7 @@ impl Import {
             .count()
     }
 
-    /// Loads, supports and damage models that are left out.
+    /// What is left out and changes the results.
     pub fn losses(&self) -> Losses {
         Losses::of(&self.entries)
     }

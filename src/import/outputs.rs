@@ -1,6 +1,7 @@
-//! Outputs and computed quantities of Peridigm and PeriLab.
+//! Outputs of Peridigm and PeriLab.
 
-use super::draft::Value;
+use super::computed::{ANGULAR_MOMENTUM, Quantity};
+use super::draft::{Section, Value};
 use super::log::Fate;
 use super::sets::Sets;
 use super::translation::Translation;
@@ -65,11 +66,19 @@ const FIELDS: [(&str, &str, &str); 33] = [
 ];
 
 /// Output variables that need no field.
-const ALWAYS: [(&str, &str); 11] = [
+const ALWAYS: [(&str, &str); 8] = [
     ("Element Id", "`id` is always there"),
     ("Block Id", "`block` is always there"),
     ("Model Coordinates", "always there"),
-    ("Coordinates", "always there"),
+    ("Coordinates", "coordinates and displacement"),
+    ("Volume", "always there"),
+    ("Specific Volume", "`volume` is always there"),
+    ("Current Coordinates", "coordinates and displacement"),
+    ("Deformed Coordinates", "coordinates and displacement"),
+];
+
+/// Variables of the whole run that the history always has.
+const GLOBALS: [(&str, &str); 3] = [
     (
         "Global Kinetic Energy",
         "`kinetic_energy` of the history is always there",
@@ -82,11 +91,10 @@ const ALWAYS: [(&str, &str); 11] = [
         "Global Strain Energy",
         "`strain_energy` of the history is always there",
     ),
-    ("Volume", "always there"),
-    ("Specific Volume", "`volume` is always there"),
-    ("Current Coordinates", "coordinates and displacement"),
-    ("Deformed Coordinates", "coordinates and displacement"),
 ];
+
+/// Why temperatures are left out.
+pub(super) const NO_TEMPERATURE: &str = "no temperature acts on a material that expands";
 
 /// Words for the parts of tensors behind a name, such as `Cauchy_StressXX`.
 const TENSOR_PARTS: [&str; 9] = ["XX", "XY", "XZ", "YX", "YY", "YZ", "ZX", "ZY", "ZZ"];
@@ -100,17 +108,68 @@ pub enum Interval {
     Number(u64),
 }
 
+/// The field for an output variable, as the table of fields has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FieldOf {
+    /// Its name.
+    pub(super) name: &'static str,
+    /// How the variable differs from it; empty if it does not.
+    pub(super) difference: &'static str,
+    /// The component of a tensor that the variable names, in upper case.
+    pub(super) part: Option<&'static str>,
+}
+
+/// Find the field for an output variable such as `Cauchy_StressXX`.
+pub(super) fn field_of(variable: &str) -> Option<FieldOf> {
+    let find = |wanted: &str, part| {
+        let found = FIELDS.iter().find(|(known, ..)| is_key(wanted, known))?;
+        let (_, name, difference) = *found;
+        Some(FieldOf {
+            name,
+            difference,
+            part,
+        })
+    };
+    find(variable, None).or_else(|| {
+        let part = TENSOR_PARTS.iter().find(|part| variable.ends_with(**part));
+        let part = part.copied()?;
+        find(variable.trim_end_matches(part), Some(part))
+    })
+}
+
+/// What an output variable is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// A field of the result.
+    Field,
+    /// A column of the history.
+    Global,
+    /// Neither.
+    Other,
+}
+
+/// An interval of the deck and its key.
+struct Frequency {
+    interval: Interval,
+    node: Node,
+    /// The output has fields.
+    has_fields: bool,
+}
+
 /// The outputs of a deck so far.
 #[derive(Default)]
 pub struct Outputs {
     fields: Vec<&'static str>,
-    /// The interval of each output, its key, and whether the output has fields.
-    intervals: Vec<(Interval, Node, bool)>,
+    /// The interval of each output with fields, or without variables.
+    intervals: Vec<Frequency>,
+    /// The interval of each output with columns of the history only.
+    history_intervals: Vec<Frequency>,
     /// Materials expand by prescribed temperatures, so points have some.
     has_temperature: bool,
     /// Names of computed quantities and what became of them.
     computed: Vec<(String, Fate, String)>,
     reactions: Vec<String>,
+    angular_momentum: bool,
 }
 
 impl Outputs {
@@ -122,7 +181,7 @@ impl Outputs {
         }
     }
 
-    /// Read a table of computed quantities; `label` is the key with the name of a quantity, which else is that of its table.
+    /// Read a table of computed quantities. The key `Output Label` names a quantity, which else has the name of its table.
     ///
     /// # Errors
     /// If a position is no number, or a set is unknown.
@@ -134,101 +193,21 @@ impl Outputs {
         node: &Node,
     ) -> Result<()> {
         for (name, table) in node.tables() {
-            let label_node = table.get("Output Label");
-            let label = label_node.and_then(Node::text).unwrap_or(name).to_owned();
-            let (fate, note) = self.quantity(translation, sets, bodies, (&label, table))?;
-            translation.log.note(table, fate, note.clone());
-            if fate != Fate::LeftOut {
-                for (_, key) in table.entries() {
-                    translation.log.note(key, fate, "as its table");
-                }
+            let label = table.get("Output Label").and_then(Node::text);
+            let label = label.unwrap_or(name).to_owned();
+            let quantity = Quantity::new(&label, table);
+            let written = quantity.write(translation, sets, bodies, self.has_temperature)?;
+            if let Some(set) = written.reaction
+                && !self.reactions.contains(&set)
+            {
+                self.reactions.push(set);
             }
+            self.angular_momentum |= written.angular_momentum;
+            let (fate, note) = (written.fate, written.note);
+            translation.log.whole(table, fate, note.clone());
             self.computed.push((label, fate, note));
         }
         Ok(())
-    }
-
-    /// Write a computed quantity; return what became of it.
-    fn quantity(
-        &mut self,
-        translation: &mut Translation,
-        sets: &mut Sets,
-        bodies: &[(String, String)],
-        (label, table): (&str, &Node),
-    ) -> Result<(Fate, String)> {
-        let word = |key: &str| table.get(key).and_then(Node::text).unwrap_or("").to_owned();
-        let class = word("Compute Class");
-        let variable = word("Variable");
-        let is_force = ["Force", "Forces", "External Forces"]
-            .iter()
-            .any(|name| is_key(&variable, name));
-        let is_sum = is_key(&word("Calculation Type"), "Sum");
-        if is_key(&class, "Nearest Point Data") {
-            let mut position = Vec::new();
-            for axis in ["X", "Y", "Z"].iter().take(translation.dimension) {
-                let node = translation.required(table, axis, &format!("the quantity `{label}`"))?;
-                position.push(translation.number(node, axis)?);
-            }
-            if is_key(&variable, "Model Coordinates") || is_key(&variable, "Coordinates") {
-                let note = "a constant: the position of the nearest point";
-                return Ok((Fate::LeftOut, note.to_owned()));
-            }
-            let field = FIELDS.iter().find(|(name, ..)| is_key(&variable, name));
-            let field = field.filter(|(_, field, _)| *field != "rank");
-            let Some((_, field, difference)) = field else {
-                return Ok((Fate::LeftOut, "there is no such field".to_owned()));
-            };
-            let mut probe = vec![("at".to_owned(), Value::numbers(&position))];
-            if !["displacement", "velocity"].contains(field) {
-                let fields = Value::list([Value::text(*field)]);
-                probe.push(("fields".to_owned(), fields));
-            }
-            let name = translation.name("probe", label);
-            let history = translation.draft.section("history");
-            history.set(format!("probe.{name}"), Value::Table(probe));
-            let note = format!("[history] probe.{name}");
-            return Ok(if difference.is_empty() {
-                (Fate::Taken, note)
-            } else {
-                (Fate::Approximated, format!("{note}, {difference}"))
-            });
-        }
-        if is_force && is_sum {
-            let set = if is_key(&class, "Block Data") {
-                let block = word("Block");
-                let body = bodies.iter().find(|(read, _)| is_key(read, &block));
-                match body {
-                    Some((_, body)) => body.clone(),
-                    None => return Ok((Fate::LeftOut, "its block is unknown".to_owned())),
-                }
-            } else if is_key(&class, "Node Set Data") {
-                let name = word("Node Set");
-                sets.find(translation, table, &name)?
-            } else {
-                return Ok((
-                    Fate::LeftOut,
-                    "unknown, or without a counterpart".to_owned(),
-                ));
-            };
-            if !self.reactions.contains(&set) {
-                self.reactions.push(set.clone());
-            }
-            let note = format!(
-                "column reaction_{set}: the force of the supports on the set; opposite to the internal force at rest"
-            );
-            return Ok((Fate::Approximated, note));
-        }
-        if is_key(&variable, "Kinetic Energy") && is_sum {
-            let note = "kinetic_energy of the history, of all bodies";
-            return Ok((Fate::Approximated, note.to_owned()));
-        }
-        let energies = ["Stored Elastic Energy", "Strain Energy"];
-        if energies.iter().any(|name| is_key(&variable, name)) && is_sum {
-            let note = "strain_energy of the history, of all bodies";
-            return Ok((Fate::Approximated, note.to_owned()));
-        }
-        let note = "the history has no such quantity; it follows from the fields";
-        Ok((Fate::LeftOut, note.to_owned()))
     }
 
     /// Read an output: its variables and interval. Peridigm counts every step of an output without frequency.
@@ -237,16 +216,22 @@ impl Outputs {
     /// If the frequency is no number.
     pub fn output(&mut self, translation: &Translation, node: &Node) -> Result<()> {
         let log = &translation.log;
-        let mut has_fields = false;
+        let (mut has_fields, mut has_globals) = (false, false);
         if let Some(variables) = node.get("Output Variables") {
             for (name, variable) in variables.entries() {
                 if !translation.is_true(variable) {
                     log.taken(variable, "not written");
                     continue;
                 }
-                let (fate, note) = self.variable(name, &mut has_fields);
+                let (kind, fate, note) = self.variable(translation, name);
+                has_fields |= kind == Kind::Field;
+                has_globals |= kind == Kind::Global;
                 log.note(variable, fate, note);
             }
+        }
+        let is_history = has_globals && !has_fields;
+        if let Some(first) = node.get("Initial Output Step") {
+            log.left_out(first, "the first and the last state are always written");
         }
         let keys = ["Output Frequency", "Number of Output Steps"];
         for (index, key) in keys.iter().enumerate() {
@@ -267,13 +252,23 @@ impl Outputs {
                 0 => Interval::Steps(count),
                 _ => Interval::Number(count),
             };
+            let section = if is_history { "history" } else { "output" };
             let note = match (index, text.contains(' ')) {
-                (_, true) => "[output] every; the first number counts for all steps",
-                (0, _) => "[output] every_steps",
-                _ => "[output] every: the length of the run over it",
+                (_, true) => "every; the first number counts for all steps",
+                (0, _) => "every_steps",
+                _ => "every: the length of the run over it",
             };
-            log.taken(interval, note);
-            self.intervals.push((read, interval.clone(), has_fields));
+            log.taken(interval, format!("[{section}] {note}"));
+            let frequency = Frequency {
+                interval: read,
+                node: interval.clone(),
+                has_fields,
+            };
+            if is_history {
+                self.history_intervals.push(frequency);
+            } else {
+                self.intervals.push(frequency);
+            }
         }
         for (name, setting) in node.entries() {
             let files = [
@@ -298,83 +293,120 @@ impl Outputs {
 
     /// The largest interval of the outputs, of those with fields if any has. The others are listed.
     fn interval(&self, translation: &Translation) -> Option<Interval> {
-        let with_fields = self.intervals.iter().any(|(.., fields)| *fields);
+        let with_fields = self.intervals.iter().any(|frequency| frequency.has_fields);
         let candidates = self.intervals.iter();
-        let mut candidates = candidates.filter(|(.., fields)| *fields || !with_fields);
-        let first = candidates.next()?;
-        let (largest, node, _) = candidates.fold(first, |known, next| match (known.0, next.0) {
-            (Interval::Steps(a), Interval::Steps(b)) if b > a => next,
-            (Interval::Number(a), Interval::Number(b)) if b < a => next,
-            _ => known,
-        });
+        let candidates = candidates.filter(|frequency| frequency.has_fields || !with_fields);
+        let largest = candidates.reduce(|a, b| if is_longer(b, a) { b } else { a })?;
         let mut others = Vec::new();
-        for (interval, other, _) in &self.intervals {
-            if interval != largest {
+        for frequency in &self.intervals {
+            if frequency.interval != largest.interval {
                 let note = "there is one interval for all fields; the largest counts";
-                translation.log.approximated(other, note);
-                others.push(other.text().unwrap_or("").trim());
+                translation.log.approximated(&frequency.node, note);
+                others.push(frequency.node.text().unwrap_or("").trim());
             }
         }
         if !others.is_empty() {
             let note = format!("the other outputs have {}", others.join(", "));
-            translation.log.approximated(node, note);
+            translation.log.approximated(&largest.node, note);
         }
-        Some(*largest)
+        Some(largest.interval)
     }
 
-    /// Note an output variable; return what becomes of it.
-    fn variable(&mut self, name: &str, has_fields: &mut bool) -> (Fate, String) {
-        if let Some((_, fate, note)) = self.computed.iter().find(|(label, ..)| is_key(label, name))
-        {
-            return (*fate, note.clone());
+    /// The smallest interval of the outputs with columns of the history only. The others are listed.
+    fn history_interval(&self, translation: &Translation) -> Option<Interval> {
+        let all = self.history_intervals.iter();
+        let smallest = all.reduce(|a, b| if is_longer(a, b) { b } else { a })?;
+        for frequency in &self.history_intervals {
+            if frequency.interval != smallest.interval {
+                let note = "there is one interval for the history; the smallest counts";
+                translation.log.approximated(&frequency.node, note);
+            }
+        }
+        Some(smallest.interval)
+    }
+
+    /// What an output variable is, and what becomes of it.
+    fn variable(&mut self, translation: &Translation, name: &str) -> (Kind, Fate, String) {
+        let mut computed = self.computed.iter();
+        if let Some((_, fate, note)) = computed.find(|(label, ..)| is_key(label, name)) {
+            return (Kind::Global, *fate, note.clone());
         }
         if let Some((_, note)) = ALWAYS.iter().find(|(known, _)| is_key(name, known)) {
-            return (Fate::Taken, (*note).to_owned());
+            return (Kind::Other, Fate::Taken, (*note).to_owned());
+        }
+        if let Some((_, note)) = GLOBALS.iter().find(|(known, _)| is_key(name, known)) {
+            return (Kind::Global, Fate::Taken, (*note).to_owned());
+        }
+        if is_key(name, "Global Angular Momentum") && translation.dimension > 1 {
+            self.angular_momentum = true;
+            return (Kind::Global, Fate::Taken, ANGULAR_MOMENTUM.to_owned());
         }
         if is_key(name, "Temperature") && !self.has_temperature {
-            let note = "no temperature acts on a material that expands";
-            return (Fate::LeftOut, note.to_owned());
+            return (Kind::Other, Fate::LeftOut, NO_TEMPERATURE.to_owned());
         }
-        let part = TENSOR_PARTS.iter().find_map(|part| name.strip_suffix(part));
-        let tensor = part.map(|name| name.trim_end_matches('_')).unwrap_or(name);
-        let field = FIELDS
-            .iter()
-            .find(|(known, ..)| is_key(name, known) || is_key(tensor, known));
-        let Some((_, field, difference)) = field else {
-            return (Fate::LeftOut, "there is no such field".to_owned());
+        let Some(field) = field_of(name) else {
+            return (
+                Kind::Other,
+                Fate::LeftOut,
+                "there is no such field".to_owned(),
+            );
         };
-        *has_fields = true;
-        if !self.fields.contains(field) {
-            self.fields.push(field);
+        if !self.fields.contains(&field.name) {
+            self.fields.push(field.name);
         }
-        if difference.is_empty() {
-            (Fate::Taken, format!("field {field}"))
+        let note = format!("field {}", field.name);
+        if field.difference.is_empty() {
+            (Kind::Field, Fate::Taken, note)
         } else {
-            (Fate::Approximated, format!("field {field}, {difference}"))
+            let note = format!("{note}, {}", field.difference);
+            (Kind::Field, Fate::Approximated, note)
         }
     }
 
     /// Write the sections; `length` is that of the run, s.
     pub fn finish(self, translation: &mut Translation, length: f64) {
         let interval = self.interval(translation);
+        let history_interval = self.history_interval(translation);
         let output = translation.draft.section("output");
-        match interval {
-            Some(Interval::Steps(steps)) => {
-                output.set("every_steps", Value::Number(steps.to_string()));
-            }
-            Some(Interval::Number(number)) => {
-                output.set("every", Value::number(length / number as f64));
-            }
-            None => {}
-        }
+        set_interval(output, interval, length);
         if !self.fields.is_empty() {
             let fields = self.fields.iter().map(|field| Value::text(*field));
             output.set("fields", Value::list(fields));
+        }
+        if history_interval.is_some() {
+            let history = translation.draft.section("history");
+            set_interval(history, history_interval, length);
+        }
+        if self.angular_momentum {
+            let history = translation.draft.section("history");
+            history.set("angular_momentum", Value::Flag(true));
         }
         if !self.reactions.is_empty() {
             let sets = self.reactions.into_iter().map(Value::text);
             let history = translation.draft.section("history");
             history.set("reactions", Value::list(sets));
         }
+    }
+}
+
+/// Test whether outputs are further apart than others; intervals of different kinds are not compared.
+fn is_longer(one: &Frequency, other: &Frequency) -> bool {
+    match (one.interval, other.interval) {
+        (Interval::Steps(a), Interval::Steps(b)) => a > b,
+        (Interval::Number(a), Interval::Number(b)) => a < b,
+        _ => false,
+    }
+}
+
+/// Write an interval into a section of outputs.
+fn set_interval(section: &mut Section, interval: Option<Interval>, length: f64) {
+    match interval {
+        Some(Interval::Steps(steps)) => {
+            section.set("every_steps", Value::Number(steps.to_string()));
+        }
+        Some(Interval::Number(number)) => {
+            section.set("every", Value::number(length / number as f64));
+        }
+        None => {}
     }
 }

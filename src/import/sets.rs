@@ -1,15 +1,18 @@
 //! Sets of points of an imported deck: node sets in the deck, in files and in the mesh.
 
 use super::draft::{Section, Value};
+use super::expression::Dialect;
 use super::files::PointFile;
 use super::translation::Translation;
-use super::tree::{Node, is_key};
+use super::tree::{Content, Node, is_key};
 use crate::error::{Result, excerpt};
 
 /// A node set that the deck defines.
 struct Defined<'n> {
     name: String,
     node: &'n Node,
+    /// Its code reads it as a node set by its name or its place.
+    is_declared: bool,
     /// Name of the set in the new deck, once it is used.
     written: Option<String>,
 }
@@ -33,11 +36,12 @@ impl<'n> Sets<'n> {
         }
     }
 
-    /// Note a node set that the deck defines.
-    pub fn define(&mut self, name: &str, node: &'n Node) {
+    /// Note a node set that the deck defines. One that is not declared is a node set only if something uses it.
+    pub fn define(&mut self, name: &str, node: &'n Node, is_declared: bool) {
         self.defined.push(Defined {
             name: name.to_owned(),
             node,
+            is_declared,
             written: None,
         });
     }
@@ -58,6 +62,10 @@ impl<'n> Sets<'n> {
                 return Ok(written.clone());
             }
             let written = define(translation, &set.name, set.node)?;
+            if !set.is_declared {
+                let note = "a node set by its use; Peridigm wants `Node Set` in its name";
+                translation.log.taken(set.node, note);
+            }
             set.written = Some(written.clone());
             return Ok(written);
         }
@@ -65,7 +73,15 @@ impl<'n> Sets<'n> {
             return Ok(written.clone());
         }
         if !self.has_mesh {
-            let message = format!("the deck defines no node set {}", excerpt(name));
+            let mut message = format!("the deck defines no node set {}", excerpt(name));
+            let declared = self.defined.iter().filter(|set| set.is_declared);
+            let known: Vec<String> = declared.map(|set| excerpt(&set.name)).collect();
+            if !known.is_empty() {
+                message += &format!("; it has {}", known.join(", "));
+            }
+            if translation.dialect == Dialect::Peridigm {
+                message += "; node sets are parameters of `Boundary Conditions` with `Node Set` in their names";
+            }
             return Err(translation.error(user.line, message));
         }
         let written = translation.new_name("set", name);
@@ -79,11 +95,11 @@ impl<'n> Sets<'n> {
     /// Number of points of a set that the deck defines by their numbers.
     pub fn size(&self, translation: &Translation, name: &str) -> Option<u64> {
         let set = self.defined.iter().find(|set| is_key(&set.name, name))?;
-        let text = set.node.text()?;
-        match numbers(text) {
+        let text = set_text(set.node)?;
+        match numbers(&text) {
             Some(ids) => Some(ids.len() as u64),
             None => {
-                let ids = crate::points::id_file::read(&translation.path(text), 1).ok()?;
+                let ids = crate::points::id_file::read(&translation.path(&text), 1).ok()?;
                 Some(ids.len() as u64)
             }
         }
@@ -92,7 +108,7 @@ impl<'n> Sets<'n> {
     /// Note the node sets that nothing uses.
     pub fn finish(&self, translation: &Translation) {
         for set in &self.defined {
-            if set.written.is_none() {
+            if set.written.is_none() && set.is_declared {
                 translation
                     .log
                     .left_out(set.node, "nothing uses this node set");
@@ -103,7 +119,10 @@ impl<'n> Sets<'n> {
 
 /// Write the definition of a node set; return its name.
 fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<String> {
-    let text = translation.text(node, name)?.to_owned();
+    let Some(text) = set_text(node) else {
+        let message = format!("`{name}` must be a file, numbers of points or a condition");
+        return Err(translation.error(node.line, message));
+    };
     if text.eq_ignore_ascii_case("all") {
         translation.log.taken(node, "the set `all`");
         return Ok("all".to_owned());
@@ -137,6 +156,18 @@ fn define(translation: &mut Translation, name: &str, node: &Node) -> Result<Stri
     }
     translation.add(section);
     Ok(written)
+}
+
+/// The text of a node set: a list of numbers as one text.
+fn set_text(node: &Node) -> Option<String> {
+    match &node.content {
+        Content::Text(text) => Some(text.trim().to_owned()),
+        Content::List(nodes) => {
+            let words: Option<Vec<&str>> = nodes.iter().map(Node::text).collect();
+            Some(words?.join(" "))
+        }
+        Content::Table(_) => None,
+    }
 }
 
 /// The numbers of a list `1 2 3` or a range `1:27`.

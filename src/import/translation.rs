@@ -224,6 +224,13 @@ impl<'a> Translation<'a> {
         }))
     }
 
+    /// Leave out an initial value, load or support; a comment stands in its place.
+    pub fn leave_out_load(&mut self, node: &Node, section: &str, name: &str, why: &str) {
+        self.log.left_out(node, why);
+        let header = format!("{section}.{}", slug(name));
+        self.draft.leave_out(&header, why);
+    }
+
     /// Add a section to the new deck.
     pub fn add(&mut self, section: Section) {
         self.draft.add(section);

@@ -243,8 +243,9 @@ fn point(
         None => 0,
         Some(column) => entries[column].parse().map_err(|_| {
             format!(
-                "block must be a whole number, is {}",
-                excerpt(entries[column])
+                "block must be a whole number, is {}; the columns are `{}`",
+                excerpt(entries[column]),
+                columns.names.join(" ")
             )
         })?,
     };
@@ -254,7 +255,7 @@ fn point(
     let Some((body, _)) = body else {
         return Err(format!(
             "block {block} belongs to no body; add a body with `points = {{ file = …, block = \
-             {block} }}`"
+             {block} }}`, or remove its rows"
         ));
     };
     Ok(Point::new(0, position, volume, *body))

@@ -34,10 +34,7 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
         if is_comment(row) || heading.as_ref().is_some_and(|heading| heading.line == line) {
             continue;
         }
-        for entry in row
-            .split([',', ';', ' ', '\t', '\r'])
-            .filter(|entry| !entry.is_empty())
-        {
+        for entry in words(row) {
             let id = entry.parse::<u64>().ok().filter(|id| *id >= first);
             let id = id.ok_or_else(|| {
                 format!(
@@ -54,4 +51,23 @@ pub fn read(path: &Path, first: u64) -> Result<Vec<u64>, String> {
     ids.sort_unstable();
     ids.dedup();
     Ok(ids)
+}
+
+/// The first line, from 1, with a number; `None` if the file cannot be read or lacks it.
+pub fn line_of(path: &Path, number: u64) -> Option<u64> {
+    let heading = heading(path).ok()?.map(|heading| heading.line);
+    let text = std::fs::read_to_string(path).ok()?;
+    let text = text.trim_start_matches('\u{feff}');
+    let mut rows = (1..).zip(text.lines());
+    let found = rows.find(|(line, row)| {
+        let is_number = |entry: &str| entry.parse() == Ok(number);
+        !is_comment(row) && heading != Some(*line) && words(row).any(is_number)
+    });
+    found.map(|(line, _)| line)
+}
+
+/// The entries of a row.
+fn words(row: &str) -> impl Iterator<Item = &str> {
+    let words = row.split([',', ';', ' ', '\t', '\r']);
+    words.filter(|entry| !entry.is_empty())
 }

@@ -24,7 +24,7 @@ use nalgebra::Vector3;
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 use crate::mesh::{Runs, suggestion};
-use crate::problem::{Jitter, PointSource, Problem, Selector};
+use crate::problem::{IdFile, Jitter, PointSource, Problem, Selector};
 use crate::scatter::{Scattered, uniform};
 
 /// Maximum number of points per rank.
@@ -176,18 +176,42 @@ fn resolve_mesh_sets(problem: &Problem, meshes: &[(mesh::Found, u64)]) -> Result
 
 fn check_set_ids(problem: &Problem, total: u64) -> Result<()> {
     for set in &problem.sets {
-        if let Selector::Ids { ids, key, largest } = &set.selector
+        if let Selector::Ids { ids, file, largest } = &set.selector
             && let Some(id) = ids.last().filter(|id| **id >= total)
         {
-            let message = format!(
-                "[set.{}] {key}: no point has the id {id}, counted from 0; those of the {total} points are 0 to {}",
-                set.name,
-                total - 1
-            );
+            let message = match file {
+                None => format!(
+                    "[set.{}] ids: no point has the id {id}, counted from 0; those of the {total} points are 0 to {}",
+                    set.name,
+                    total - 1
+                ),
+                Some(file) => {
+                    let message = wrong_number(file, ids, *id, total);
+                    format!("[set.{}] file: {message}", set.name)
+                }
+            };
             return Err(Error::input(message).at(largest));
         }
     }
     Ok(())
+}
+
+/// The message for an id of a file that no point has.
+fn wrong_number(file: &IdFile, ids: &[u64], id: u64, total: u64) -> String {
+    let IdFile { path, first } = file;
+    let number = id + first;
+    let line = id_file::line_of(path, number).map_or(String::new(), |line| format!(":{line}"));
+    let last = total - 1 + first;
+    // With numbers from 1 to the number of points, only the first number is wrong.
+    let hint = if *first == 0 && id == total && ids[0] > 0 {
+        "; if the file counts from 1, set `first_id = 1`"
+    } else {
+        ""
+    };
+    format!(
+        "{}{line}: no point has the number {number}; those of the {total} points are {first} to {last}{hint}",
+        path.display()
+    )
 }
 
 fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Point]) -> Result<()> {
@@ -200,9 +224,23 @@ fn check_no_empty_body(problem: &Problem, comm: &dyn Communicator, points: &[Poi
         None => Ok(()),
         Some(empty) => {
             let body = &problem.bodies[empty];
+            let file;
             let why = match &body.points {
                 PointSource::Lattice { .. } => {
                     "its shape is smaller than the spacing, or a later body covers it"
+                }
+                PointSource::File {
+                    path,
+                    columns: None,
+                    ..
+                } if matches!(columns::heading(path), Ok(None)) => {
+                    let default = Columns::default_order(problem.dimension.count());
+                    file = format!(
+                        "no row of its file belongs to it; the file has no header, so its columns are `{}`; \
+                         `points.columns` names others",
+                        default.names.join(" ")
+                    );
+                    &file
                 }
                 PointSource::File { .. } => "no row of its file belongs to it",
                 PointSource::Mesh { .. } => "no element of its mesh belongs to it",

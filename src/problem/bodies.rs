@@ -172,7 +172,7 @@ impl InterfaceDamage {
 
 impl Interface {
     /// The pair of two bodies, in any order, if it is listed.
-    fn pair(&self, here: &Body, there: &Body) -> Option<&InterfacePair> {
+    pub fn pair(&self, here: &Body, there: &Body) -> Option<&InterfacePair> {
         self.pairs.iter().find(|pair| {
             let [a, b] = &pair.bodies;
             (*a == here.name && *b == there.name) || (*a == there.name && *b == here.name)
@@ -368,13 +368,22 @@ pub enum Selector {
     Ids {
         /// Sorted.
         ids: Vec<u64>,
-        /// The key that has them.
-        key: &'static str,
+        /// The file that has them, if it is not the deck.
+        file: Option<IdFile>,
         /// Where the largest one stands in the deck.
         largest: Range<usize>,
     },
     /// Those of a group of the meshes that bodies have their points from.
     Mesh(MeshSet),
+}
+
+/// A file with the numbers of points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct IdFile {
+    /// Path, already relative to the working directory.
+    pub path: PathBuf,
+    /// Number of the first point in it.
+    pub first: u64,
 }
 
 /// The points of a named group of the problem's meshes. They are known once the points have been generated.

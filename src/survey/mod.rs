@@ -77,6 +77,7 @@ impl Survey {
         horizons(problem, &bodies, &mut warnings);
         stretches(problem, &mut warnings);
         let joints = joints(simulation);
+        touching_joints(problem, &joints, &mut warnings);
         let mut cuts = simulation.cut.clone();
         comm.sum(&mut cuts);
         cuts.iter_mut().for_each(|ends| *ends /= 2);
@@ -121,6 +122,26 @@ fn joints<const D: usize>(simulation: &Simulation<'_, D>) -> Vec<([usize; 2], u6
         .map(|[i, j]| ([i, j], bonds[i * count + j]))
         .filter(|(_, bonds)| *bonds > 0)
         .collect()
+}
+
+/// Warn of pairs of bodies that are bonded by the rule of all pairs, and have contact too.
+fn touching_joints(problem: &Problem, joints: &[([usize; 2], u64)], warnings: &mut Vec<Warning>) {
+    let Some(contact) = &problem.contact else {
+        return;
+    };
+    for (pair, bonds) in joints {
+        let [first, second] = pair.map(|body| &problem.bodies[body]);
+        let is_chosen = problem.interface.pair(first, second).is_some();
+        if is_chosen || contact.between(first, second).is_none() {
+            continue;
+        }
+        let message = format!(
+            "[interface] rule: {bonds} bonds join [body.{}] and [body.{}], which also have contact; for contact alone, set \
+             `rule = \"none\"`, or give the pair an [interface.pair.NAME]",
+            first.name, second.name
+        );
+        warnings.push(Warning::new(message).at(&second.span));
+    }
 }
 
 fn horizons(problem: &Problem, bodies: &[BodyFigures], warnings: &mut Vec<Warning>) {

@@ -681,11 +681,14 @@ fn an_imported_tensile_test_has_youngs_modulus() {
     let printed = text(&output);
     assert!(output.status.success(), "{printed}");
     for line in [
-        "approximated  Peridigm > Compute Class Parameters > Top > Variable: Force",
-        "30 keys taken, 9 approximated, 0 left out",
+        "taken         Peridigm > Compute Class Parameters > Top -> [history] field.top_reaction_force_x",
+        "22 keys taken, 2 approximated, 0 left out",
     ] {
         assert!(printed.contains(line), "{printed}");
     }
+    // The list can be piped.
+    let listed = String::from_utf8_lossy(&output.stdout);
+    assert!(listed.contains("what became of the keys"), "{listed}");
     let new = folder.join("tensile.toml");
     let output = import(&[]);
     assert_eq!(output.status.code(), Some(2));
@@ -738,6 +741,13 @@ fn an_imported_tensile_test_has_youngs_modulus() {
             .unwrap()
     };
     let gage = |name: &str| value(&format!("probe_{name}_gage_displacement_y"));
+    // Supports balance the internal forces of points at rest.
+    let [reaction, force] =
+        ["reaction_block_3_y", "field_top_reaction_force_y_integral"].map(value);
+    assert!(
+        (force / reaction + 1.0).abs() < 1e-9,
+        "{force:e} {reaction:e}"
+    );
     let strain = (gage("upper") - gage("lower")) / 7.0;
     // A strain of 0.1 % is not small to the last digit: its square counts in this law.
     let modulus = value("reaction_block_3_y") / 16.0 / strain;

@@ -167,7 +167,14 @@ fn rates_and_errors_follow_from_a_reference() {
         "--value",
         "first:kinetic_energy",
     ];
+    // A speed is no resolution: only --x asks for its rate.
     succeed(&mut sweep.command(&options));
+    let table = sweep.table("out/plate_sweep/sweep.csv");
+    assert!(
+        !table.iter().any(|(name, _)| name.ends_with("_rate")),
+        "{table:?}"
+    );
+    succeed(&mut sweep.command(&[&options[..], &["--x", "speed"]].concat()));
     let table = sweep.table("out/plate_sweep/sweep.csv");
     let rates = numbers(column(&table, "first_kinetic_energy_rate"));
     assert!(rates[0].is_nan() && rates[1].is_nan(), "{rates:?}");

@@ -453,12 +453,11 @@ fn a_bond_of_perilab_has_its_micromodulus() {
         key("Models > Material Models > Alu > Poisson's Ratio"),
         Fate::Approximated
     );
-    assert_eq!(
-        key("Models > Thermal Models > Heat > Thermal Conductivity"),
-        Fate::LeftOut
-    );
+    assert_eq!(key("Models > Thermal Models"), Fate::LeftOut);
     assert_eq!(key("Boundary Conditions > Warm"), Fate::LeftOut);
-    assert_eq!(key("Boundary Conditions > Warm > Value"), Fate::LeftOut);
+    // A table that is left out is one line.
+    let mut keys = imported.entries.iter().map(|entry| entry.key.as_str());
+    assert!(!keys.any(|key| key.contains("Warm > ") || key.contains("Heat")));
     assert_eq!(
         key("Boundary Conditions > Push > Value"),
         Fate::Approximated
@@ -733,7 +732,7 @@ fn temperatures_of_peridigm_count_from_the_start() {
     assert!(imported.losses().damages.is_empty());
     assert_eq!(
         imported.losses().to_string(),
-        "1 loads or supports and 0 damage models are left out: lines 33"
+        "1 load or support is left out: line 33"
     );
 }
 
@@ -869,6 +868,382 @@ fn a_damage_model_without_a_counterpart_is_a_loss() {
     assert_eq!(imported.losses().damages, [line]);
     assert!(imported.losses().conditions.is_empty());
 }
+
+/// Computed quantities of Peridigm in front of the solver, and a second output with columns of the history only.
+fn with_quantities(quantities: &str, variables: &str) -> String {
+    let tables = format!("  Compute Class Parameters:\n{quantities}  Solver:\n");
+    let output = format!(
+        "  Output2:\n    Initial Output Step: 3\n    Output Frequency: 5\n    Output Variables:\n{variables}"
+    );
+    TWO_POINTS.replacen("  Solver:\n", &tables, 1) + &output
+}
+
+#[test]
+fn computed_quantities_of_peridigm_are_columns_of_the_history() {
+    let folder = Folder::new("quantities");
+    let mut quantities = String::new();
+    for (name, class, place, calculation, variable) in [
+        (
+            "Fastest",
+            "Block_Data",
+            "Block: block_1",
+            "Maximum",
+            "Velocity",
+        ),
+        (
+            "Lowest",
+            "Node_Set_Data",
+            "Node Set: Left Node Set",
+            "Minimum",
+            "Displacement",
+        ),
+        ("Broken", "Block_Data", "Block: block_1", "Sum", "Damage"),
+        (
+            "Force",
+            "Node_Set_Data",
+            "Node Set: Left Node Set",
+            "Sum",
+            "Force",
+        ),
+        (
+            "Stored",
+            "Block_Data",
+            "Block: block_1",
+            "Sum",
+            "Stored_Elastic_Energy",
+        ),
+        (
+            "Largest",
+            "Block_Data",
+            "Block: block_1",
+            "Maximum",
+            "Force",
+        ),
+        ("Spin", "Angular_Momentum", "Verbose: true", "Sum", "None"),
+        ("Global", "Energy", "Verbose: true", "Sum", "None"),
+        ("Odd", "Block_Data", "Block: block_1", "Median", "Damage"),
+        ("Radii", "Block_Data", "Block: block_1", "Sum", "Radius"),
+        ("Gone", "Block_Data", "Block: block_7", "Sum", "Damage"),
+        ("Magic", "Magic_Data", "Block: block_1", "Sum", "Damage"),
+        (
+            "Now",
+            "Nearest_Point_Data",
+            "X: -1.0\n      Y: 0.0\n      Z: 0.0",
+            "None",
+            "Coordinates",
+        ),
+        (
+            "Then",
+            "Nearest_Point_Data",
+            "X: -1.0\n      Y: 0.0\n      Z: 0.0",
+            "None",
+            "Model_Coordinates",
+        ),
+    ] {
+        quantities += &format!(
+            "    {name}:\n      Compute Class: {class}\n      {place}\n      Calculation Type: {calculation}\n      \
+             Variable: {variable}\n      Output Label: Label_{name}\n"
+        );
+    }
+    let variables =
+        "      Label_Fastest: true\n      Label_Now: true\n      Global_Angular_Momentum: true\n";
+    let text = with_quantities(&quantities, variables);
+    let imported = folder.import("two.yaml", &text).unwrap();
+    let problem = folder.problem(&imported);
+    let set = |name: &str| {
+        problem
+            .sets
+            .iter()
+            .position(|set| set.name == name)
+            .unwrap()
+    };
+    let found: Vec<_> = problem.history.statistics.iter().collect();
+    // One table for each component of a vector.
+    assert_eq!(found.len(), 4 * 3 + 2, "{}", imported.text);
+    let with = |start: &str| {
+        found
+            .iter()
+            .filter(|one| one.name.starts_with(start))
+            .count()
+    };
+    assert_eq!(with("label_fastest_"), 3);
+    let of = |name: &str| *found.iter().find(|one| one.name == name).unwrap();
+    assert_eq!(of("label_lowest_x").set, set("left_node_set"));
+    assert_eq!(of("label_broken").set, set("block_1"));
+    for line in [
+        "field.label_fastest_y = { field = \"velocity\", component = \"y\", set = \"block_1\", of = [\"maximum\"] }",
+        "field.label_broken = { field = \"damage\", set = \"block_1\", of = [\"sum\"] }",
+        "field.label_force_x = { field = \"force_density\", component = \"x\", set = \"left_node_set\", of = [\"integral\"] }",
+        "field.label_stored = { field = \"strain_energy_density\", set = \"block_1\", of = [\"integral\"] }",
+        "probe.label_now = { at = [-1.0, 0.0, 0.0] }",
+        "angular_momentum = true",
+    ] {
+        assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+    }
+    // No support acts, so there are no reactions.
+    assert!(!imported.text.contains("reactions"), "{}", imported.text);
+    let quantity = |name: &str| {
+        fate(
+            &imported,
+            &format!("Peridigm > Compute Class Parameters > {name}"),
+        )
+    };
+    for (name, expected, note) in [
+        (
+            "Fastest",
+            Fate::Taken,
+            "[history] field.label_fastest_x, field.label_fastest_y, field.label_fastest_z: maximum of velocity",
+        ),
+        (
+            "Force",
+            Fate::Taken,
+            "field.label_force_z: integral of force_density",
+        ),
+        (
+            "Largest",
+            Fate::Approximated,
+            "maximum of force_density; times the volume",
+        ),
+        ("Global", Fate::Taken, "of the history are always there"),
+        (
+            "Spin",
+            Fate::Taken,
+            "[history] angular_momentum: about the origin",
+        ),
+        (
+            "Odd",
+            Fate::LeftOut,
+            "the calculation `Median` is not known",
+        ),
+        ("Radii", Fate::LeftOut, "there is no such field"),
+        ("Gone", Fate::LeftOut, "the block `block_7` is no body"),
+        (
+            "Magic",
+            Fate::LeftOut,
+            "the class `Magic_Data` has no counterpart",
+        ),
+        (
+            "Now",
+            Fate::Approximated,
+            "[history] probe.label_now: displacement; add the position",
+        ),
+        (
+            "Then",
+            Fate::LeftOut,
+            "a constant: the position of the nearest point",
+        ),
+    ] {
+        let (found, text) = quantity(name);
+        assert_eq!(found, expected, "{name}: {text}");
+        assert!(text.contains(note), "{name}: {text}");
+    }
+    // A quantity is one line, and the interval of its output is that of the history.
+    let mut keys = imported.entries.iter().map(|entry| entry.key.as_str());
+    assert!(!keys.any(|key| key.contains("Fastest > ")));
+    assert!(
+        imported.text.contains("[output]\nevery_steps = 10\n"),
+        "{}",
+        imported.text
+    );
+    let history = &imported.text[imported.text.find("\n[history]\n").unwrap()..];
+    assert!(history.contains("\nevery_steps = 5\n"), "{history}");
+    assert_eq!(
+        fate(&imported, "Peridigm > Output2 > Output Frequency"),
+        (Fate::Taken, "[history] every_steps")
+    );
+    assert_eq!(
+        fate(&imported, "Peridigm > Output2 > Initial Output Step").1,
+        "the first and the last state are always written"
+    );
+}
+
+/// The sum of the forces on a supported set is a reaction too, and the values of the history are those of the fields.
+#[test]
+fn sums_of_forces_are_opposite_to_reactions() {
+    let folder = Folder::new("forces");
+    let quantities = "    Sum:\n      Compute Class: Node_Set_Data\n      Node Set: Left Node Set\n      \
+                      Calculation Type: Sum\n      Variable: Force\n";
+    let text = with_quantities(quantities, "      Sum: true\n").replacen(
+        "      Type: Initial Velocity\n      Node Set: Left Node Set\n      Coordinate: x\n      Value: \"0.5\"",
+        "      Type: Prescribed Displacement\n      Node Set: Left Node Set\n      Coordinate: x\n      Value: \"0.0\"",
+        1,
+    );
+    let imported = folder.import("two.yaml", &text).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("reactions = [\"left_node_set\"]"),
+        "{}",
+        imported.text
+    );
+    let (kind, note) = fate(&imported, "Peridigm > Compute Class Parameters > Sum");
+    assert_eq!(kind, Fate::Taken);
+    assert!(
+        note.ends_with(
+            "column reaction_left_node_set: the force of the supports, opposite at rest"
+        ),
+        "{note}"
+    );
+}
+
+#[test]
+fn a_node_set_of_peridigm_is_one_by_its_name_or_by_its_use() {
+    let folder = Folder::new("node-sets");
+    let text = TWO_POINTS
+        .replacen(
+            "    Left Node Set: \"1\"\n",
+            "    Left Points: [1]\n    Others: \"2\"\n",
+            1,
+        )
+        .replacen("Node Set: Left Node Set", "Node Set: Left Points", 1);
+    let imported = folder.import("two.yaml", &text).unwrap();
+    folder.problem(&imported);
+    assert!(
+        imported.text.contains("[set.left_points]\nids = [0]"),
+        "{}",
+        imported.text
+    );
+    let (kind, note) = fate(&imported, "Peridigm > Boundary Conditions > Left Points");
+    assert_eq!(kind, Fate::Taken);
+    assert!(
+        note.contains("Peridigm wants `Node Set` in its name"),
+        "{note}"
+    );
+    let others = fate(&imported, "Peridigm > Boundary Conditions > Others");
+    assert_eq!(others, (Fate::LeftOut, "unknown, or without a counterpart"));
+    let error = folder
+        .import(
+            "two.yaml",
+            &text.replacen("Node Set: Left Points", "Node Set: Left Point", 1),
+        )
+        .unwrap_err();
+    let message = "the deck defines no node set `Left Point`; it has `Right Node Set`, `Spare Node Set`; node sets are \
+                   parameters of `Boundary Conditions` with `Node Set` in their names";
+    assert!(error.contains(message), "{error}");
+}
+
+#[test]
+fn bonds_between_blocks_of_peridigm_are_all_or_none() {
+    let folder = Folder::new("omitted-bonds");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n");
+    for (value, rule, expected, note) in [
+        ("All", true, Fate::Taken, "[interface] rule = \"none\""),
+        ("None", false, Fate::Taken, "blocks are bonded"),
+        (
+            "Off",
+            false,
+            Fate::LeftOut,
+            "the value `Off` is not known (All, None); the blocks stay bonded",
+        ),
+    ] {
+        let key = format!(
+            "<Parameter name=\"Omit Bonds Between Blocks\" type=\"string\" value=\"{value}\"/>\n    \
+             <ParameterList name=\"Bond Filters\">"
+        );
+        let text = BAR.replacen("<ParameterList name=\"Bond Filters\">", &key, 1);
+        let imported = folder.import("bar.xml", &text).unwrap();
+        folder.problem(&imported);
+        assert_eq!(
+            imported.text.contains("[interface]"),
+            rule,
+            "{}",
+            imported.text
+        );
+        let found = fate(&imported, "Discretization > Omit Bonds Between Blocks");
+        assert_eq!(found, (expected, note));
+        let losses = imported.losses();
+        assert_eq!(losses.is_empty(), expected == Fate::Taken);
+        if value == "Off" {
+            let warning = "the value of `Omit Bonds Between Blocks` is not known: line 5";
+            assert_eq!(losses.to_string(), warning);
+        }
+    }
+}
+
+#[test]
+fn correspondence_has_no_influence_function() {
+    let folder = Folder::new("influence");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n");
+    let key = "Discretization > Influence Function";
+    let import = |function: &str, model: &str| {
+        let function = format!(
+            "<Parameter name=\"Influence Function\" type=\"string\" value=\"{function}\"/>\n    \
+             <ParameterList name=\"Bond Filters\">"
+        );
+        let text = BAR
+            .replacen("<ParameterList name=\"Bond Filters\">", &function, 1)
+            .replacen("Elastic Correspondence", model, 1);
+        let imported = folder.import("bar.xml", &text).unwrap();
+        folder.problem(&imported);
+        imported
+    };
+    let imported = import("Parabolic Decay", "Elastic Correspondence");
+    assert!(
+        !imported.text.contains("\ninfluence = "),
+        "{}",
+        imported.text
+    );
+    assert_eq!(
+        fate(&imported, key),
+        (Fate::LeftOut, "correspondence: always ω = 1")
+    );
+    assert_eq!(
+        fate(&import("One", "Elastic Correspondence"), key).0,
+        Fate::Taken
+    );
+    let imported = import("Parabolic Decay", "Elastic");
+    assert!(
+        imported.text.contains("\ninfluence = \"linear\""),
+        "{}",
+        imported.text
+    );
+    assert_eq!(fate(&imported, key).0, Fate::Approximated);
+    assert_eq!(fate(&import("1.0/zeta", "Elastic"), key).0, Fate::Taken);
+}
+
+/// A comment stands in place of a load that is left out; a damage model without a block is no loss.
+#[test]
+fn what_is_left_out_has_a_comment_and_what_is_unused_no_warning() {
+    let folder = Folder::new("left-out");
+    folder.write("bar.txt", &bar_points());
+    folder.write("set.txt", "1\n");
+    let spare = "<ParameterList name=\"Damage Models\">\n    <ParameterList name=\"Spare\">\n      \
+                 <Parameter name=\"Damage Model\" type=\"string\" value=\"Von Mises\"/>\n    </ParameterList>";
+    let restart = "</ParameterList>\n  <ParameterList name=\"Restart\">\n    <Parameter name=\"Restart\" type=\"bool\" \
+                   value=\"true\"/>\n  </ParameterList>\n  <ParameterList name=\"Solver1\">";
+    let text = BAR
+        .replacen("<ParameterList name=\"Damage Models\">", spare, 1)
+        .replacen(
+            "</ParameterList>\n  <ParameterList name=\"Solver1\">",
+            restart,
+            1,
+        );
+    let imported = folder.import("bar.xml", &text).unwrap();
+    folder.problem(&imported);
+    assert_eq!(
+        fate(&imported, "Damage Models > Spare"),
+        (Fate::LeftOut, "no block uses this damage model")
+    );
+    assert!(imported.losses().is_empty(), "{:?}", imported.losses());
+    let (kind, note) = fate(&imported, "Restart");
+    assert_eq!(kind, Fate::Approximated);
+    assert!(note.contains("`fissure run --restart` continues"), "{note}");
+    let text = text.replacen("Prescribed Displacement", "Prescribed Velocity", 1);
+    let imported = folder.import("bar.xml", &text).unwrap();
+    folder.problem(&imported);
+    let comment = "\n# left out: [condition.pull] `Prescribed Velocity` has no counterpart\n";
+    assert!(imported.text.contains(comment), "{}", imported.text);
+    let at = |header: &str| imported.text.find(header).unwrap();
+    assert!(at("\n[body.block_1]") < at(comment) && at(comment) < at("\n[time]"));
+    assert!(
+        imported
+            .losses()
+            .to_string()
+            .starts_with("1 load or support is left out: line ")
+    );
+}
+
 /// Twelve points of LAMMPS, of which the four with x = 2 are the group `top`.
 const BLOCK: &str = "atom_style peri
 lattice sc 1.0

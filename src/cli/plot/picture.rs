@@ -319,7 +319,17 @@ impl<'a> Painter<'a> {
         let dimension = number_of("dimension")? as usize;
         let section = number_of("out_of_plane_measure")?;
         let fields = result.fields()?;
-        let field = choose_field(arguments.field.as_deref(), path, &fields)?;
+        let mut field = choose_field(arguments.field.as_deref(), path, &fields)?;
+        if arguments.field.is_none() && field.name == "velocity" {
+            // Equilibria have no velocity.
+            let displacement = fields.iter().find(|field| field.name == "displacement");
+            let is_zero = |values: Vec<f64>| values.iter().all(|value| *value == 0.0);
+            if let Some(displacement) = displacement
+                && is_zero(result.field("velocity", reference)?)
+            {
+                field = displacement;
+            }
+        }
         if dimension != 2 && !arguments.path.is_empty() {
             return Err(Error::input("--path is for results of plane problems"));
         }

@@ -38,7 +38,8 @@ A value with commas, such as [1, 2] or max(a, b), is one value.
 
 With a reference, the error of a value f is (f - reference)/|reference|, and its rate p over a
 parameter h is that of |f - reference| ~ h^p, from each run and the one before it. Without one, the
-rate is that of f - f0 ~ h^p from three successive runs, where f0 is unknown.
+rate is that of f - f0 ~ h^p from three successive runs, where f0 is unknown; it is there where h
+changes a spacing, a horizon or a time step, or is named by --x.
 
 Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 stopped by a signal; the same
 command continues.")]
@@ -119,10 +120,11 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
         let (label, set) = (design.label(row), design.assignments(row));
         let read = || {
             let deck = deck::read_with(&arguments.deck, &arguments.with, &set)?;
-            value::check(&arguments.value, &column_names(&deck.problem()?))?;
-            deck.explain()
+            let problem = deck.problem()?;
+            value::check(&arguments.value, &column_names(&problem))?;
+            Ok((deck.explain()?, runs::resolution(&problem)))
         };
-        let deck = read().map_err(|error| Error {
+        let (deck, resolution) = read().map_err(|error: Error| Error {
             message: format!("{label}: {}", error.message),
             ..error
         })?;
@@ -132,6 +134,7 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
             folder,
             set,
             deck,
+            resolution,
         })
     };
     design.rows.iter().zip(design.folders()).map(run).collect()
@@ -152,7 +155,13 @@ pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
     let folder = arguments.folder();
     let runs = planned_runs(arguments, &design, &folder)?;
     let program = Program::new(arguments)?;
-    let mut table = Table::new(&design, &arguments.value, &references, abscissa);
+    let differs = |rows: &[usize]| {
+        let mut pairs = rows.windows(2);
+        pairs.any(|pair| runs[pair[0]].resolution != runs[pair[1]].resolution)
+    };
+    let converges = |axis| design.groups(axis).iter().any(|(_, rows)| differs(rows));
+    let has_rates = arguments.x.is_some() || abscissa.is_some_and(converges);
+    let mut table = Table::new(&design, &arguments.value, &references, abscissa, has_rates);
     let mut due = Vec::new();
     for (number, run) in runs.iter().enumerate() {
         let is_chosen = chosen.contains(&number);

@@ -7,6 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use fissure::error::{Error, Result};
+use fissure::problem::{PointSource, Problem, StepRule};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
@@ -42,6 +43,24 @@ pub struct Run {
     pub set: Vec<(String, String)>,
     /// The deck with all its values.
     pub deck: String,
+    /// Horizons and spacings (m) and time steps (s, or fractions of the stable one).
+    pub resolution: Vec<f64>,
+}
+
+/// The horizons, spacings and time steps of a run, which differ between runs of a convergence study.
+pub fn resolution(problem: &Problem) -> Vec<f64> {
+    let mut found = vec![problem.horizon];
+    for body in &problem.bodies {
+        found.push(body.horizon);
+        if let PointSource::Lattice { spacing, .. } = &body.points {
+            found.extend(spacing);
+        }
+    }
+    for stage in problem.all_stages() {
+        let (StepRule::Automatic(step) | StepRule::Fixed(step)) = stage.time.step;
+        found.push(step);
+    }
+    found
 }
 
 /// How a run ended.

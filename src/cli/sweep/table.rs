@@ -19,6 +19,8 @@ pub struct Table<'a> {
     columns: &'a [Column],
     references: &'a [Option<f64>],
     abscissa: Option<usize>,
+    /// There are rates without a reference too.
+    has_rates: bool,
     /// Values by run and column; `None` for runs that are not complete.
     values: Vec<Option<Vec<Option<f64>>>>,
     units: Vec<String>,
@@ -40,12 +42,14 @@ impl<'a> Table<'a> {
         columns: &'a [Column],
         references: &'a [Option<f64>],
         abscissa: Option<usize>,
+        has_rates: bool,
     ) -> Self {
         Self {
             design,
             columns,
             references,
             abscissa,
+            has_rates,
             values: vec![None; design.rows.len()],
             units: vec![String::new(); columns.len()],
         }
@@ -165,6 +169,9 @@ impl<'a> Table<'a> {
         let Some(abscissa) = self.abscissa else {
             return found;
         };
+        if self.references[column].is_none() && !self.has_rates {
+            return found;
+        }
         for (_, rows) in self.design.groups(abscissa) {
             let series = self.series(&rows, abscissa, column);
             for (row, rate) in rows.iter().zip(rates(&series, self.references[column])) {

@@ -4,10 +4,13 @@ use super::run::set;
 use super::{Model, wrong};
 use crate::error::Result;
 use crate::import::draft::{Section, Value};
-use crate::import::log::Fate;
+use crate::import::log::{Fate, LOADS_OF_SCRIPTS};
 use crate::import::regions::{Region, others};
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
+
+/// Name of the rigid body of an indenter.
+const INDENTER: &str = "indenter";
 
 /// Read a fix.
 pub(super) fn fix(
@@ -56,15 +59,15 @@ pub(super) fn fix(
         Ok(vector)
     };
     let volume = spacing.powi(3);
+    let name = format!("fix {id}");
     let made = match (*style, rest.first().copied()) {
         ("setforce", _) => {
             let zero =
                 |k: usize| rest.get(k).and_then(|word| variables.number(word).ok()) == Some(0.0);
             let is_null = |k: usize| rest.get(k) == Some(&"NULL");
             if !(0..3).all(|k| zero(k) || is_null(k)) {
-                translation
-                    .log
-                    .left_out(node, "forces are set to 0 only, which keeps velocities");
+                let note = "forces are set to 0 only, which keeps velocities";
+                translation.leave_out_load(node, "condition", &name, note);
                 return Ok(());
             }
             let velocity = model
@@ -130,9 +133,12 @@ pub(super) fn fix(
         _ => None,
     };
     let Some((key, value, note)) = made else {
-        translation
-            .log
-            .left_out(node, format!("fix {style} has no counterpart"));
+        let note = format!("fix {style} has no counterpart");
+        if LOADS_OF_SCRIPTS.contains(style) {
+            translation.leave_out_load(node, "condition", &name, &note);
+        } else {
+            translation.log.left_out(node, note);
+        }
         return Ok(());
     };
     let vector: Vec<Value> = value;
@@ -144,12 +150,11 @@ pub(super) fn fix(
         return Ok(());
     }
     let Some(set) = set(translation, model, bodies, group) else {
-        translation
-            .log
-            .left_out(node, "its group is no body or region");
+        let note = "its group is no body or region";
+        translation.leave_out_load(node, "condition", &name, note);
         return Ok(());
     };
-    let written = translation.name("condition", &format!("fix {id}"));
+    let written = translation.name("condition", &name);
     let mut section = Section::new(format!("condition.{written}"));
     section
         .set("set", Value::text(set))
@@ -174,9 +179,8 @@ fn indent(
     let words = arguments.get(4..).unwrap_or(&[]);
     let fail = |message: String| wrong(translation, command, message);
     if words.windows(2).any(|pair| pair == ["side", "in"]) {
-        translation
-            .log
-            .left_out(node, "a rigid body acts on what lies outside of it");
+        let note = "a rigid body acts on what lies outside of it";
+        translation.leave_out_load(node, "rigid", INDENTER, note);
         return Ok(());
     }
     // The value at the start, and the motion after it.
@@ -206,9 +210,8 @@ fn indent(
             }
             let (radius, grows) = position(words.get(4))?;
             if grows.is_some() {
-                translation
-                    .log
-                    .left_out(node, "a rigid body has a fixed radius");
+                let note = "a rigid body has a fixed radius";
+                translation.leave_out_load(node, "rigid", INDENTER, note);
                 return Ok(());
             }
             (Region::Sphere(centre, radius).shape(0.0), &words[5..])
@@ -257,9 +260,8 @@ fn indent(
             (plane, words.get(4..).unwrap_or(&[]))
         }
         _ => {
-            translation
-                .log
-                .left_out(node, "an indenter is a sphere, a cylinder or a plane");
+            let note = "an indenter is a sphere, a cylinder or a plane";
+            translation.leave_out_load(node, "rigid", INDENTER, note);
             return Ok(());
         }
     };
@@ -275,7 +277,7 @@ fn indent(
             }
         }
     }
-    let written = translation.new_name("rigid", "indenter");
+    let written = translation.new_name("rigid", INDENTER);
     let mut section = Section::new(format!("rigid.{written}"));
     let Value::Table(entries) = shape else {
         unreachable!("a shape is a table");

@@ -6,7 +6,7 @@ use crate::import::draft::Value;
 use crate::import::sets::Sets;
 use crate::import::solver;
 use crate::import::translation::Translation;
-use crate::import::tree::{Node, is_key};
+use crate::import::tree::{Content, Node, is_key};
 
 /// The type of a condition that prescribes temperatures.
 const PRESCRIBED_TEMPERATURE: &str = "Prescribed Temperature";
@@ -35,9 +35,9 @@ pub(super) fn conditions<'n>(
     }
     if let Some(node) = root.get("Boundary Conditions") {
         for (name, value) in node.entries() {
-            if value.text().is_some() && name.to_lowercase().replace('_', " ").contains("node set")
-            {
-                sets.define(name, value);
+            if !matches!(value.content, Content::Table(_)) {
+                let name_of_set = name.to_lowercase().replace('_', " ");
+                sets.define(name, value, name_of_set.contains("node set"));
             }
         }
         for (name, table) in node.tables() {
@@ -62,7 +62,12 @@ pub(super) fn conditions<'n>(
             let known = quantity.iter().find(|(known, _)| is_key(kind_name, known));
             let Some((known, quantity)) = known else {
                 let note = format!("{} has no counterpart", excerpt(kind_name));
-                translation.log.left_out(table, note);
+                let words = kind_name.to_lowercase();
+                let section = match words.starts_with("initial") {
+                    true => "initial",
+                    false => "condition",
+                };
+                translation.leave_out_load(table, section, name, &note);
                 continue;
             };
             translation.log.taken(kind, *known);
@@ -105,7 +110,7 @@ fn temperature<'n>(
 ) -> Result<()> {
     if expanding.is_empty() {
         let note = "no material expands, and heat is not conducted";
-        translation.log.left_out(table, note);
+        translation.leave_out_load(table, "condition", name, note);
         return Ok(());
     }
     let value = translation.required(table, "Value", &format!("the condition `{name}`"))?;

@@ -2,6 +2,7 @@
 
 use crate::error::{Result, excerpt};
 use crate::import::draft::{Section, Value};
+use crate::import::log::OMITTED_BONDS;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
@@ -12,20 +13,7 @@ pub(super) fn contact(
     discretization: &Node,
     blocks: &[(String, String)],
 ) -> Result<()> {
-    let omits = discretization.get("Omit Bonds Between Blocks");
-    let omits_all = omits
-        .and_then(Node::text)
-        .is_some_and(|text| is_key(text, "All"));
-    if let Some(node) = omits {
-        if omits_all {
-            translation.log.taken(node, "[interface] rule = \"none\"")
-        } else {
-            translation.log.left_out(
-                node,
-                "bonds are omitted between all blocks, or pairs of bodies",
-            )
-        }
-    }
+    let omits_all = omits_all(translation, discretization, blocks.len());
     let node = root.get("Contact");
     if blocks.len() > 1 && (omits_all || node.is_some()) {
         let rule = if omits_all { "none" } else { "own" };
@@ -102,6 +90,33 @@ pub(super) fn contact(
         translation.add(section);
     }
     Ok(())
+}
+
+/// Test whether no bonds join blocks; Peridigm knows `All` and `None`.
+fn omits_all(translation: &Translation, discretization: &Node, blocks: usize) -> bool {
+    let Some(node) = discretization.get(OMITTED_BONDS) else {
+        return false;
+    };
+    let text = node.text().unwrap_or("");
+    let log = &translation.log;
+    if is_key(text, "All") {
+        let note = match blocks {
+            0 | 1 => "there is one block",
+            _ => "[interface] rule = \"none\"",
+        };
+        log.taken(node, note);
+        return true;
+    }
+    if is_key(text, "None") {
+        log.taken(node, "blocks are bonded");
+    } else {
+        let note = format!(
+            "the value {} is not known (All, None); the blocks stay bonded",
+            excerpt(text)
+        );
+        log.left_out(node, note);
+    }
+    false
 }
 
 /// Write the contact model of an interaction.

@@ -1,5 +1,6 @@
 //! Material and damage models of Peridigm.
 
+use super::points::Influence;
 use crate::error::{Result, excerpt};
 use crate::import::bodies::{Criterion, DamageModel, Material};
 use crate::import::draft::{Section, Value};
@@ -74,6 +75,49 @@ const MATERIALS: [(&str, &str, &str); 20] = [
 /// The key of the thermal expansion of materials and damage models.
 const EXPANSION: &str = "Thermal Expansion Coefficient";
 
+/// Laws with a choice of the influence function; the others have ω = 1.
+const INFLUENCED: [&str; 2] = ["ordinary", "ordinary_viscoelastic"];
+
+/// Note what became of the influence function.
+pub(super) fn note_influence(
+    translation: &Translation,
+    influence: &Influence,
+    materials: &[Material],
+) {
+    let log = &translation.log;
+    let node = &influence.node;
+    if influence.known == Some("constant") {
+        log.taken(node, "influence = \"constant\", the default");
+        return;
+    }
+    let mut constant: Vec<&str> = Vec::new();
+    for material in materials {
+        if !INFLUENCED.contains(&material.law) && !constant.contains(&material.law) {
+            constant.push(material.law);
+        }
+    }
+    let constant_note = format!("{}: always ω = 1", constant.join(", "));
+    if materials
+        .iter()
+        .all(|material| constant.contains(&material.law))
+    {
+        log.left_out(node, constant_note);
+        return;
+    }
+    let Some(written) = influence.written else {
+        let note = "influence is one of constant, linear, gaussian and inverse; constant is used";
+        log.left_out(node, note);
+        return;
+    };
+    log.taken(node, format!("influence = \"{written}\" of the materials"));
+    if !influence.difference.is_empty() {
+        log.approximated(node, influence.difference);
+    }
+    if !constant.is_empty() {
+        log.approximated(node, constant_note);
+    }
+}
+
 /// Write the materials; return them, and the headers of materials with thermal expansion.
 pub(super) fn read_materials(
     translation: &mut Translation,
@@ -141,7 +185,9 @@ pub(super) fn read_materials(
                 .taken(node, "thermal_expansion of the material");
             expanding.push(section.header().to_owned());
         }
-        if let (Some(influence), "ordinary" | "ordinary_viscoelastic") = (influence, *law) {
+        if let Some(influence) = influence
+            && INFLUENCED.contains(law)
+        {
             section.set("influence", Value::text(influence));
         }
         translation.add(section);

@@ -7,7 +7,9 @@ mod materials;
 mod points;
 
 use crate::error::Result;
+use crate::import::bodies::note_unused_damages;
 use crate::import::draft::Value;
+use crate::import::log::Fate;
 use crate::import::outputs::Outputs;
 use crate::import::sets::Sets;
 use crate::import::solver;
@@ -16,7 +18,7 @@ use crate::import::tree::Node;
 use blocks::read_blocks;
 use conditions::conditions;
 use contact::contact;
-use materials::{damages, read_materials};
+use materials::{damages, note_influence, read_materials};
 use points::{Points, influence, points};
 
 /// Translate a deck.
@@ -41,9 +43,20 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let stages = stages(translation, root, &solvers)?;
     let points = points(translation, discretization)?;
     let influence = influence(translation, discretization)?;
-    let (read, expanding) = read_materials(translation, materials, influence)?;
+    let function = influence.as_ref().and_then(|influence| influence.written);
+    let (read, expanding) = read_materials(translation, materials, function)?;
     let damages = damages(translation, root)?;
+    if let Some(influence) = &influence {
+        note_influence(translation, influence, &read);
+    }
     let names = read_blocks(translation, blocks, &points, &read, &damages)?;
+    if let Some(models) = root.get("Damage Models") {
+        note_unused_damages(translation, models, blocks);
+    }
+    if let Some(restart) = root.get("Restart") {
+        let note = "checkpoints are written by default; `fissure run --restart` continues a run";
+        translation.log.whole(restart, Fate::Approximated, note);
+    }
     let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
     let has_temperature = conditions(translation, root, &mut sets, &stages, &expanding)?;
     contact(translation, root, discretization, &names)?;

@@ -119,47 +119,42 @@ fn quick_grid(translation: &mut Translation, node: &Node) -> Result<Points> {
     ])))
 }
 
-/// The influence function of all materials.
-pub(super) fn influence(
-    translation: &mut Translation,
-    node: &Node,
-) -> Result<Option<&'static str>> {
+/// The influence function of a deck.
+pub(super) struct Influence {
+    /// The key.
+    pub(super) node: Node,
+    /// The name of the function; `None` if there is none like it.
+    pub(super) known: Option<&'static str>,
+    /// The value of the key `influence`; `None` where that is the default.
+    pub(super) written: Option<&'static str>,
+    /// How the function differs; empty if it does not.
+    pub(super) difference: &'static str,
+}
+
+/// Read the influence function of all materials.
+pub(super) fn influence(translation: &Translation, node: &Node) -> Result<Option<Influence>> {
     let Some(function) = node.get("Influence Function") else {
         return Ok(None);
     };
     let text = translation.text(function, "Influence Function")?;
     let bare: String = text.chars().filter(|c| !c.is_whitespace()).collect();
     let bare = bare.trim_end_matches(';').trim_start_matches("value=");
-    let note = |name: &str| format!("influence = \"{name}\" of the materials");
-    Ok(match bare {
-        "One" => {
-            translation.log.taken(function, note("constant"));
-            None
-        }
-        "1.0/zeta" | "1/zeta" | "horizon/zeta" => {
-            translation.log.taken(function, note("inverse"));
-            Some("inverse")
-        }
-        "1.0-zeta/horizon" | "1-zeta/horizon" => {
-            translation.log.taken(function, note("linear"));
-            Some("linear")
-        }
-        "Gaussian" => {
-            let note = note("gaussian") + ": exp(−4ξ²/δ²) in place of exp(−6.25ξ²/δ²)";
-            translation.log.approximated(function, note);
-            Some("gaussian")
-        }
+    let (known, difference) = match bare {
+        "One" => (Some("constant"), ""),
+        "1.0/zeta" | "1/zeta" | "horizon/zeta" => (Some("inverse"), ""),
+        "1.0-zeta/horizon" | "1-zeta/horizon" => (Some("linear"), ""),
+        "Gaussian" => (Some("gaussian"), "exp(−4ξ²/δ²) in place of exp(−6.25ξ²/δ²)"),
         "ParabolicDecay" | "Parabolic_Decay" => {
-            translation.log.approximated(function, note("linear"));
-            Some("linear")
+            (Some("linear"), "in place of a parabola from half a horizon")
         }
-        _ => {
-            let note =
-                "influence is one of constant, linear, gaussian and inverse; constant is used";
-            translation.log.left_out(function, note);
-            None
-        }
-    })
+        _ => (None, ""),
+    };
+    Ok(Some(Influence {
+        node: function.clone(),
+        known,
+        written: known.filter(|known| *known != "constant"),
+        difference,
+    }))
 }
 
 /// The number of a block of a text file, `block_NUMBER`.

@@ -57,7 +57,8 @@ pub(super) fn conditions(
             } else {
                 "no material expands, and heat is not conducted".to_owned()
             };
-            translation.log.left_out(table, note);
+            let section = if is_initial { "initial" } else { "condition" };
+            translation.leave_out_load(table, section, name, &note);
             continue;
         };
         translation.log.taken(variable, "the condition's key");

@@ -7,6 +7,7 @@ mod materials;
 mod points;
 
 use crate::error::Result;
+use crate::import::bodies::note_unused_damages;
 use crate::import::bond_filters::bond_filters;
 use crate::import::draft::Value;
 use crate::import::outputs::Outputs;
@@ -60,6 +61,9 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
         expansions,
     };
     let bodies = read_blocks(translation, blocks, &points, &laws, damping)?;
+    if let (Some(models), true) = (models.get("Damage Models"), breaks) {
+        note_unused_damages(translation, models, blocks);
+    }
     let expands = blocks.tables().any(|(_, block)| {
         let model = block.get("Thermal Model").and_then(Node::text);
         model.is_some_and(|model| {
@@ -71,7 +75,7 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     let mut sets = Sets::new(matches!(points, Points::Mesh(_)));
     if let Some(node_sets) = discretization.get("Node Sets") {
         for (name, node) in node_sets.entries() {
-            sets.define(name, node);
+            sets.define(name, node, true);
         }
     }
     let has_temperature = conditions(translation, root, &mut sets, &stages, expands)?;
