@@ -57,11 +57,7 @@ fn compared(
     let decks = (Deck::new(old.clone())?, Deck::new(new.clone())?);
     let old_scope = Scope::of(old, &decks.0.grammar)?;
     let new_scope = Scope::of(new, &decks.1.grammar)?;
-    // A checkpoint of an earlier version lacks keys that were added since; they have their defaults. A deck that this version
-    // cannot fill in, because a file is gone, is compared as it is.
-    let table = |deck: &Deck| {
-        let text = deck.explain();
-        let text = text.unwrap_or_else(|_| deck.source().text.clone());
+    let table = |text: &str| {
         let parsed = text.parse::<Table>();
         parsed
             .map(Value::Table)
@@ -71,8 +67,42 @@ fn compared(
         scopes: [&old_scope, &new_scope],
         lines: Vec::new(),
     };
-    compare(&mut comparison, &table(&decks.0)?, &table(&decks.1)?);
+    let (mut old, mut new) = (table(&old.text)?, table(&new.text)?);
+    // A checkpoint of an earlier version lacks keys that were added since; they have their defaults. A deck that this version
+    // cannot fill in, because a file is gone, is compared as it is.
+    if let Ok(explained) = decks.0.explain() {
+        complete(&mut old, &table(&explained)?, &new);
+    }
+    if let Ok(explained) = decks.1.explain() {
+        complete(&mut new, &table(&explained)?, &old);
+    }
+    compare(&mut comparison, &old, &new);
     Ok(comparison.lines)
+}
+
+/// Add the keys of another deck that a deck leaves out, with the values that it has with all defaults.
+fn complete(deck: &mut Value, explained: &Value, other: &Value) {
+    let is_empty = |value: &Value| value.as_table().is_some_and(Table::is_empty);
+    match (deck, explained, other) {
+        (Value::Table(deck), Value::Table(explained), Value::Table(other)) => {
+            for (key, other) in other {
+                match (deck.get_mut(key), explained.get(key)) {
+                    (Some(own), Some(explained)) => complete(own, explained, other),
+                    // No tables are as good as none of them.
+                    (None, Some(explained)) if !is_empty(explained) || is_empty(other) => {
+                        deck.insert(key.clone(), explained.clone());
+                    }
+                    _ => {}
+                }
+            }
+        }
+        (Value::Array(deck), Value::Array(explained), Value::Array(other)) => {
+            for ((deck, explained), other) in deck.iter_mut().zip(explained).zip(other) {
+                complete(deck, explained, other);
+            }
+        }
+        _ => {}
+    }
 }
 
 struct Comparison<'a> {

@@ -15,7 +15,7 @@ use super::scene::Mark;
 const REACH: f64 = 0.6;
 
 /// The same for a pixel that has points within this distance on all sides.
-const REACH_INSIDE: f64 = 1.5;
+const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
 pub fn paint(
