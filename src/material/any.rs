@@ -245,6 +245,10 @@ impl<const D: usize> Law<D> for AnyLaw {
         with_law!(self, law => Law::<D>::weighted_volume(law, numbers))
     }
 
+    fn dilatation(&self, numbers: &[f64]) -> Option<f64> {
+        with_law!(self, law => Law::<D>::dilatation(law, numbers))
+    }
+
     fn stress_across(&self, gradient: &SMatrix<f64, D, D>, plastic: &PlasticState) -> Option<f64> {
         with_law!(self, law => Law::<D>::stress_across(law, gradient, plastic))
     }

@@ -18,6 +18,7 @@ mod normalised;
 mod ordinary;
 mod ordinary_plastic;
 mod ordinary_viscoelastic;
+mod pals;
 mod plastic_state;
 mod pmb;
 mod registration;
@@ -48,6 +49,7 @@ registration::register! {
     tensor_pmb::TensorPmb,
     linear_microelastic::LinearMicroelastic,
     ordinary::Ordinary,
+    pals::Pals,
     ordinary_plastic::OrdinaryPlastic,
     ordinary_viscoelastic::OrdinaryViscoelastic,
     correspondence::Correspondence,
@@ -264,6 +266,11 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
 
     /// The weighted volume m (m⁵) of a point from its numbers, for laws that keep it.
     fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// The dilatation θ of a point from its numbers, for laws that do not find it with the weighted volume m alone.
+    fn dilatation(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
 

@@ -19,7 +19,7 @@
 use super::bond::Weights;
 use super::{
     Along, AnyLaw, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law,
-    PlasticState, Property, Word,
+    Pals, PlasticState, Property, Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -132,18 +132,28 @@ pub(super) const INFLUENCE: Key = Key {
     ]),
 };
 
+const SURFACE_CORRECTION: Key = Key {
+    name: "surface_correction",
+    meaning: "what each point's own family corrects: nothing, or the influence functions of the dilatation and of the \
+              deviatoric energy",
+    kind: Kind::Word(&[Word::new("none"), Word::new("pals")]),
+};
+
 impl Declared for Ordinary {
     const DECLARATIONS: &'static [Declaration] = &[Declaration {
-        keys: &[INFLUENCE],
+        keys: &[INFLUENCE, SURFACE_CORRECTION],
         any_poisson_ratio: true,
         no_line: Some("`ordinary` has no 1-D form; `pmb` is the same there for ν = 0.25"),
         breaks_by_energy: true,
         critical_stretch: Some(critical_stretch),
+        scales_thresholds: |values| values.word(SURFACE_CORRECTION.name) != "none",
         examples: &[
             "poisson_ratio = 0.4",
             "poisson_ratio = 0.1, influence = 'linear'",
             "poisson_ratio = 0.25, influence = 'gaussian'",
             "poisson_ratio = -0.3, influence = 'inverse'",
+            "poisson_ratio = 0.3, surface_correction = 'pals'",
+            "poisson_ratio = 0.4, surface_correction = 'pals', influence = 'linear'",
         ],
         ..Declaration::new(
             "ordinary",
@@ -154,7 +164,10 @@ impl Declared for Ordinary {
 }
 
 fn build(given: &Given) -> Built {
-    with_influence(Ordinary::of(given, influence(given)), given)
+    match given.values.word(SURFACE_CORRECTION.name) {
+        "pals" => with_influence(Pals::of(given, influence(given)), given),
+        _ => with_influence(Ordinary::of(given, influence(given)), given),
+    }
 }
 
 /// A law with the influence that is asked for.

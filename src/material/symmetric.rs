@@ -53,3 +53,15 @@ pub fn to_entries<const D: usize>(tensor: &SMatrix<f64, D, D>, entries: &mut [f6
         entries[D + k] = tensor[(a, b)];
     }
 }
+
+/// Exponents of x, y and z in the monomials of a degree, in the order in which they are summed.
+pub fn exponents(degree: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..=degree).flat_map(move |z| (0..=degree - z).map(move |y| [degree - z - y, y, z]))
+}
+
+/// How many components of a symmetric tensor have the same exponents.
+pub fn multiplicity(exponents: [usize; 3]) -> f64 {
+    let factorial = |n: usize| (1..=n).product::<usize>();
+    let all = factorial(exponents.iter().sum());
+    (all / exponents.map(factorial).iter().product::<usize>()) as f64
+}

@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
-use super::symmetric::{Symmetric, mixed, to_entries};
+use super::symmetric::{Symmetric, exponents, mixed, multiplicity, to_entries};
 use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
 use crate::lanes::Lanes;
 
@@ -82,18 +82,6 @@ fn along<const D: usize>(bond: &Bond<D>, (diagonal, others): &Symmetric<D>) -> L
         sum += others[k] * (xi[a] * xi[b] * 2.0);
     }
     sum * (bond.inverse * bond.inverse)
-}
-
-/// Exponents of x, y and z in the monomials of a degree, in the order in which they are summed.
-fn exponents(degree: usize) -> impl Iterator<Item = [usize; 3]> {
-    (0..=degree).flat_map(move |z| (0..=degree - z).map(move |y| [degree - z - y, y, z]))
-}
-
-/// How many components of a symmetric tensor have the same exponents.
-fn multiplicity(exponents: [usize; 3]) -> f64 {
-    let factorial = |n: usize| (1..=n).product::<usize>();
-    let all = factorial(exponents.iter().sum());
-    (all / exponents.map(factorial).iter().product::<usize>()) as f64
 }
 
 /// A component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc by its exponents.

@@ -705,10 +705,12 @@ fn between_bodies_of_different_horizons_by_energy() {
 fn between_bodies_of_different_horizons_by_stretch() {
     let tensor = "pmb = { density = 1, youngs_modulus = 3e3, surface_correction = 'tensor' }";
     let pmb = "pmb = { density = 1, youngs_modulus = 3e3 }";
+    let pals = "ordinary = { density = 1, youngs_modulus = 3e3, poisson_ratio = 0.3, surface_correction = 'pals' }";
     for (law, rule) in [
         (pmb.to_owned(), "critical_stretch"),
         (pmb.to_owned(), "critical_stretch alpha = 0.25"),
         (tensor.to_owned(), "critical_stretch"),
+        (pals.to_owned(), "critical_stretch"),
         (ordinary(0.3, "constant"), "critical_stretch"),
     ] {
         let [coarse, border, fine] = [4.0, 7.0, 10.0].map(|y| cost_at(y, &law, rule, 0.5));

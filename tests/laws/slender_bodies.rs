@@ -113,24 +113,27 @@ fn bars_of_six_and_ten_points() {
     check(10, &[("zero_energy = 'dispersion'", [1.00, 0.93])]);
 }
 
-/// Values of the section problem of an infinite bar, solved by a program of its own with m = 3.
+/// Values of the section problem of an infinite bar, solved by programs of their own with m = 3.
 #[test]
 fn surface_corrections_of_bars() {
-    for (correction, across, wanted) in [
-        ("none", 4, [0.71, 0.50]),
-        ("energy", 4, [1.45, 1.12]),
-        ("tensor", 4, [1.01, 0.80]),
-        ("tensor", 6, [1.02, 0.90]),
+    for (law, correction, across, wanted) in [
+        ("pmb", "none", 4, [0.71, 0.50]),
+        ("pmb", "energy", 4, [1.45, 1.12]),
+        ("pmb", "tensor", 4, [1.01, 0.80]),
+        ("pmb", "tensor", 6, [1.02, 0.90]),
+        ("ordinary", "none", 4, [1.47, 1.09]),
+        ("ordinary", "pals", 4, [0.986, 0.695]),
+        ("ordinary", "pals", 6, [0.987, 0.822]),
     ] {
-        let law = format!(
-            "pmb = {{ density = 1000, youngs_modulus = {YOUNG}, surface_correction = '{correction}' }}"
+        let table = format!(
+            "{law} = {{ density = 1000, youngs_modulus = {YOUNG}, poisson_ratio = {RATIO}, surface_correction = '{correction}' }}"
         );
         for (load, wanted) in [Load::Tension, Load::Bending].into_iter().zip(wanted) {
-            let found = stiffness((&law, "exact"), across, load);
-            println!("{across} {correction} {load:?}: {found:.3}");
+            let found = stiffness((&table, "exact"), across, load);
+            println!("{law} {across} {correction} {load:?}: {found:.3}");
             assert!(
                 (found - wanted).abs() < 0.011,
-                "{across} {correction} {load:?}: {found}"
+                "{law} {across} {correction} {load:?}: {found}"
             );
         }
     }

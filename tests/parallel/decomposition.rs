@@ -487,6 +487,12 @@ fn blocks_of_the_ordinary_law() {
 }
 
 #[test]
+fn blocks_of_the_position_aware_law() {
+    let law = "ordinary = { density = 2, youngs_modulus = 5, poisson_ratio = 0.3, surface_correction = 'pals' }";
+    same_with_either_family("pals", &with_one_law(law));
+}
+
+#[test]
 fn blocks_of_the_normalised_law() {
     let law = "normalised_pmb = { density = 2, youngs_modulus = 5 }";
     same_everywhere("normalised", &with_one_law(law), true);

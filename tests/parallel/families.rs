@@ -154,6 +154,14 @@ fn prototype_microelastic_bonds() {
 }
 
 #[test]
+fn position_aware_bonds() {
+    let ratio = ", poisson_ratio = 0.3, surface_correction = 'pals'";
+    let grid = "horizon = 3\nvolume_correction = 'exact'";
+    compare::<3>(&deck(SOLID, "ordinary", ratio, grid, "0"));
+    compare::<2>(&deck(PLANE, "ordinary", ratio, grid, "0.25"));
+}
+
+#[test]
 fn ordinary_bonds() {
     let ratio = ", poisson_ratio = 0.3, influence = 'inverse'";
     let grid = "horizon = 2\nvolume_correction = 'exact'";

@@ -30,7 +30,7 @@ const MATERIALS: [(&str, &str, &str); 20] = [
         "ordinary",
         "points count whole, and rotations are not linearised",
     ),
-    ("Pals", "ordinary", "without the position-aware weights"),
+    ("Pals", "ordinary", ""),
     ("Multiphysics Elastic", "ordinary", "without the fluid"),
     ("Elastic Correspondence", "correspondence", ""),
     (
@@ -216,7 +216,11 @@ fn law_keys(
         }
         Ok(())
     };
+    let model = table.get("Material Model").and_then(Node::text);
     match law {
+        "ordinary" if model.is_some_and(|model| is_key(model, "Pals")) => {
+            section.set("surface_correction", Value::text("pals"));
+        }
         "ordinary_plastic" => {
             take(section, "Yield Stress", "yield_stress")?;
             section.set("calibration", Value::text("continuum"));
@@ -277,7 +281,7 @@ fn law_keys(
     }
     if let Some(node) = table.get("Apply Shear Correction Factor") {
         if translation.is_true(node) {
-            log.left_out(node, "ordinary laws have no surface correction")
+            log.left_out(node, "has no counterpart; `surface_correction = \"pals\"` of `ordinary` is another correction")
         } else {
             log.taken(node, "no surface correction")
         }

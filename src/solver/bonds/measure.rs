@@ -253,6 +253,12 @@ impl<const D: usize> Forces<D> {
                 0.0
             };
         }
+        for (point, growth) in growth.iter_mut().enumerate() {
+            let law = &self.blocks[usize::from(model.block[point])].law;
+            if let Some(of_law) = Law::<D>::dilatation(law, &self.numbers.of(point)) {
+                *growth = of_law;
+            }
+        }
         [weighted_volume, growth]
     }
 }
