@@ -69,17 +69,17 @@ pub fn at<const D: usize>(
     gradient: &SMatrix<f64, D, D>,
     state: &mut PlasticState,
 ) -> Option<(SMatrix<f64, D, D>, f64)> {
-    let trial = Trial::of(gradient, state)?;
-    let mut strains = trial.strains;
-    let flow = law.flow(&law.stress(&Matrix3::from_diagonal(&strains)), state);
+    let mut trial = Trial::of(gradient, state)?;
+    let flow = law.flow(&law.stress(&Matrix3::from_diagonal(&trial.strains)), state);
     if let Some(flow) = flow {
-        let flow = flow.diagonal();
-        strains -= flow;
-        let change = flow.map(|flow| libm::expm1(-2.0 * flow));
+        let change = flow.diagonal().map(|flow| libm::expm1(-2.0 * flow));
         let change = trial.tensor(&change.component_mul(&trial.squares));
         let change = trial.inverse * change * trial.inverse.transpose();
         add(&mut state.strain, &change);
+        // The stress follows from the state alone, so that a restart computes the same bits.
+        trial = Trial::of(gradient, state)?;
     }
+    let strains = trial.strains;
     let stress = law.stress(&Matrix3::from_diagonal(&strains)).diagonal();
     let piola = trial.tensor(&stress) * trial.inverse.transpose();
     let piola = piola.fixed_view::<D, D>(0, 0).into_owned();

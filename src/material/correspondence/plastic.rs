@@ -71,6 +71,9 @@ pub const STRAIN_MEASURE: Key = Key {
 /// by rounding.
 const SURFACE: f64 = 1e-12;
 
+/// The same for logarithmic strains: b_e of a point that has returned is rounded by the square of its stretches.
+const LOGARITHMIC_SURFACE: f64 = 1e-9;
+
 /// What is wrong with the values of the keys.
 pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let fault = |key: &Key, message: &str| {
@@ -233,8 +236,13 @@ impl Plastic {
     /// work; `None` if nothing flows.
     pub fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) -> Option<Matrix3<f64>> {
         let (limit, most) = (self.limit(state), equivalent(trial));
+        let surface = if self.is_logarithmic {
+            LOGARITHMIC_SURFACE
+        } else {
+            SURFACE
+        };
         // Of what is not finite nothing flows, and it is told as what it is.
-        let flows = most > limit * (1.0 + SURFACE) && most.is_finite();
+        let flows = most > limit * (1.0 + surface) && most.is_finite();
         if !flows {
             return None;
         }
