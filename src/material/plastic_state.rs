@@ -3,7 +3,7 @@
 /// Plastic strain and what came of it; 0 at the start.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PlasticState {
-    /// E_p: xx, yy, zz, yz, xz, xy.
+    /// E_p, or C_p⁻¹ − I where the strain is logarithmic: xx, yy, zz, yz, xz, xy.
     pub strain: [f64; 6],
     /// ∫ √(⅔ Ė_p:Ė_p) dt.
     pub equivalent: f64,

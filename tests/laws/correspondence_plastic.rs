@@ -322,6 +322,40 @@ fn the_energy_of_a_body_that_flows_is_balanced() {
 }
 
 #[test]
+fn the_energy_of_large_plastic_strains_is_balanced() {
+    // Stretched along x by up to a half.
+    let run = |safety: f64| {
+        let more = format!(
+            "initial.burst.velocity = ['0.06*(x - 3.5)', '-0.06*(y - 3.5) + 0.01*x']
+            time = {{ end = 15, safety = {safety} }}"
+        );
+        let hardening = format!("hardening_modulus = {HARDENING}");
+        let text = deck("plane-strain", &more).replace(
+            &hardening,
+            "hardening_modulus = 0.02, strain_measure = 'logarithmic'",
+        );
+        simulate::<2, _>(&text, |mut simulation| {
+            let mut observer = HistoryObserver::new(&simulation).unwrap();
+            row(&mut observer, &mut simulation);
+            while !simulation.is_over() {
+                simulation.advance();
+                simulation.check().unwrap();
+            }
+            let energies = row(&mut observer, &mut simulation).energies;
+            let snapshot = Snapshot::new(&mut simulation);
+            let flowed = snapshot.field(&mut simulation, Field::PlasticStrainEquivalent);
+            let largest = flowed.iter().copied().fold(0.0, f64::max);
+            let start = energies.kinetic + energies.strain + energies.dissipated;
+            assert!(energies.dissipated > 0.3 * start, "{energies:?}");
+            assert!(largest > 0.3, "{largest}");
+            (energies.error / start).abs()
+        })
+    };
+    let [coarse, fine] = [0.4, 0.1].map(run);
+    assert!(fine < 2e-3 && fine < 0.5 * coarse, "{coarse} {fine}");
+}
+
+#[test]
 fn a_relaxed_body_yields_as_one_that_is_pulled() {
     // Supports of two horizons: the families of all whom free points are bonded to reach no end of the bar.
     let text = format!(

@@ -2,7 +2,8 @@
 //! What its fronts do at finer spacings stands in docs/src/verification/eoi_alon.md.
 
 use crate::support::history::{column, row};
-use crate::support::simulate;
+use crate::support::{simulate, simulate_input};
+use fissure::solver::Simulation;
 use fissure::solver::observers::HistoryObserver;
 
 const DENSITY: f64 = 3690.0;
@@ -27,18 +28,25 @@ type Row = [f64; 4];
 
 /// A row after every step.
 fn run(deck: &str) -> Vec<Row> {
-    simulate::<3, _>(deck, |mut simulation| {
-        let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let names = ["time", "front_wave", "front_damage", "tip_farthest_length"];
-        let columns = names.map(|name| column(&observer, name));
-        let mut rows = Vec::new();
-        while simulation.clock.number() < simulation.clock.last() {
-            simulation.advance();
-            let values = row(&mut observer, &mut simulation).values;
-            rows.push(columns.map(|column| values[column]));
-        }
-        rows
+    simulate::<3, _>(deck, |simulation| {
+        rows(
+            simulation,
+            ["time", "front_wave", "front_damage", "tip_farthest_length"],
+        )
     })
+}
+
+/// Columns of the history after every step.
+fn rows<const N: usize>(mut simulation: Simulation<'_, 3>, names: [&str; N]) -> Vec<[f64; N]> {
+    let mut observer = HistoryObserver::new(&simulation).unwrap();
+    let columns = names.map(|name| column(&observer, name));
+    let mut rows = Vec::new();
+    while !simulation.is_over() {
+        simulation.advance();
+        let values = row(&mut observer, &mut simulation).values;
+        rows.push(columns.map(|column| values[column]));
+    }
+    rows
 }
 
 /// Speed (m/s) of the wave or damage front between two places (m), by least squares.
@@ -153,4 +161,45 @@ fn the_constant_of_equation_15_in_the_force_of_equation_4_gives_no_wave() {
         ("pmb]", "normalised_pmb]\nform = 'diehl2016'"),
     ]));
     assert!(with_length.last().unwrap()[WAVE] > 60e-3);
+}
+
+#[test]
+fn a_projectile_makes_the_fronts_of_the_prescribed_load() {
+    let prescribed = run(&deck(&[("dx = 1e-3", "dx = 2e-3")]));
+    let speeds = |rows: &[Row]| {
+        let damage = speed(rows, DAMAGE, 20e-3, 50e-3);
+        [speed(rows, WAVE, 30e-3, 90e-3), damage]
+    };
+    let wanted = speeds(&prescribed);
+    // At 67 m/s the projectile presses as hard as the load, at 380 m/s five times as hard.
+    for (velocity, load) in [("67", 3.8e5), ("380", 1.9e6)] {
+        let set = [("dx", "2e-3"), ("shot", "24e-3"), ("speed", velocity)];
+        simulate_input::<3, _>("edge_on_impact", &set, |simulation| {
+            let names = [
+                "time",
+                "front_wave",
+                "front_damage",
+                "tip_farthest_length",
+                "contact_impact_force_x",
+            ];
+            let all = rows(simulation, names);
+            let fronts: Vec<Row> = all
+                .iter()
+                .map(|row| [row[0], row[1], row[2], row[3]])
+                .collect();
+            let found = speeds(&fronts);
+            for (found, wanted) in found.into_iter().zip(wanted) {
+                assert!((found / wanted - 1.0).abs() < 0.08, "{found} {wanted}");
+            }
+            assert!(found[1] < found[0], "{found:?}");
+            // On the projectile, against its motion; the mean after the first microsecond.
+            let late: Vec<f64> = all
+                .iter()
+                .filter(|row| row[0] > 1e-6)
+                .map(|row| -row[4])
+                .collect();
+            let force = late.iter().sum::<f64>() / late.len() as f64;
+            assert!((force / load - 1.0).abs() < 0.1, "{force} for {load}");
+        });
+    }
 }

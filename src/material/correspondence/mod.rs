@@ -19,6 +19,7 @@ mod bond_associated;
 mod control;
 mod family;
 mod hooke;
+mod logarithmic;
 mod plastic;
 mod stress;
 mod tensor;
@@ -68,6 +69,7 @@ const KEYS: &[Key] = hooke::keys_with_hooke![
     STRESS,
     plastic::YIELD_STRESS,
     plastic::HARDENING,
+    plastic::STRAIN_MEASURE,
     control::KIND,
     control::COEFFICIENT,
 ];
@@ -90,7 +92,7 @@ impl Declared for Correspondence {
         fault: Some(|values, dimension| {
             hooke::fault(values, dimension)
                 .or_else(|| control::fault(values, dimension))
-                .or_else(|| plastic::fault(values))
+                .or_else(|| plastic::fault(values, dimension))
         }),
         elastic: Some(hooke::average),
         invariants,
@@ -319,7 +321,7 @@ impl<const D: usize> Law<D> for Correspondence {
         let stress = inverse.and_then(|inverse| {
             let gradient = moved * inverse;
             let (stress, energy) = match &self.plastic {
-                Some(plastic) => plastic.at(&gradient, state),
+                Some(plastic) => plastic.at(&gradient, state)?,
                 None => self.stress.at(&gradient)?,
             };
             Some((inverse, gradient, stress, energy))
@@ -412,7 +414,7 @@ impl<const D: usize> Law<D> for Correspondence {
 
     fn stress_across(&self, gradient: &SMatrix<f64, D, D>, state: &PlasticState) -> Option<f64> {
         match &self.plastic {
-            Some(plastic) => Some(plastic.across(gradient, state)),
+            Some(plastic) => plastic.across(gradient, state),
             None => self.stress.across(gradient),
         }
     }

@@ -1,4 +1,5 @@
-//! J2 plasticity with isotropic hardening, of the strain of each point's family.
+//! J2 plasticity with isotropic hardening, of the strain of each point's family: at small strains, and by
+//! [`logarithmic`] at large ones.
 //!
 //! Green & Naghdi 1965: Green's strain is the sum of an elastic and a plastic one, E = E_e + E_p, and
 //! S = C : E_e, P = F S. E does not change when the body turns, so that none of this knows rotations: there is
@@ -16,8 +17,9 @@ use std::ops::AddAssign;
 
 use nalgebra::{Matrix3, SMatrix};
 
-use super::super::{Given, Key, Kind, LawFault, PlasticState, Property, Values};
+use super::super::{Given, Key, Kind, LawFault, PlasticState, Property, Values, Word};
 use super::hooke;
+use super::logarithmic;
 use super::stress::{green_strain, stretch_of};
 use super::tensor::{matrix, rows};
 use crate::dimension::Dimension;
@@ -35,6 +37,8 @@ pub struct Plastic {
     shear: f64,
     /// Whether the stress across the plane is 0.
     is_sheet: bool,
+    /// Whether the elastic strain is logarithmic.
+    is_logarithmic: bool,
 }
 
 pub const YIELD_STRESS: Key = Key {
@@ -56,21 +60,41 @@ pub const HARDENING: Key = Key {
     },
 };
 
+pub const STRAIN_MEASURE: Key = Key {
+    name: "strain_measure",
+    meaning: "elastic strain of a body that yields: Green-Lagrange, for small strains, or logarithmic with \
+              F = F_e F_p, for large ones",
+    kind: Kind::Word(&[Word::new("green-lagrange"), Word::new("logarithmic")]),
+};
+
 /// How far above the yield stress, as a share of it, nothing flows: what has returned once does not flow again
 /// by rounding.
 const SURFACE: f64 = 1e-12;
 
+/// The same for logarithmic strains: b_e of a point that has returned is rounded by the square of its stretches.
+const LOGARITHMIC_SURFACE: f64 = 1e-9;
+
 /// What is wrong with the values of the keys.
-pub fn fault(values: &Values) -> Option<LawFault> {
+pub fn fault(values: &Values, dimension: Dimension) -> Option<LawFault> {
     let fault = |key: &Key, message: &str| {
         Some(LawFault {
             key: Some(key.name),
             message: message.to_owned(),
         })
     };
+    let is_logarithmic = values.word(STRAIN_MEASURE.name) == "logarithmic";
     if values.get(YIELD_STRESS.name).is_none() {
+        if is_logarithmic {
+            return fault(&STRAIN_MEASURE, "`\"logarithmic\"` needs `yield_stress`");
+        }
         values.get(HARDENING.name)?;
         return fault(&HARDENING, "needs `yield_stress`");
+    }
+    if is_logarithmic && matches!(dimension, Dimension::PlaneStress { .. }) {
+        return fault(
+            &STRAIN_MEASURE,
+            "`\"logarithmic\"` is for plane strain and space, not for plane stress",
+        );
     }
     if let Some(constant) = hooke::own_constants(values) {
         let message = format!(
@@ -106,45 +130,60 @@ impl Plastic {
             },
             shear,
             is_sheet,
+            is_logarithmic: given.values.word(STRAIN_MEASURE.name) == "logarithmic",
         })
     }
 
     /// For people to read.
-    pub fn described(&self) -> [(&'static str, Property); 2] {
+    pub fn described(&self) -> [(&'static str, Property); 3] {
+        let strain = if self.is_logarithmic {
+            "logarithmic"
+        } else {
+            "Green–Lagrange"
+        };
         [
             ("yield stress", Property::Number(self.yield_stress, "Pa")),
             ("hardening", Property::Number(self.hardening, "Pa")),
+            ("strain measure", Property::Text(strain)),
         ]
     }
 
     /// P (Pa) and the elastic energy density (J/m³) at a displacement gradient, to which the body comes from
-    /// a plastic state that changes with it.
+    /// a plastic state that changes with it; `None` where there is no logarithmic strain.
     pub fn at<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
         state: &mut PlasticState,
-    ) -> (SMatrix<f64, D, D>, f64) {
+    ) -> Option<(SMatrix<f64, D, D>, f64)> {
+        if self.is_logarithmic {
+            return logarithmic::at(self, gradient, state);
+        }
         let mut strain = Matrix3::zeros();
         let in_plane = matrix(&green_strain(&rows(gradient)));
         strain.view_mut((0, 0), (D, D)).copy_from(&in_plane);
         let trial = self.stress(&(strain - tensor_of(&state.strain)));
-        self.flow(&trial, state);
+        if let Some(flow) = self.flow(&trial, state) {
+            logarithmic::add(&mut state.strain, &flow);
+        }
         let elastic = strain - tensor_of(&state.strain);
         let stress = self.stress(&elastic);
         let second: SMatrix<f64, D, D> = stress.fixed_view::<D, D>(0, 0).into_owned();
-        (second + gradient * second, 0.5 * stress.dot(&elastic))
+        Some((second + gradient * second, 0.5 * stress.dot(&elastic)))
     }
 
-    /// Kirchhoff stress across the plane in plane strain, Pa.
+    /// Kirchhoff stress across the plane in plane strain, Pa; `None` where there is no logarithmic strain.
     pub fn across<const D: usize>(
         &self,
         gradient: &SMatrix<f64, D, D>,
         state: &PlasticState,
-    ) -> f64 {
+    ) -> Option<f64> {
+        if self.is_logarithmic {
+            return logarithmic::across(self, gradient, state);
+        }
         let mut elastic = -tensor_of(&state.strain);
         let in_plane = matrix(&green_strain(&rows(gradient)));
         elastic.view_mut((0, 0), (D, D)).add_assign(&in_plane);
-        self.stress(&elastic)[(2, 2)]
+        Some(self.stress(&elastic)[(2, 2)])
     }
 
     /// Stretch F_zz across the plane in plane stress.
@@ -159,8 +198,8 @@ impl Plastic {
         stretch_of(zz - 0.5 * self.lambda / self.shear * elastic)
     }
 
-    /// S of an elastic strain, Pa.
-    fn stress(&self, elastic: &Matrix3<f64>) -> Matrix3<f64> {
+    /// Stress of an elastic strain, Pa: S, or the Kirchhoff stress of a logarithmic strain.
+    pub fn stress(&self, elastic: &Matrix3<f64>) -> Matrix3<f64> {
         let mut stress = elastic * (2.0 * self.shear);
         if self.is_sheet {
             let mean = self.lambda * (elastic[(0, 0)] + elastic[(1, 1)]);
@@ -191,13 +230,19 @@ impl Plastic {
         self.yield_stress + self.hardening * state.equivalent
     }
 
-    /// Lets flow what would come to this stress (Pa) without.
-    fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) {
+    /// The plastic strain that grows where the stress (Pa) would be this one without flow, and what it adds to ε̄ and to the
+    /// work; `None` if nothing flows.
+    pub fn flow(&self, trial: &Matrix3<f64>, state: &mut PlasticState) -> Option<Matrix3<f64>> {
         let (limit, most) = (self.limit(state), equivalent(trial));
+        let surface = if self.is_logarithmic {
+            LOGARITHMIC_SURFACE
+        } else {
+            SURFACE
+        };
         // Of what is not finite nothing flows, and it is told as what it is.
-        let flows = most > limit * (1.0 + SURFACE) && most.is_finite();
+        let flows = most > limit * (1.0 + surface) && most.is_finite();
         if !flows {
-            return;
+            return None;
         }
         let (growth, change) = if self.is_sheet {
             self.in_a_sheet(trial, limit)
@@ -205,12 +250,9 @@ impl Plastic {
             let growth = (most - limit) / (3.0 * self.shear + self.hardening);
             (growth, deviator(trial) * (1.5 * growth / most))
         };
-        let entries = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
-        for (strain, entry) in state.strain.iter_mut().zip(entries) {
-            *strain += change[entry];
-        }
         state.equivalent += growth;
         state.work += (limit + 0.5 * self.hardening * growth) * growth;
+        Some(change)
     }
 
     /// Δε̄ and ΔE_p in plane stress. C and the deviator's projection have the same eigenvectors, so that the
@@ -252,7 +294,7 @@ impl Plastic {
 }
 
 /// A symmetric tensor of its entries xx, yy, zz, yz, xz, xy.
-fn tensor_of([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Matrix3<f64> {
+pub fn tensor_of([xx, yy, zz, yz, xz, xy]: &[f64; 6]) -> Matrix3<f64> {
     Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
 }
 
@@ -355,7 +397,7 @@ mod tests {
         let solid = law(Dimension::Space);
         let [mut of_sheet, mut of_solid] = [PlasticState::default(); 2];
         for gradient in walk::<2>() {
-            let (stress, energy) = sheet.at(&gradient, &mut of_sheet);
+            let (stress, energy) = sheet.at(&gradient, &mut of_sheet).unwrap();
             let mut whole = Matrix3::zeros();
             whole.fixed_view_mut::<2, 2>(0, 0).copy_from(&gradient);
             // The gradient across at which the stress across is 0, between two that are too small and too
@@ -363,14 +405,14 @@ mod tests {
             let [mut low, mut high] = [-0.3, 0.3];
             for _ in 0..80 {
                 whole[(2, 2)] = 0.5 * (low + high);
-                let (stress, _) = solid.at(&whole, &mut of_solid.clone());
+                let (stress, _) = solid.at(&whole, &mut of_solid.clone()).unwrap();
                 if stress[(2, 2)] > 0.0 {
                     high = whole[(2, 2)];
                 } else {
                     low = whole[(2, 2)];
                 }
             }
-            let (wanted, wanted_energy) = solid.at(&whole, &mut of_solid);
+            let (wanted, wanted_energy) = solid.at(&whole, &mut of_solid).unwrap();
             let wanted: Matrix2<f64> = wanted.fixed_view::<2, 2>(0, 0).into_owned();
             assert!((stress - wanted).norm() < 1e-9 * YIELD, "{stress} {wanted}");
             assert!((energy - wanted_energy).abs() < 1e-9 * YIELD);
@@ -392,7 +434,7 @@ mod tests {
             let elastic = super::super::Stress::of("st-venant-kirchhoff", &given, hooke);
             let gradient = Matrix2::new(1e-3, 2e-3, -5e-4, 1e-3);
             let mut state = PlasticState::default();
-            let (stress, energy) = law.at(&gradient, &mut state);
+            let (stress, energy) = law.at(&gradient, &mut state).unwrap();
             let (wanted, wanted_energy) = elastic.at(&gradient).unwrap();
             assert_eq!(state, PlasticState::default());
             assert!((stress - wanted).norm() < 1e-14 * wanted.norm());
