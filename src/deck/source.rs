@@ -18,8 +18,8 @@ const MOST_SHOWN: usize = 790;
 /// Characters of what an error says.
 const MOST_SAID: usize = 600;
 
-/// Characters of a line that are shown in any case.
-const NARROWEST: usize = 24;
+/// The least and the largest number of characters of a line that are shown.
+const SHOWN_OF_LINE: [usize; 2] = [24, 160];
 
 /// A deck's file name and text.
 #[derive(Debug, Clone)]
@@ -137,7 +137,12 @@ impl Source {
             .map_or(1, |text| text.chars().take(MOST_SHOWN).count());
         let heading = format!("{}:{line_number}:{}: {message}", path.display(), column + 1);
         let room = MOST_SHOWN.saturating_sub(heading.chars().count()) / 2;
-        let window = Window::new(line, column, room.saturating_sub(12).max(NARROWEST));
+        let window = Window::new(
+            line,
+            column,
+            room.saturating_sub(12)
+                .clamp(SHOWN_OF_LINE[0], SHOWN_OF_LINE[1]),
+        );
         let carets = "^".repeat(marked.clamp(1, window.rest().max(1)));
         let gutter = " ".repeat(line_number.to_string().len());
         format!(
@@ -261,7 +266,7 @@ mod tests {
             (0..1, &long),
         ] {
             let error = shown(&text, marked, message);
-            assert!(error.chars().count() <= 400, "{error}");
+            assert!(error.chars().count() <= 800, "{error}");
             assert_eq!(error.lines().count(), 4, "{error}");
             assert!(
                 !error.replace('\n', "").contains(char::is_control),

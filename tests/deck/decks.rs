@@ -11,6 +11,7 @@ use fissure::comm::threads;
 use fissure::deck::{self, Deck, Source};
 use fissure::error::{ErrorKind, Result};
 use fissure::solver::Simulation;
+use fissure::solver::calibration::calibrated;
 use fissure::survey::dry_run;
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -40,7 +41,9 @@ fn right_decks() -> Vec<Source> {
 /// Number of points, and first step (s) and number of steps of each stage, of the run that a deck makes.
 pub fn prepare(source: &Source) -> Result<(u64, Vec<(f64, f64)>)> {
     let deck = Deck::new(source.clone())?;
-    let look = dry_run(&deck.problem()?, 1, false).map_err(|error| deck.locate(error))?;
+    let problem = deck.problem()?;
+    let look = calibrated(&problem).and_then(|problem| dry_run(&problem, 1, false));
+    let look = look.map_err(|error| deck.locate(error))?;
     Ok((look.points, look.steps))
 }
 

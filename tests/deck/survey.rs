@@ -227,6 +227,7 @@ fn numbers_that_no_solid_has() {
     let expected = "[body.plate] damage: its bonds break at a stretch of 0.500; bonds of this stretch need `safety = 0.86` or less, it is 0.95";
     assert_eq!(warnings(&bold), [expected]);
     let wide = plate("").replace("horizon = 3", "horizon = 9");
+    let wide = wide.replace("time.end = 1", "time.end = 10");
     let expected = "[body.plate]: its horizon, 9 m, is 9 spacings; 3 to 6 are usual";
     assert_eq!(warnings(&wide), [expected]);
     let long = plate("").replace("time.end = 1", "time.end = 4e12");
@@ -278,7 +279,7 @@ fn areas_for_volumes() {
             grid.horizon = 3
             material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
             body.plate = {{ material = 'glass', points.file = '{}' }}
-            time.end = 1e-2
+            time.end = 10
             ",
             file.display()
         ))

@@ -16,6 +16,7 @@ use fissure::deck::{self, Source};
 use fissure::problem::Problem;
 use fissure::solver::Simulation;
 use fissure::solver::bonds::BondUpdate;
+use fissure::solver::calibration::calibrated;
 
 /// A validated deck from its text.
 pub fn problem(text: &str) -> Problem {
@@ -44,6 +45,7 @@ pub fn simulate_input<const D: usize, T>(
         .collect();
     let problem = deck::read(&path, &set).and_then(|deck| deck.problem());
     let problem = problem.unwrap_or_else(|error| panic!("{error}"));
+    let problem = calibrated(&problem).unwrap_or_else(|error| panic!("{error}"));
     let comm = threads::alone();
     body(Simulation::new(&problem, &comm).unwrap_or_else(|error| panic!("{error}")))
 }
