@@ -330,3 +330,30 @@ fn scattered_points_are_cells_without_gaps_and_holes_stay_open() {
     // A sixth of the plate, which takes about half of the picture.
     assert!(with_hole - scattered > 0.05, "{with_hole} {scattered}");
 }
+
+/// A stretched plate in equilibrium.
+const RESTING: &str = "
+dimension = 'plane-stress'
+grid = { spacing = 1e-3, horizon = 2e-3 }
+material.glass.pmb = { density = 2440, youngs_modulus = 72e9 }
+body.plate = { material = 'glass', shape.box = { lower = [0, 0], upper = [0.02, 0.01] } }
+set.ends.where = 'x < 2e-3 || x > 18e-3'
+condition.pull = { set = 'ends', displacement = ['1e-3*x*t', 0] }
+time = { end = 2e-6, method = 'static', static.load_steps = 1 }
+output = { every_steps = 1, fields = ['displacement', 'velocity'] }
+";
+
+/// Equilibria have no velocity, so the displacement is drawn; where points move, the velocity is.
+#[test]
+fn equilibria_show_their_displacement() {
+    let folder = Folder::new("equilibria");
+    let moving = PLATE.replace("'stress'", "'displacement'");
+    for (name, deck, field) in [
+        ("moving", moving.as_str(), "velocity"),
+        ("resting", RESTING, "displacement"),
+    ] {
+        let out = run(&folder, name, deck, &[]);
+        let words = format!("{field}.png: {field}, magnitude at t = 2.000 µs");
+        expect(&command("plot", &[&out], &[]), 0, &[&words]);
+    }
+}
