@@ -1,4 +1,4 @@
-//! What a deck writes to the result, and how often; validated.
+//! Validation of the result's content and interval, of checkpoints and of rebalancing.
 
 use super::grammar::{self, Balance, Deck};
 use super::resolve::{Scope, find};
@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem;
 
-/// Validates what is written to the result; `end` (s) is the end of the run.
+/// Validate the content and interval of the result; `end` (s) is the end of the run.
 ///
 /// # Errors
 /// On an unknown field or set and on a wrong interval.
@@ -50,7 +50,7 @@ pub fn output(
     })
 }
 
-/// The interval of outputs; none where only `times` are given.
+/// The interval of outputs; `None` if only `times` are given.
 fn every(scope: &Scope, output: &grammar::Output, end: f64) -> Result<Option<problem::Interval>> {
     let default = problem::Interval::Seconds(end / problem::OUTPUTS);
     match (&output.every, &output.every_steps) {
@@ -91,7 +91,7 @@ fn times(scope: &Scope, output: &grammar::Output, end: f64) -> Result<Vec<f64>> 
     Ok(times)
 }
 
-/// Validates when points are dealt out anew.
+/// Validate the settings of the rebalancing.
 ///
 /// # Errors
 /// On a bound that every partition exceeds.

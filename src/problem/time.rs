@@ -13,7 +13,7 @@ pub struct Time {
     pub method: Method,
     /// Factor on the density in the equation of motion.
     pub density_scale: f64,
-    /// Settings of a step that adapts to the number of broken bonds, if it does.
+    /// Settings of a step that adapts to the number of broken bonds, if this is requested.
     pub adaptive: Option<Adaptive>,
 }
 
