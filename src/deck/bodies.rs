@@ -97,9 +97,10 @@ pub fn bodies(
     })
 }
 
-/// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their points
-/// stay aligned. In each direction it is 0, unless the first body whose flat faces are whole cells apart would not be
-/// filled exactly; then it is the lower face of that body.
+/// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their
+/// points stay aligned. In each direction, the first body that is a whole number of cells long between flat faces
+/// decides. The origin is 0 if cells from 0 fill this body exactly, otherwise its lower face. Without such a body it is
+/// 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {

@@ -16,9 +16,9 @@ pub struct Grid {
     pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded.
     pub horizon: Number,
-    /// Position in m of a corner of a lattice cell. The default in each direction is 0. An exception is a body that is
-    /// a whole number of cells long but does not start at a cell face: the default is then the lower face of the first
-    /// such body.
+    /// Position in m of a corner of a lattice cell. The default in each direction follows from the first body that is a
+    /// whole number of cells long between flat faces: 0 if cells from 0 fill it exactly, otherwise its lower face.
+    /// Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
     /// Volume correction of points near the edge of a family: `"exact"`, `"linear"` or `"none"`. The default is
