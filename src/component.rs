@@ -11,7 +11,7 @@ const SYMMETRIC: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 /// Names of the components of a tensor, row by row.
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
-/// A number that follows from the values of a point.
+/// A component or invariant: a number computed from the values of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Component {
     /// Entry of the values.
@@ -28,7 +28,7 @@ pub enum Component {
     Determinant,
 }
 
-/// Names of the components of fields with so many; none of a scalar.
+/// Names of the components of a field with this number of components; empty for a scalar.
 pub fn names(components: usize) -> &'static [&'static str] {
     match components {
         2 => &AXES[..2],
@@ -39,8 +39,8 @@ pub fn names(components: usize) -> &'static [&'static str] {
     }
 }
 
-/// Index and name of the components that a problem of this dimension has; one of a scalar, without a name. Stress and
-/// strain are those of the body in space, whose normal components are there in any dimension.
+/// Index and name of the components in a problem of this dimension; a scalar has one component without a name. Stress
+/// and strain are those of the body in space and have three normal components in any dimension.
 pub fn entries(
     components: usize,
     dimension: usize,
@@ -57,7 +57,7 @@ pub fn entries(
     all.iter().copied().enumerate().filter(is_there)
 }
 
-/// Names of the invariants of fields with so many components.
+/// Names of the invariants of a field with this number of components.
 pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
     match components {
         2 | 3 => &[("magnitude", Component::Magnitude)],
@@ -79,7 +79,7 @@ pub fn invariants(components: usize) -> &'static [(&'static str, Component)] {
 }
 
 impl Component {
-    /// The number of a point with these values.
+    /// The component or invariant of these values.
     pub fn of(self, values: &[f64]) -> f64 {
         match self {
             Self::Entry(entry) => values[entry],

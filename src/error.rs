@@ -1,4 +1,4 @@
-//! The one error type: what went wrong, in words a user can act on, and whose fault it is; and warnings.
+//! The error type of the crate, and warnings. An error has a message for the user and a category.
 //!
 //! Both may name bytes of the deck by a span. [`Deck::locate`](crate::deck::Deck::locate) turns it into file,
 //! line and column.
@@ -18,10 +18,10 @@ pub enum ErrorKind {
     Stopped,
 }
 
-/// An error with a message that names the key or the file, and what would be right.
+/// An error whose message names the key or the file and what is allowed.
 #[derive(Debug, Clone)]
 pub struct Error {
-    /// Whose fault it is.
+    /// Category of the error.
     pub kind: ErrorKind,
     /// The message, without a leading `error:`; may span several lines.
     pub message: String,
@@ -29,19 +29,19 @@ pub struct Error {
     pub span: Option<Range<usize>>,
 }
 
-/// Something that is allowed but most likely not meant.
+/// A warning: something is allowed but probably a mistake.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
     /// The message, without a leading `warning:`; one line.
     pub message: String,
-    /// Bytes of the deck that it is about, unless the message names them.
+    /// Bytes of the deck that the warning refers to, unless the message names them.
     pub span: Option<Range<usize>>,
 }
 
-/// The result of anything that can fail.
+/// `Result` with the error type of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Most characters of a user's text that a message repeats.
+/// Largest number of characters of a user's text that a message quotes.
 const EXCERPT: usize = 40;
 
 /// A user's text for a message: in backticks, without control characters, and not too long.
@@ -117,7 +117,7 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {}
 
 impl Warning {
-    /// A warning that names no place in the deck.
+    /// A warning without a span in the deck.
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: message.into(),

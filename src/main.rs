@@ -9,8 +9,8 @@ fn main() -> ExitCode {
     cli::main()
 }
 
-/// Large arrays go back to the system as soon as they are freed: those of the set-up are as large as
-/// those of the run.
+/// Return large arrays to the system as soon as they are freed, because the arrays of the set-up are as large as those
+/// of the run.
 fn give_memory_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: only sets a parameter of the allocator, before there is another thread.

@@ -1,6 +1,6 @@
 //! Parts of messages: numbers and names as users read them.
 
-/// Names longer than this resemble no other name.
+/// Longest name for which similar names are searched.
 const LONGEST_NAME: usize = 64;
 
 /// A number for a message; with an exponent where it would be a long row of digits.

@@ -22,8 +22,8 @@ pub struct Weibull {
 }
 
 impl Weibull {
-    /// The strength of a point over the characteristic strength: (−ln u)^(1/m). It is below x with a probability of
-    /// 1 − exp(−x^m).
+    /// The strength of a point divided by the characteristic strength: (−ln u)^(1/m). It is below x with a probability
+    /// of 1 − exp(−x^m).
     pub fn strength(self, id: u64) -> f64 {
         let survival = uniform(self.seed, Scattered::Strength, id);
         libm::pow(-libm::log(survival), 1.0 / self.modulus)

@@ -33,7 +33,7 @@ pub fn is_key(source: &Source, name: &str) -> bool {
 pub fn assign(source: &Source, assignments: &[(&str, &str)]) -> Result<String> {
     let mut document: DocumentMut = match source.text.parse() {
         Ok(document) => document,
-        // The reader of decks says what is wrong.
+        // The deck reader reports the error.
         Err(_) => return Ok(source.text.clone()),
     };
     for (key, text) in assignments {
@@ -148,7 +148,7 @@ mod tests {
             let error = assigned(deck, key, "1").unwrap_err();
             assert!(error.message.contains(message), "{}", error.message);
         }
-        // What is no TOML is left to the reader of decks.
+        // The deck reader reports text that is not TOML.
         assert_eq!(assigned("a = = 1", "e.f", "1").unwrap(), "a = = 1");
     }
 }

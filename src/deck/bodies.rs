@@ -16,13 +16,12 @@ use crate::message::format_number;
 use crate::points::Columns;
 use crate::problem;
 
-/// The square of this number of bond lists is looked through in every step.
+/// Largest number of bodies; each step searches as many bond lists as the square of this number.
 const MOST_BODIES: usize = 256;
 
 /// Validates the bodies.
 ///
-/// # Errors
-/// On an unknown material or damage law, a wrong shape, or anything but one source of points.
+/// # Errors On an unknown material or damage law, a wrong shape, or not exactly one source of points.
 pub fn bodies(
     scope: &Scope,
     deck: &Deck,
@@ -98,9 +97,10 @@ pub fn bodies(
     })
 }
 
-/// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their points
-/// stay aligned. In each direction it is 0, unless the first body whose flat faces are whole cells apart would not be
-/// filled exactly; then it is the lower face of that body.
+/// Sets the origin of the grids of a deck without `origin`: one for all bodies with the same cells, so that their
+/// points stay aligned. In each direction, the first body that is a whole number of cells long between flat faces
+/// decides. The origin is 0 if cells from 0 fill this body exactly, otherwise its lower face. Without such a body it is
+/// 0.
 fn anchor(bodies: &mut [problem::Body], dimension: usize) {
     let mut anchors: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for index in 0..bodies.len() {
@@ -134,7 +134,7 @@ fn same_cells(bodies: &[problem::Body], edges: [f64; 3]) -> impl Iterator<Item =
     })
 }
 
-/// The share of a cell's edge by which a number of cells may differ from a whole one.
+/// Tolerance for a whole number of cells, as a fraction of a cell's edge.
 const WHOLE: f64 = 1e-6;
 
 /// Where cells with an edge (m) begin that fill a shape exactly along an axis, m: 0 if they may begin there. `None` for a
@@ -170,7 +170,7 @@ fn flat_faces(shape: &problem::Shape, axis: usize) -> Option<[f64; 2]> {
     }
 }
 
-/// An error if a body asks for rows of a point file, or elements of a mesh, that an earlier one takes.
+/// An error if a body requests rows of a point file, or elements of a mesh, that belong to an earlier body.
 fn rows_are_taken_once(scope: &Scope, bodies: Vec<problem::Body>) -> Result<Vec<problem::Body>> {
     let rows = |body: &problem::Body| match &body.points {
         problem::PointSource::File {

@@ -1,4 +1,4 @@
-//! Whether two decks describe the same physics: what a restart must not change.
+//! Comparison of the physics of two decks, which a restart must not change.
 
 use toml::{Table, Value};
 
@@ -14,11 +14,11 @@ use crate::expression::{Expression, POSITION_AND_TIME};
 /// Keys within sections that a restart may change.
 const FREE_KEYS: [&str; 1] = ["time.end"];
 
-/// Keys of the history that say how often there is a row.
+/// Keys of the history that set the interval of rows.
 const HOW_OFTEN: [&str; 2] = ["every", "every_steps"];
 
-/// What differs in the physics of two decks, both with every default filled in: a line for each key
-/// with its old and its new value.
+/// The differences in the physics of two decks with all defaults filled in: one line per key, with its old and new
+/// value.
 ///
 /// # Errors
 /// When a deck cannot be parsed.
@@ -28,8 +28,7 @@ pub fn differences(old: &Source, new: &Source) -> Result<Vec<String>> {
     })
 }
 
-/// What differs in the meaning of the history's columns, as [`differences`]; how often there is a row
-/// means nothing.
+/// The differences in the meaning of the history's columns, as in [`differences`]. The interval of rows is ignored.
 ///
 /// # Errors
 /// When a deck cannot be parsed.
@@ -117,7 +116,7 @@ impl Comparison<'_> {
             return;
         }
         match (old, new) {
-            // What is compared where it is used is compared here only if both decks have it.
+            // Sections that are compared where they are used are compared here only if both decks have them.
             (None, _) | (_, None) if counts_where_used(key) => {}
             (Some(Value::Table(old)), Some(Value::Table(new))) => {
                 let order = |table: &Table| table.keys().cloned().collect::<Vec<_>>();
@@ -173,13 +172,13 @@ impl Comparison<'_> {
     }
 }
 
-/// Whether the section of a key counts where it is used.
+/// Whether the section of a key is compared where it is used.
 fn counts_where_used(key: &str) -> bool {
     let section = key.split('.').next().and_then(Section::find);
     section.is_some_and(|section| section.restart == Restart::WhereUsed)
 }
 
-/// A value for people: as written, and what it comes to.
+/// A value for messages: as written, and its evaluated number.
 fn shown(value: Option<&Value>, expression: Option<&Expression>) -> String {
     let Some(value) = value else {
         return "not there".to_owned();

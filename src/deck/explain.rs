@@ -27,7 +27,7 @@ pub fn explain(scope: &Scope, deck: &Deck, problem: &Problem) -> Result<String> 
     toml::to_string(&deck).map_err(|error| Error::run(format!("cannot write the deck: {error}")))
 }
 
-/// Writes into the deck whatever it leaves to a default that depends on other values.
+/// Write defaults that depend on other values into the deck.
 fn fill(deck: &mut Deck, problem: &Problem) {
     let number = |value| Some(default_number(value));
     match problem.dimension {
@@ -176,7 +176,7 @@ fn fill_material(material: &mut Material, dimension: Dimension) {
     *table = filled.collect();
 }
 
-/// The grid's spacing, if one number holds for all directions.
+/// The grid's spacing, if it is the same in all directions.
 fn edge(grid: &Grid) -> Option<Number> {
     let spacing = grid.spacing.as_ref()?;
     match spacing.get_ref() {

@@ -1,4 +1,4 @@
-//! What a deck writes to the history, and how often; validated.
+//! Validation of the history's content and interval.
 
 use super::grammar::{self, Deck, Text};
 use super::names::suits_a_column;
@@ -155,7 +155,7 @@ fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
     Ok(fields[find(scope.source, name, names, key)?])
 }
 
-/// The number of a point that a table asks for; by default that of a scalar or the magnitude of a vector.
+/// The component or invariant that a table requests; by default the scalar or the magnitude of a vector.
 fn component(
     scope: &Scope,
     key: &str,

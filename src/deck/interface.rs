@@ -12,17 +12,16 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{self, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Toughness};
 
-/// What stands for damage in a pair whose bonds never break.
+/// Value of `damage` for a pair whose bonds never break.
 const UNBREAKABLE: &str = "none";
 
 /// The largest ratio of the stiffnesses of two bodies whose interface has a strength.
 const MAX_STIFFNESS_RATIO: f64 = 10.0;
 
-/// Validates the rules of the bonds between bodies, and damage that these have of their own.
+/// Validate the rules of the bonds between bodies, and the damage laws of pairs.
 ///
-/// # Errors
-/// On bodies whose laws no bond can have, a rule or damage that the laws of a pair do not allow, and on pairs that
-/// are none or are given twice.
+/// # Errors On bodies whose laws cannot share a bond, a rule or damage that the laws of a pair do not allow, an invalid
+/// pair, and a pair that is given twice.
 pub fn interface(
     scope: &Scope,
     deck: &Deck,
@@ -102,7 +101,7 @@ struct Damages<'a> {
 }
 
 impl Damages<'_> {
-    /// When the bonds break, and where that stands in the deck.
+    /// When the bonds break, and the span of this setting.
     fn damage(
         &self,
         table: &grammar::Pair,

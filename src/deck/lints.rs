@@ -1,5 +1,5 @@
-//! What a deck may say but most likely does not mean: names that nothing uses, conditions that are none, and stages that
-//! change the mass of moving points.
+//! Warnings about probable mistakes in a deck: unused names, numbers in place of conditions, and stages that change the
+//! mass of moving points.
 
 use indexmap::IndexSet;
 use toml::Value;
@@ -12,7 +12,7 @@ use crate::message::format_number;
 use crate::points::file;
 use crate::problem::{PointSource, Problem, Selector, changes_density_scale};
 
-/// A warning for each of them. `scope` is that of the validated deck.
+/// Return a warning for each probable mistake; `scope` is the scope of the validated deck.
 ///
 /// # Errors
 /// When the deck cannot be written out to look for names.
@@ -75,7 +75,7 @@ fn ignored_columns(problem: &Problem) -> Vec<Warning> {
     warnings
 }
 
-/// A warning for each table that is there to be referred to, and that no other part of the deck refers to.
+/// A warning for each table that only has an effect by reference and that no other part of the deck refers to.
 fn unused(scope: &Scope, deck: &Deck) -> Vec<Warning> {
     let used = scope.used.borrow();
     let mut tables = deck.named_tables();

@@ -20,9 +20,8 @@ use crate::problem::law;
 
 /// Validates a material.
 ///
-/// # Errors
-/// On an unknown law or key, wrong constants, too few or too many, and those of a solid that the law
-/// cannot be.
+/// # Errors On an unknown law or key; on wrong, missing or surplus constants; and on constants of a solid that the law
+/// cannot model.
 pub fn material(
     scope: &Scope,
     dimension: Dimension,
@@ -153,9 +152,8 @@ impl Section<'_> {
         Ok(value)
     }
 
-    /// The elastic constants; those of a bond-based law have its own Poisson ratio, but for a bar under uniaxial
-    /// stress, and a law may have
-    /// keys that stand for them.
+    /// The elastic constants. A bond-based law fixes Poisson's ratio, except for a bar under uniaxial stress. A law may
+    /// have its own keys instead of elastic constants.
     fn elastic(&self, law: &problem::Law, dimension: Dimension) -> Result<Isotropic> {
         let own = (self.declaration.elastic).and_then(|own| own(&law.values, dimension));
         if let Some(own) = own {
@@ -192,7 +190,7 @@ impl Section<'_> {
             _ => return Err(self.wrong_number_of_constants(&given)),
         };
         let last = given.last().map(|(name, _)| *name);
-        // What is wrong with the constants stands at the last one, but names none of them alone.
+        // An error about the constants points at the last one, but no single constant is wrong.
         let error = |message: String| {
             let place = last.map_or(self.place.clone(), |name| self.table[name].span());
             self.scope.error(place, format!("{}: {message}", self.key))

@@ -51,8 +51,7 @@ pub struct Deck {
     grammar: grammar::Deck,
 }
 
-/// Reads a deck; `set` gives parameters, by name, other values or expressions, and keys, with the sections that they
-/// are in, other values.
+/// Read a deck. `set` replaces parameters by name (with values or expressions) and keys by section and name.
 ///
 /// # Errors
 /// An input error that names file, line, column and key and says what would be right.
@@ -89,7 +88,7 @@ pub fn read_with(path: &Path, overlays: &[PathBuf], set: &[(String, String)]) ->
 }
 
 impl Deck {
-    /// From a text.
+    /// Read a deck from its text.
     ///
     /// # Errors
     /// As [`read`].

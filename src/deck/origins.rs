@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use toml::de::{DeTable, DeValue};
 
-/// The files of a changed deck, and the bytes of its text that stand in them.
+/// The files of a merged deck, and the byte ranges of its text that come from them.
 #[derive(Debug)]
 pub struct Origins {
     /// Paths and texts: the deck and its overlays.
@@ -13,7 +13,7 @@ pub struct Origins {
     pieces: Vec<Piece>,
 }
 
-/// Bytes of the changed text that stand in a file.
+/// A byte range of the merged text that comes from a file.
 #[derive(Debug)]
 struct Piece {
     changed: Range<usize>,

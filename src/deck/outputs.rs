@@ -1,4 +1,4 @@
-//! What a deck writes to the result, and how often; validated.
+//! Validation of the result's content and interval, of checkpoints and of rebalancing.
 
 use super::grammar::{self, Balance, Deck};
 use super::resolve::{Scope, find};
@@ -163,7 +163,7 @@ fn times(scope: &Scope, section: &str, output: &grammar::Output, end: f64) -> Re
     Ok(times)
 }
 
-/// Validates when points are dealt out anew.
+/// Validate the settings of the rebalancing.
 ///
 /// # Errors
 /// On a bound that every partition exceeds.

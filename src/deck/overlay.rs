@@ -1,4 +1,4 @@
-//! The keys of other decks over those of a deck.
+//! Merging of overlay decks into a deck.
 
 use toml_edit::{DocumentMut, Item, TableLike};
 
@@ -29,7 +29,7 @@ pub fn merge(deck: &Source, overlays: &[Source]) -> Result<String> {
 
 /// A text with the places of its comments and blanks.
 fn document(source: &Source) -> Result<DocumentMut> {
-    // Its errors are in the words that decks without overlays get.
+    // Its errors have the same text as for decks without overlays.
     if let Err(error) = source.text.parse::<toml::Table>() {
         return Err(toml_error(source, &error));
     }
@@ -61,7 +61,7 @@ fn merge_tables<'k>(
                 let mut item = item.clone();
                 forget_positions(&mut item);
                 if let (Item::Value(value), true) = (&mut item, is_inline) {
-                    // A comment behind it would hide what follows on the line.
+                    // A comment after the value would hide the rest of the line.
                     value.decor_mut().clear();
                 }
                 lower.insert(key, item);
@@ -112,7 +112,7 @@ mod tests {
             .unwrap_or_else(|error| panic!("{error}\n{text}"))
     }
 
-    /// What tables with these keys and values are, one over the other, without choices.
+    /// The merge of two tables with these keys and values, without choices.
     fn over(lower: &mut Table, upper: &Table) {
         for (key, value) in upper {
             match (lower.get_mut(key), value) {

@@ -1,4 +1,4 @@
-//! The named numbers of a deck, which may build on one another in any order.
+//! The named numbers of a deck, which may refer to each other in any order.
 
 use indexmap::IndexMap;
 
@@ -16,8 +16,7 @@ const RESERVED: [&str; 9] = ["x", "y", "z", "t", "pi", "and", "or", "not", "free
 
 /// Evaluates the parameters into the scope.
 ///
-/// # Errors
-/// On a name that no expression can use, on an unknown name and on a circle.
+/// # Errors On a name that no expression can use, an unknown name, or a circular definition.
 pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<()> {
     for name in written.keys() {
         let text = name.get_ref();
@@ -43,7 +42,7 @@ pub fn evaluate(scope: &mut Scope, written: &IndexMap<Text, Number>) -> Result<(
     Ok(())
 }
 
-/// Why expressions cannot use a name, if they cannot.
+/// The reason why expressions cannot use a name; `None` if they can.
 pub fn name_fault(name: &str) -> Option<String> {
     let is_identifier = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !name.is_empty()
@@ -57,7 +56,7 @@ pub fn name_fault(name: &str) -> Option<String> {
     })
 }
 
-/// Gives a parameter another value or expression.
+/// Replace the value or expression of a parameter.
 ///
 /// # Errors
 /// When the deck has no such parameter or the value is no expression.
@@ -106,13 +105,13 @@ fn awaited(scope: &Scope, written: &IndexMap<Text, Number>, number: &Number) -> 
         .find_map(|need| written.get_index_of(need.as_str()))
 }
 
-/// The error about parameters that wait for one another.
+/// The error about parameters with a circular definition.
 fn circle(scope: &Scope, written: &IndexMap<Text, Number>) -> Error {
     let mut way: Vec<usize> = Vec::new();
     let mut next = written
         .values()
         .find_map(|number| awaited(scope, written, number));
-    // Whatever waits leads to the circle, though it need not be on it.
+    // Every unresolved parameter leads to the circle, but may not be part of it.
     while let Some(index) = next.filter(|index| !way.contains(index)) {
         way.push(index);
         next = awaited(scope, written, &written[index]);

@@ -30,15 +30,14 @@ pub struct Scope<'a> {
     pub tables: IndexMap<String, Arc<Table>>,
     /// Number of components of a vector.
     pub dimension: usize,
-    /// Section and name of the tables that [`Self::find_used`] has found.
+    /// Section and name of the tables that [`Self::find_used`] has looked up.
     pub used: RefCell<IndexSet<(&'static str, String)>>,
 }
 
 impl<'a> Scope<'a> {
-    /// Evaluates the parameters, which may build on one another in any order, and reads the tables.
+    /// Evaluate the parameters, which may refer to each other in any order, and read the tables.
     ///
-    /// # Errors
-    /// On a name that hides a variable, on an unknown name, on a circle and on a wrong table.
+    /// # Errors On a name that hides a variable, an unknown name, a circular definition, or a wrong table.
     pub fn of(source: &'a Source, deck: &Deck) -> Result<Self> {
         let mut scope = Self {
             source,
@@ -86,7 +85,7 @@ impl<'a> Scope<'a> {
         Ok(value.expect("an expression without variables is a constant"))
     }
 
-    /// A whole number that TOML can write: its integers end at 2⁶³.
+    /// A whole number below 2⁶³, the limit of TOML integers.
     pub fn whole(&self, number: &Spanned<u64>, key: &str) -> Result<u64> {
         let (value, most) = (*number.get_ref(), i64::MAX);
         if value <= most as u64 {
@@ -135,7 +134,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// An expression of the given variables (z and y only where the dimension has them).
+    /// An expression of the given variables; z and y only if the dimension has them.
     pub fn expression(
         &self,
         number: &Number,
@@ -206,7 +205,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// The entries of a vector, one a dimension.
+    /// The entries of a vector, one for each dimension.
     ///
     /// # Errors
     /// When there are more or fewer.
@@ -243,8 +242,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// The index of the one key that is given, of several that exclude one another; `place` is the
-    /// table that holds them.
+    /// The index of the one given key among mutually exclusive keys; `place` is the table with these keys.
     pub fn exactly_one(
         &self,
         place: Range<usize>,
@@ -277,7 +275,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// One expression a component.
+    /// One expression for each component.
     pub fn expressions(
         &self,
         vector: &Vector,
@@ -298,7 +296,7 @@ impl<'a> Scope<'a> {
             .collect()
     }
 
-    /// One expression a component, or none where the deck says `"free"`.
+    /// One expression for each component; `None` for a component with `"free"`.
     pub fn motion(&self, vector: &Vector, key: &str) -> Result<Vec<Option<Expression>>> {
         let motion = self
             .entries(vector, key)?
@@ -341,7 +339,7 @@ pub fn find<'n>(
         })
 }
 
-/// Resolves every table, under its name.
+/// Resolve every table; the results have the names of the tables.
 pub fn resolve_each<T, U>(
     tables: &Tables<T>,
     resolve: impl Fn(&str, &Spanned<T>) -> Result<U>,

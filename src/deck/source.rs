@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::origins::Origins;
 use crate::error::{Error, Result, Warning};
 
-/// The most bytes of a deck.
+/// Largest size of a deck, bytes.
 const LONGEST: u64 = 1 << 28;
 
 /// Characters of a whole error, where the path is not longer than all the rest.
@@ -28,11 +28,11 @@ pub struct Source {
     pub path: PathBuf,
     /// The whole text.
     pub text: String,
-    /// The files that the text was put together from, if it is not that of the file.
+    /// The files that the text was merged from; `None` if the text is that of the file.
     origins: Option<Arc<Origins>>,
 }
 
-/// The line of a changed deck that an error marks is in no file.
+/// Note for an error whose line is in the merged deck but in no file.
 const CHANGED: &str = "\nnote: lines are those of the deck as changed by --with and --set";
 
 impl Source {
@@ -92,7 +92,7 @@ impl Source {
         }
     }
 
-    /// An input error that names file, line and column and shows what stands there.
+    /// An input error that names file, line and column and shows the line.
     pub fn error(&self, span: Range<usize>, message: impl AsRef<str>) -> Error {
         Error::input(self.marked(span, message.as_ref()))
     }
@@ -155,12 +155,12 @@ impl Source {
 /// The part of a line that is shown.
 struct Window {
     text: String,
-    /// What stands below the text before the mark: blanks, and tabs where the text has them.
+    /// The blanks below the text before the mark; tabs are kept as tabs.
     indent: String,
 }
 
 impl Window {
-    /// So many characters of a line at most, those from `column` on among them.
+    /// An excerpt of at most this many characters of a line, which includes the text at `column`.
     fn new(line: &str, column: usize, width: usize) -> Self {
         // The end of a line may be marked as well.
         let fits = line.chars().nth(width).is_none();

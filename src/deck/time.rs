@@ -8,19 +8,19 @@ use crate::error::Result;
 use crate::message::format_number;
 use crate::problem::{self, Method, StepRule};
 
-/// The share by which times that are computed in different ways may differ.
+/// Relative tolerance of times that are computed in different ways.
 const UP_TO_ROUNDING: f64 = 1e-9;
 
-/// The most halvings of a load step: then there are a million parts.
+/// Largest number of halvings of a load step, which gives about a million parts.
 const MOST_HALVINGS: u64 = 20;
 
-/// A stretch of time with the keys of `[time]` or of a stage.
+/// A time span with the keys of `[time]` or of a stage.
 struct TimeSegment<'a> {
     /// The table, as messages name it.
     key: &'static str,
     /// Length, s.
     length: f64,
-    /// When it ends, s.
+    /// Its end, s.
     end: f64,
     step: Option<&'a Number>,
     safety: &'a Number,
@@ -59,7 +59,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
         end,
         step: time.step.as_ref(),
         safety: &time.safety,
-        // With stages, what a relaxation does not use may be meant for others.
+        // With stages, keys that a relaxation does not use may be meant for other stages.
         method: if deck.stage.is_empty() {
             method
         } else {
@@ -75,8 +75,7 @@ pub fn time(scope: &Scope, deck: &Deck) -> Result<problem::Time> {
 
 /// Validates the stages of the run, whose time axis is `whole`.
 ///
-/// # Errors
-/// On ends that do not follow one another up to that of the run, on unknown names and on wrong numbers.
+/// # Errors On ends that do not increase up to the end of the run, on unknown names and on wrong numbers.
 pub fn stages(scope: &Scope, deck: &Deck, whole: &problem::Time) -> Result<Vec<problem::Stage>> {
     let time = deck.time.get_ref();
     let mut start = 0.0;
@@ -310,7 +309,7 @@ impl TimeSegment<'_> {
         })
     }
 
-    /// The rule of Newton's method; `shared` has what the table does not say.
+    /// The settings of Newton's method; `shared` has the values of keys that are missing in the table.
     fn newton(
         &self,
         scope: &Scope,
@@ -341,7 +340,7 @@ impl TimeSegment<'_> {
     }
 }
 
-/// An error if anything moves at the start of a method that finds equilibria.
+/// An error if anything moves at the start of a method that computes equilibria.
 fn at_rest(scope: &Scope, deck: &Deck, method: grammar::Method) -> Result<()> {
     for (name, table) in &deck.initial {
         if let Some(velocity) = &table.get_ref().velocity {

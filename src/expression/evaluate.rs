@@ -8,7 +8,7 @@ use super::{Table, Variable};
 /// Largest magnitude of an integer exponent that is raised by multiplication.
 const LARGEST_INTEGER_EXPONENT: f64 = 16.0;
 
-/// Stack that nearly every expression fits in; clearing it costs next to nothing.
+/// Stack size that is enough for nearly all expressions; clearing it is cheap.
 const SHALLOW_STACK: usize = 16;
 
 /// Stack that the most deeply nested expression fits in: while the parser is inside one level of
@@ -261,7 +261,7 @@ pub(super) fn append(code: &mut Vec<Instruction>, instruction: Instruction) {
     code.push(replacement);
 }
 
-/// The most values that the code has on its stack at once.
+/// Largest stack size of the code, in values.
 pub(super) fn stack_size(code: &[Instruction]) -> usize {
     let mut size = 0;
     let mut largest = 0;
@@ -279,7 +279,7 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Whether the code's value is 0 or 1 because of how it is made.
+/// Whether the form of the code guarantees a value of 0 or 1, as for a comparison.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {
     let mut truths = Vec::new();
     let take = |stack: &mut Vec<bool>| stack.pop().unwrap_or(false);

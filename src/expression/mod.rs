@@ -54,7 +54,7 @@ use crate::error::{self, Error};
 use evaluate::Instruction;
 pub use table::Table;
 
-/// A variable that an expression may use at evaluation time, beside named parameters.
+/// A variable that an expression may use at evaluation time, in addition to named parameters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Variable {
     /// `x`, the first coordinate.
@@ -94,7 +94,7 @@ impl Variable {
         }
     }
 
-    /// Its place among x, y, z, t.
+    /// Its index among x, y, z, t.
     fn slot(self) -> usize {
         match self {
             Self::X | Self::R => 0,
@@ -112,7 +112,7 @@ pub struct ExpressionError {
     pub start: usize,
     /// The byte after the last; the same as `start` at the end of the text.
     pub end: usize,
-    /// What is wrong, and what would be right.
+    /// Message: what is wrong, and what is allowed.
     pub message: String,
 }
 
@@ -141,7 +141,7 @@ impl std::error::Error for ExpressionError {}
 pub struct Expression {
     /// Postfix code, which is never empty.
     code: Vec<Instruction>,
-    /// The most values that the code has on its stack at once.
+    /// Largest stack size of the code, in values.
     stack_size: usize,
     /// Tables that the code reads, by number, in the order of their first use.
     tables: Vec<Arc<Table>>,
@@ -226,7 +226,7 @@ impl Expression {
         })
     }
 
-    /// The values of a table, whose first and last segment go on beyond its rows.
+    /// The value of a table as an expression of time; its first and last segment extend beyond its rows.
     pub fn of_table(table: Table) -> Self {
         Self {
             code: vec![Instruction::Table(0)],
@@ -248,7 +248,7 @@ impl Expression {
             && tables.all(|(own, other)| own.extends(other))
     }
 
-    /// Whether a name is that of a function.
+    /// Whether a name is the name of a function.
     pub fn is_function(name: &str) -> bool {
         names::is_function(name)
     }
@@ -268,8 +268,8 @@ impl Expression {
         evaluate::evaluate(&self.code, &self.tables, self.stack_size, [x, y, z, time])
     }
 
-    /// By how much the value changes from a time on while the time goes on by a step, or back by a negative
-    /// one; with an error of rounding that is one of the change, not of the value.
+    /// Change of the value from a time over a step, which may be negative. The round-off is relative to the change, not
+    /// to the value.
     pub fn increment(&self, position: [f64; 3], time: f64, step: f64) -> f64 {
         let [x, y, z] = position;
         increment::increment(&self.code, &self.tables, [x, y, z, time], step)
@@ -280,7 +280,7 @@ impl Expression {
         self.evaluate(position, time) != 0.0
     }
 
-    /// Whether the value is a truth, 0 or 1, by how it is made: by a comparison or from such values.
+    /// Whether the form of the expression guarantees a value of 0 or 1, as for a comparison.
     pub fn is_condition(&self) -> bool {
         evaluate::is_truth(&self.code)
     }

@@ -11,7 +11,7 @@
 use crate::lanes::simd::Task;
 use crate::lanes::{LaneTuple, Lanes, Simd};
 
-/// The largest |x| for which the series are taken.
+/// The largest |x| for which the series are used.
 pub const NEAR: f64 = 1.0 / 256.0;
 
 /// P(x)/x.
@@ -59,20 +59,20 @@ pub struct Bond<const D: usize> {
     pub beyond_series: u8,
 }
 
-/// The influence and the share of the volume that a bond has in the sums of its two ends.
+/// Weights of a bond in the sums of its two ends: influence times volume correction.
 #[derive(Debug, Clone, Copy)]
 pub enum Weights {
     /// 1.
     One,
-    /// The same at both ends.
+    /// The same weight at both ends.
     Same(Lanes),
-    /// Those of the own and of the far end.
+    /// The weights at point i and at neighbour j.
     Each([Lanes; 2]),
 }
 
 impl Weights {
-    /// A bit for each bond, intact or not, that is within the horizon of point i, and of point j: there its force state
-    /// acts.
+    /// One bit per bond, intact or not, that is within the horizon of point i, and of point j. The force state of an
+    /// end acts only on these bonds.
     #[inline(always)]
     pub fn acting(self) -> [u8; 2] {
         match self {
@@ -81,7 +81,7 @@ impl Weights {
         }
     }
 
-    /// That of the own end.
+    /// The weight at point i.
     #[inline(always)]
     pub fn own(self) -> Lanes {
         match self {
@@ -90,7 +90,7 @@ impl Weights {
         }
     }
 
-    /// That of the far end.
+    /// The weight at neighbour j.
     #[inline(always)]
     pub fn far(self) -> Lanes {
         match self {
@@ -99,7 +99,7 @@ impl Weights {
         }
     }
 
-    /// The weighted sum of what the own and the far end give; the same to the bit from both ends.
+    /// The weighted sum of the contributions of i and j. Both ends compute the same bits.
     #[inline(always)]
     pub fn sum(self, here: Lanes, there: Lanes) -> Lanes {
         match self {
@@ -158,7 +158,7 @@ pub struct Reference<const D: usize> {
     pub inverse_square: Lanes,
 }
 
-/// What a loop wants to know of deformed bonds.
+/// The quantities of deformed bonds that a loop reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wanted {
     /// What is linear in η.
@@ -251,7 +251,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 }
 
 impl<const D: usize> Bond<D> {
-    /// With the stretches, for those who do not want them of all bonds.
+    /// Add the stretches, for loops that do not need them for all bonds.
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);
@@ -427,7 +427,7 @@ mod tests {
             Self::sum(first, rest / (2.0 * first))
         }
 
-        /// A number over this one.
+        /// A number divided by this one.
         fn under(self, number: f64) -> Self {
             let first = number / self.0;
             let rest = (-first).mul_add(self.0, number) - first * self.1;

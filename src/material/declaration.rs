@@ -1,5 +1,5 @@
-//! What a law declares of itself, as data. The deck's grammar, the table of laws in the book and the
-//! tests of what every law must do follow from it.
+//! Declarations of laws, as data. The deck's grammar, the table of laws in the book, and the tests of all laws use
+//! them.
 
 use std::fmt;
 use std::ops::Range;
@@ -14,24 +14,25 @@ use crate::elastic::Isotropic;
 pub struct Declaration {
     /// Its name in decks.
     pub name: &'static str,
-    /// What its forces are, in a line.
+    /// Description of its forces, one line.
     pub force: &'static str,
-    /// The keys that it has beside density, elastic constants and damping.
+    /// Its keys in addition to density, elastic constants and damping.
     pub keys: &'static [Key],
     /// Whether Poisson's ratio is free, so that it takes two elastic constants; else the ratio is
     /// that of [bond-based laws](Dimension::bond_based_poisson_ratio).
     pub any_poisson_ratio: bool,
-    /// Why there is no 1-D form and what serves there; `None` if there is one.
+    /// Why there is no 1-D form, and the alternative; `None` if there is one.
     pub no_line: Option<&'static str>,
-    /// Whether forces act along ξ and are linear in the displacements, so that they know no rotation.
+    /// Whether forces act along ξ and are linear in the displacements, so that they ignore rotation.
     pub linear: bool,
-    /// What always holds for it, with these values of its keys.
+    /// The invariants of the law with these values of its keys.
     pub invariants: fn(&Values) -> Invariants,
-    /// What is wrong with the values of its keys together, if anything is.
+    /// The error in the combination of its keys' values, if there is one.
     pub fault: Option<fn(&Values, Dimension) -> Option<LawFault>>,
-    /// The elastic constants that follow from its own keys, where these are given; then no others are.
+    /// The elastic constants that follow from its own keys, if these are given; a deck must then give no other
+    /// constants.
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
-    /// Whether bonds can break by the work that they have taken.
+    /// Whether bonds can break by the work done on them.
     pub breaks_by_energy: bool,
     /// The critical stretch that belongs to a fracture energy (J/m²); `None` if bonds never break by
     /// their stretch.
@@ -39,13 +40,13 @@ pub struct Declaration {
     /// The stretch at which bonds of the law break by themselves; its bodies have no damage law. `None` if a damage law
     /// says when they break.
     pub own_critical_stretch: Option<fn(&Given) -> f64>,
-    /// What is wrong with the law at a horizon, if anything can be.
+    /// Check of the law at a horizon, which returns an error; `None` if no horizon is wrong.
     pub horizon_fault: Option<fn(&Given) -> Option<String>>,
     /// Whether the law scales the critical stretch of each bond itself, with these values of its keys.
     pub scales_thresholds: fn(&Values) -> bool,
-    /// Makes the law.
+    /// Create the law.
     pub build: fn(&Given) -> Built,
-    /// What the tests try it with: keys beside density and Young's modulus.
+    /// Examples for the tests: keys in addition to density and Young's modulus.
     pub examples: &'static [&'static str],
 }
 
@@ -78,7 +79,7 @@ impl Declaration {
         self.own_critical_stretch.is_some()
     }
 
-    /// Whether the law is there in this setting, with the defaults of its keys.
+    /// Whether the law exists in this setting, with the defaults of its keys.
     pub fn is_for(&self, dimension: Dimension) -> bool {
         self.no_line.is_none() || !matches!(dimension, Dimension::Line { .. })
     }
@@ -95,14 +96,14 @@ impl fmt::Debug for Declaration {
     }
 }
 
-/// What holds for a law after any motion.
+/// Invariants of a law that hold after any motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Invariants {
-    /// Forces are the slope of the strain energy, as they are not where bonds yield.
+    /// Forces are the gradient of the strain energy; this does not hold for bonds that yield.
     pub conservative: bool,
-    /// A motion that is turned has the same forces, turned.
+    /// A rotated motion has the same forces, rotated.
     pub objective: bool,
-    /// The forces of a body alone do not turn it.
+    /// The internal forces of a body have no resultant moment.
     pub angular_momentum: bool,
 }
 
@@ -115,12 +116,12 @@ impl Invariants {
     };
 }
 
-/// What is wrong with the values of a law's keys.
+/// An error in the values of a law's keys.
 #[derive(Debug, Clone)]
 pub struct LawFault {
-    /// The key that is to blame, if it is one alone.
+    /// The wrong key, if it is a single one.
     pub key: Option<&'static str>,
-    /// What is wrong, and what would be right.
+    /// Message: what is wrong, and what is allowed.
     pub message: String,
 }
 
@@ -135,39 +136,39 @@ pub trait Declared {
 pub struct Key {
     /// Its name.
     pub name: &'static str,
-    /// What it is, with its unit.
+    /// Its meaning, with unit.
     pub meaning: &'static str,
-    /// What may stand there.
+    /// The allowed values.
     pub kind: Kind,
 }
 
-/// What a key may be.
+/// The allowed values of a key.
 #[derive(Debug)]
 pub enum Kind {
     /// A number.
     Number {
-        /// Where it must lie.
+        /// The allowed range.
         range: Range<f64>,
         /// The range in words that follow "must be".
         words: &'static str,
-        /// Its value if it is not given; `None` if it must be.
+        /// Its default; `None` if the key is required.
         default: Option<f64>,
     },
-    /// A number that may be left out.
+    /// An optional number.
     Optional {
-        /// Where it must lie.
+        /// The allowed range.
         range: Range<f64>,
         /// The range in words that follow "must be".
         words: &'static str,
     },
-    /// One of these words; the first if it is not given.
+    /// One of these words; the default is the first.
     Word(&'static [Word]),
-    /// An expression of the bond's length r (m), which may be left out.
+    /// An optional expression of the bond's length r (m).
     OfLength,
 }
 
 impl Kind {
-    /// A number above 0 that must be given.
+    /// A required number above 0.
     pub const POSITIVE: Self = Self::Number {
         range: f64::MIN_POSITIVE..f64::INFINITY,
         words: "above 0",
@@ -175,12 +176,12 @@ impl Kind {
     };
 }
 
-/// A word that may stand for a key.
+/// An allowed word of a key.
 #[derive(Debug)]
 pub struct Word {
-    /// As it stands in decks.
+    /// The word as written in decks.
     pub word: &'static str,
-    /// Why there is no 1-D form with it and what serves there; `None` if there is one.
+    /// Why there is no 1-D form with this word, and the alternative; `None` if there is one.
     pub no_line: Option<&'static str>,
 }
 
@@ -236,7 +237,7 @@ impl Values {
         Self(keys.iter().map(|key| (key.name, default(key))).collect())
     }
 
-    /// Gives a key, which must be one of the law's, another value.
+    /// Set the value of a key, which must be one of the law's keys.
     pub fn set(&mut self, key: &str, value: Value) {
         if let Some((_, old)) = self.0.iter_mut().find(|(name, _)| *name == key) {
             *old = Some(value);
@@ -280,7 +281,7 @@ impl Values {
     }
 }
 
-/// What a law is made from: constants of an end of bonds.
+/// The input from which a law is created: constants of one end of bonds.
 pub struct Given<'a> {
     /// The setting.
     pub dimension: Dimension,
@@ -288,7 +289,7 @@ pub struct Given<'a> {
     pub elastic: Isotropic,
     /// δ, m.
     pub horizon: f64,
-    /// Values of the law's own keys, all that must be given among them.
+    /// Values of the law's own keys; all required keys have one.
     pub values: &'a Values,
     /// Whether the critical stretch follows from a fracture energy, which a law may then hold bond by
     /// bond; else it was given itself and holds for all bonds alike.
@@ -300,16 +301,16 @@ pub fn bond_based_critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy(given.dimension, given.elastic, energy, given.horizon)
 }
 
-/// A law, and what of it lies outside of the loops over bonds.
+/// A law, and its data that the loops over bonds do not read.
 pub struct Built {
     /// The law.
     pub law: AnyLaw,
-    /// What bonds of a length (m) are multiplied by in all sums of a point; 1 if there is none.
+    /// Factor on bonds of a length (m) in all sums of a point; `None` for 1.
     pub influence: Option<Box<dyn Fn(f64) -> f64 + Sync>>,
 }
 
 impl Built {
-    /// Without an influence.
+    /// Create it without an influence function.
     pub fn plain(law: impl Into<AnyLaw>) -> Self {
         Self {
             law: law.into(),
@@ -317,7 +318,7 @@ impl Built {
         }
     }
 
-    /// With an influence of the bond's length (m).
+    /// Create it with an influence function of the bond's length (m).
     pub fn with_influence(
         law: impl Into<AnyLaw>,
         influence: impl Fn(f64) -> f64 + Sync + 'static,

@@ -24,7 +24,7 @@ pub struct ElasticPlasticPmb {
 
 const YIELD_STRETCH: Key = Key {
     name: "yield_stretch",
-    meaning: "the stretch s_y, pulled or pushed, at which a bond yields",
+    meaning: "stretch s_y at which a bond yields, in tension and in compression",
     kind: Kind::POSITIVE,
 };
 

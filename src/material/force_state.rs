@@ -12,10 +12,10 @@ pub trait ForceState<const D: usize>: Copy {
     /// The [`Rotation`](super::Rotation) of the family that the work depends on; nothing for central forces.
     type Rotation: LaneTuple;
 
-    /// Times a number for each bond.
+    /// Multiply by a number for each bond.
     fn times(self, factor: Lanes) -> Self;
 
-    /// The sum with that of the other end, −T_j⟨−ξ⟩.
+    /// Add the force state of the other end, −T_j⟨−ξ⟩.
     fn plus(self, other: Self) -> Self;
 
     /// Adds the force density (N/m³) of the bonds whose bit is set to the sums.

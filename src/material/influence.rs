@@ -1,4 +1,4 @@
-//! Influence functions ω(|ξ|): how much a bond of this length counts.
+//! Influence functions ω(|ξ|): the weight of a bond as a function of its length.
 //!
 //! Silling et al. 2007; the forms are those in common use (Peridigm, Peridynamics.jl).
 

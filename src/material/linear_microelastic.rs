@@ -25,13 +25,15 @@ pub struct LinearMicroelastic {
 
 const LAMBDA: Key = Key {
     name: "lambda",
-    meaning: "λ in N/m⁹, an expression of the bond's length `r` in m; c/r³ if not given",
+    meaning: "stiffness λ in N/m⁹, an expression of the bond's length `r` in m; c/r³ if not \
+              given",
     kind: Kind::OfLength,
 };
 
 const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
-    meaning: "whether the strain energy of each point's own family corrects its micromodulus",
+    meaning: "surface correction of the micromodulus of each point, from its own family: none or \
+              by strain energy",
     kind: Kind::Word(&[Word::new("none"), Word::new("energy")]),
 };
 

@@ -1,10 +1,9 @@
-//! Material laws, one a file. A law knows one bond, eight at a time, and nothing of decks, points,
-//! ranks or fields.
+//! Material laws, one per file. A law computes single bonds, eight at a time. It is independent of decks, points, ranks
+//! and fields.
 //!
-//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007). The
-//! force state T_i of an end depends on the bond, on numbers of the end's whole family (such as a
-//! dilatation) and on numbers that the bond keeps from step to step (such as a plastic stretch). How
-//! many there are of each, and how they are found, the law declares.
+//! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007). The force state T_i
+//! of an end depends on the bond, on numbers of the end's whole family (such as a dilatation) and on the bond history
+//! (such as a plastic stretch). The law declares the number of both and how they are computed.
 
 mod any;
 pub mod bond;
@@ -88,7 +87,7 @@ pub trait Described {
     fn described(&self) -> Vec<(&'static str, Property)>;
 }
 
-/// A material law: what bonds add to the numbers of a point, and the force state that follows.
+/// A material law: the contributions of bonds to the numbers of a point, and the resulting force state.
 ///
 /// The loops multiply what is summed by Ṽ and by the influence, neither of which the law sees. They
 /// run over bonds in these steps:
@@ -99,29 +98,29 @@ pub trait Described {
 ///    [`Self::pass_contribution`] → sums → [`Self::update_point`]; then the numbers are sent to the ghosts;
 /// 3. [`Self::bond_history`] and [`Self::force`] of both ends.
 pub trait Law<const D: usize>: Copy + Send + Sync {
-    /// The numbers of a point that bonds read at both ends: first the constants, then those that are
-    /// found anew before each sum of forces.
+    /// The numbers of a point that bonds read at both ends: first the constants, then the numbers that are recomputed
+    /// before each sum of forces.
     type Point: LaneTuple;
 
-    /// The numbers that a bond keeps for each of its ends; 0 at the start.
+    /// The bond history: numbers stored per bond for each of its ends; initially 0.
     type BondHistory: LaneTuple;
 
-    /// What is summed over the whole family, once.
+    /// The sums over the whole family, which are computed once.
     type ReferenceSum: LaneTuple;
 
-    /// What a pass sums over the intact bonds; passes that sum less leave the rest at 0.
+    /// The sums of a pass over the intact bonds. Passes with fewer sums set the rest to 0.
     type Sum: LaneTuple;
 
     /// The force state's form.
     type Force: ForceState<D>;
 
-    /// How many of the numbers of a point are constants.
+    /// Number of constants among the numbers of a point.
     const CONSTANTS: usize = 0;
 
-    /// How many sums over the bonds come before that of the forces.
+    /// Number of passes over the bonds before the sum of the forces.
     const PASSES: usize = 0;
 
-    /// Numbers of a point that only its own law reads, after those of [`Self::Point`].
+    /// Count of numbers of a point that only its own law reads; they follow those of [`Self::Point`].
     const OWN_NUMBERS: usize = 0;
 
     /// Whether [`Self::force`] or [`Self::bond_history`] read the stretch of bonds.
@@ -130,20 +129,20 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::force`] reads the shortening of bonds.
     const FORCE_READS_EXTENSION: bool = true;
 
-    /// How many dimensions there must be for bodies of the law.
+    /// Smallest dimension that the law supports.
     const LEAST_DIMENSION: usize = 1;
 
     /// Whether [`Self::pass_contribution`] reads the stretch of bonds.
     const SUM_READS_STRETCH: bool = true;
 
-    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds, which those that only fill up a group
-    /// do not have.
+    /// Whether [`Self::pass_contribution`] reads the direction or the length of bonds. Padding bonds of a lane group
+    /// have neither.
     const SUM_READS_DIRECTION: bool = false;
 
-    /// Whether forces act along ξ and are linear in η; else bonds are those of the deformed body.
+    /// Whether forces act along ξ and are linear in η. Otherwise they depend on the deformed bonds.
     const LINEAR: bool = false;
 
-    /// For which vector instructions the loops of its forces, sums and energies are compiled.
+    /// Instruction sets for which the loops of its forces, sums and energies are compiled.
     const ISA_SET: IsaSet = IsaSet::Each;
 
     /// Whether [`Self::toughness_scale`] is not 1.
@@ -152,10 +151,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// Whether [`Self::lost_stiffness`] is not 0.
     const SOFTENS: bool = false;
 
-    /// Whether the stress of a point is the mean of stresses of its bonds, and so is [`Self::stress_across`].
+    /// Whether the stress of a point, and with it [`Self::stress_across`], is the mean of the stresses of its bonds.
     const HAS_BOND_STRESS_ACROSS: bool = false;
 
-    /// What a bond of the undeformed body adds to the sums over the whole family.
+    /// Contribution of a bond of the undeformed body to the sums over the whole family.
     #[inline(always)]
     fn reference_contribution(&self, _bond: &Bond<D>) -> Self::ReferenceSum {
         Self::ReferenceSum::splat(0.0)
@@ -164,8 +163,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// The constants of a point from the sums over its whole family.
     fn constants(&self, _sums: &[f64], _numbers: &mut [f64]) {}
 
-    /// What an intact bond adds to the sums of pass `S`, which may use the numbers found by the
-    /// passes before.
+    /// Contribution of an intact bond to the sums of pass `S`. It may use the numbers of earlier passes.
     #[inline(always)]
     fn pass_contribution<const S: usize>(
         &self,
@@ -176,8 +174,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         Self::Sum::splat(0.0)
     }
 
-    /// The numbers of a point from the sums of a pass: those of [`Self::Point`], then its own ones. What
-    /// flow adds to the plastic state is kept in a step alone.
+    /// Compute the numbers of a point from the sums of a pass: those of [`Self::Point`], then the law's own. Plastic
+    /// flow changes the stored plastic state only in a step.
     fn update_point(
         &self,
         _pass: usize,
@@ -187,7 +185,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     ) {
     }
 
-    /// How many numbers points and bonds have. A law may need fewer passes and own numbers than its type declares.
+    /// Count of the numbers of points and bonds. A law may need fewer passes and own numbers than its type declares.
     fn counts(&self) -> Counts {
         Counts::of::<Self, D>()
     }
@@ -197,12 +195,12 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Whether a pass sums the history of bonds as it is at the end of the step; else as it was at its beginning.
+    /// Whether a pass sums the bond history at the end of the step; otherwise the history at its beginning.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
 
-    /// What a bond keeps for an end when it has come to this deformation in a step (s).
+    /// The bond history of one end after a step (s) to this deformation.
     #[inline(always)]
     fn bond_history(
         &self,
@@ -217,8 +215,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     /// The force state T of one end, N/m⁶; along the bond T/|Y|, or T/|ξ| for linear laws, N/m⁷.
     fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
-    /// The force density of bonds by volume, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of the ends; the same
-    /// to the bit from both ends, up to its sign. Laws may find it in fewer operations.
+    /// The force density of bonds per volume, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of the ends. Both ends compute the
+    /// same bits, up to the sign. Laws may override it with fewer operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -256,7 +254,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         rotation::IDENTITY
     }
 
-    /// What a bond adds to the strain energy density of one end, J/m⁶.
+    /// Contribution of a bond to the strain energy density of one end, J/m⁶.
     fn bond_energy(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Lanes;
 
     /// The part of a point's strain energy density (J/m³) that belongs to no single bond.
@@ -264,7 +262,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         0.0
     }
 
-    /// The weighted volume m (m⁵) of a point from its numbers, for laws that keep it.
+    /// The weighted volume m (m⁵) of a point from its numbers, for laws that store it.
     fn weighted_volume(&self, _numbers: &[f64]) -> Option<f64> {
         None
     }
@@ -284,7 +282,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         None
     }
 
-    /// What a bond adds to the stress of [`Self::stress_across`], where [`Self::HAS_BOND_STRESS_ACROSS`], Pa/m³.
+    /// Contribution of a bond to the stress of [`Self::stress_across`] if [`Self::HAS_BOND_STRESS_ACROSS`], Pa/m³.
     #[inline(always)]
     fn bond_stress_across(&self, _bond: &Bond<D>, _end: &Self::Point) -> Lanes {
         Lanes::splat(0.0)
@@ -305,19 +303,19 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Whether a point has too few bonds left for the law, and carries no force.
+    /// Whether a point has too few intact bonds for the law, so that it carries no force.
     fn is_singular(&self, _numbers: &[f64]) -> bool {
         false
     }
 
-    /// What a bond, broken or not, has dissipated at one end without breaking, J/m⁶.
+    /// Energy that a bond has dissipated at one end without the energy of breaking, J/m⁶; also for broken bonds.
     #[inline(always)]
     fn dissipated(&self, _length: Lanes, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
     }
 
-    /// The share of its stiffness that an intact bond has lost at one end, from 0 to 1: it counts as broken to that
-    /// share in the damage of the point.
+    /// Fraction of its stiffness that an intact bond has lost at one end, from 0 to 1. The damage of the point counts
+    /// this fraction of the bond as broken.
     #[inline(always)]
     fn lost_stiffness(&self, _history: &Self::BondHistory) -> Lanes {
         Lanes::splat(0.0)
@@ -339,8 +337,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         1.0
     }
 
-    /// What the critical stretch of a bond is multiplied by, from the numbers of points i and j and the law of point j; the
-    /// same from both ends.
+    /// Factor on the critical stretch of a bond, from the numbers of points i and j and the law of point j. Both ends
+    /// compute the same factor.
     #[inline(always)]
     fn toughness_scale(&self, _bond: &Bond<D>, _points: [&Self::Point; 2], _other: &Self) -> Lanes {
         Lanes::splat(1.0)

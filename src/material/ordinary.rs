@@ -123,7 +123,8 @@ fn bulk_modulus(dimension: Dimension, elastic: Isotropic) -> Option<f64> {
 
 pub(super) const INFLUENCE: Key = Key {
     name: "influence",
-    meaning: "ω of bonds of length r and a horizon δ: 1, 1 − r/δ, exp(−4r²/δ²) or δ/r",
+    meaning: "influence function ω of bonds of length r at a horizon δ: 1, 1 − r/δ, exp(−4r²/δ²) \
+              or δ/r",
     kind: Kind::Word(&[
         Word::new("constant"),
         Word::new("linear"),
@@ -157,7 +158,7 @@ impl Declared for Ordinary {
         ],
         ..Declaration::new(
             "ordinary",
-            "the linear peridynamic solid (LPS): state-based, of the family's dilatation",
+            "linear peridynamic solid (LPS): state-based, with the dilatation of the family",
             build,
         )
     }];

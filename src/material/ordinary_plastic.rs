@@ -38,13 +38,14 @@ pub struct OrdinaryPlastic {
 
 const YIELD_STRESS: Key = Key {
     name: "yield_stress",
-    meaning: "σ_y, Pa, at which the body yields when it is pulled along an axis (von Mises)",
+    meaning: "yield stress σ_y in uniaxial tension, Pa (von Mises)",
     kind: Kind::POSITIVE,
 };
 
 const CALIBRATION: Key = Key {
     name: "calibration",
-    meaning: "whether points yield by their own families or as if these were whole",
+    meaning: "whether the yield limit of a point is computed for its own family or for a \
+              complete family",
     kind: Kind::Word(&[Word::new("family"), Word::new("continuum")]),
 };
 
@@ -64,7 +65,7 @@ impl Declared for OrdinaryPlastic {
         ],
         ..Declaration::new(
             "ordinary_plastic",
-            "as `ordinary`, perfectly plastic in its deviatoric part",
+            "as `ordinary`, with a perfectly plastic deviatoric part",
             build,
         )
     }];

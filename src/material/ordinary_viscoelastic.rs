@@ -31,13 +31,13 @@ pub struct OrdinaryViscoelastic {
 
 const RELAXATION_TIME: Key = Key {
     name: "relaxation_time",
-    meaning: "τ, s, in which the deviatoric force relaxes",
+    meaning: "relaxation time τ of the deviatoric force, s",
     kind: Kind::POSITIVE,
 };
 
 const RELAXING_SHARE: Key = Key {
     name: "relaxing_share",
-    meaning: "the share λ of the deviatoric force that relaxes",
+    meaning: "fraction λ of the deviatoric force that relaxes",
     kind: Kind::Number {
         range: 0.0..1.0,
         words: "at least 0 and below 1",
@@ -59,7 +59,7 @@ impl Declared for OrdinaryViscoelastic {
         examples: &["poisson_ratio = 0.3, relaxation_time = 0.05, relaxing_share = 0.4"],
         ..Declaration::new(
             "ordinary_viscoelastic",
-            "as `ordinary`, of which a share of the deviatoric force relaxes",
+            "as `ordinary`, but a fraction of the deviatoric force relaxes",
             build,
         )
     }];

@@ -70,7 +70,8 @@ impl Pmb {
 
 const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
-    meaning: "what each point's own family corrects in its micromodulus: nothing, its strain energy, or its elastic tensor",
+    meaning: "surface correction of the micromodulus of each point, from its own family: none, \
+              by strain energy, or by elastic tensor",
     kind: Kind::Word(&[Word::new("none"), Word::new("energy"), Word::new("tensor")]),
 };
 

@@ -1,4 +1,4 @@
-//! What follows from the list of laws: their enums, the dispatch to each, and all declarations.
+//! Code generated from the list of laws: their enums, the dispatch to each law, and all declarations.
 
 /// Makes the enums of laws, and the macros that run code for whichever law it is, from the list of
 /// laws. `$` stands first because the macros that are made need it.
@@ -68,17 +68,17 @@ macro_rules! register {
         }
         pub(crate) use with_pair;
 
-        /// How many numbers each law has in three dimensions.
+        /// Counts of the numbers of each law in three dimensions.
         const COUNTS: &[Counts] = &[$(Counts::of::<$law, 3>()),+];
 
         const DECLARATIONS: &[&[Declaration]] = &[$(<$law as Declared>::DECLARATIONS),+];
 
-        /// What all laws declare.
+        /// The declarations of all laws.
         pub fn declarations() -> impl Iterator<Item = &'static Declaration> + Clone {
             DECLARATIONS.iter().copied().flatten()
         }
 
-        // The declarations of a law say of its forces what its loops do.
+        // The declarations of a law must agree with its loops.
         $(
             const _: () = {
                 let mut k = 0;

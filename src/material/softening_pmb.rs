@@ -74,31 +74,34 @@ const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 
 const TENSILE_STRENGTH: Key = Key {
     name: "tensile_strength",
-    meaning: "f_t, Pa: the largest stress of a body that is pulled along an axis; this or `strength_stretch`",
+    meaning: "tensile strength f_t in Pa, the largest stress in uniaxial tension; this or \
+              `strength_stretch`",
     kind: ABOVE_ZERO,
 };
 
 const STRENGTH_STRETCH: Key = Key {
     name: "strength_stretch",
-    meaning: "the stretch s0 at which a bond begins to soften",
+    meaning: "stretch s0 at which a bond begins to soften",
     kind: ABOVE_ZERO,
 };
 
 const FRACTURE_ENERGY: Key = Key {
     name: "fracture_energy",
-    meaning: "G_F, J/m²: what all bonds across a unit area take; this or `critical_stretch`",
+    meaning: "fracture energy G_F in J/m², the energy that breaks all bonds across a unit area; \
+              this or `critical_stretch`",
     kind: ABOVE_ZERO,
 };
 
 const CRITICAL_STRETCH: Key = Key {
     name: "critical_stretch",
-    meaning: "the stretch s_c at which a bond bears nothing any more and breaks",
+    meaning: "stretch s_c at which the force of a bond reaches 0 and the bond breaks",
     kind: ABOVE_ZERO,
 };
 
 const CURVE: Key = Key {
     name: "curve",
-    meaning: "how the force of a bond falls between s0 and s_c: on a line, on two lines, or as an exponential",
+    meaning: "shape of the softening curve between s0 and s_c: one line, two lines, or an \
+              exponential",
     kind: Kind::Word(&[
         Word::new("bilinear"),
         Word::new("trilinear"),
@@ -108,13 +111,15 @@ const CURVE: Key = Key {
 
 const KINK_FORCE: Key = Key {
     name: "kink_force",
-    meaning: "β of \"trilinear\": the force at the kink over the largest; 1/3 if not given",
+    meaning: "β of \"trilinear\": force at the kink divided by the largest force; 1/3 if not \
+              given",
     kind: BELOW_ONE,
 };
 
 const KINK_STRETCH: Key = Key {
     name: "kink_stretch",
-    meaning: "γ of \"trilinear\": where between s0 and s_c the kink is, as a share; 2/9 if not given",
+    meaning: "γ of \"trilinear\": position of the kink between s0 and s_c, as a fraction; 2/9 if \
+              not given",
     kind: BELOW_ONE,
 };
 
@@ -153,8 +158,8 @@ impl Declared for SofteningPmb {
         ],
         ..Declaration::new(
             "softening_pmb",
-            "f = c (1 − d) s e, where d ≥ 0 of a bond follows from its largest stretch so that the force of a pulled \
-             bond falls from s0 to s_c, where it breaks",
+            "f = c (1 − d) s e, where d ≥ 0 follows from the largest stretch of the bond; in \
+             tension the force falls from s0 to s_c, where the bond breaks",
             build,
         )
     }];

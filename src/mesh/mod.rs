@@ -1,7 +1,7 @@
 //! Meshes of finite elements in the formats of other programs, and points from their elements.
 //!
-//! A reader holds the bytes of its file and checks every count of it against the bytes that are left, so a damaged
-//! file takes no more memory than a sound one of its size.
+//! A reader checks every count in its file against the number of remaining bytes. A damaged file therefore needs no
+//! more memory than a valid one of its size.
 
 mod abaqus;
 mod exodus;
@@ -28,7 +28,7 @@ use kind::KINDS;
 /// Kind of a group of faces of elements, which is stored as these elements.
 pub const SIDE_SET: &str = "side set";
 
-/// Most names of groups that a message lists.
+/// Largest number of group names that a message lists.
 const MOST_LISTED: usize = 8;
 
 /// A file format.
@@ -117,7 +117,7 @@ impl Elements {
         }
     }
 
-    /// Append all elements of another list, whose nodes begin at an index here.
+    /// Append all elements of another list, whose nodes begin at this index of the combined mesh.
     fn append(&mut self, other: &Self, first_node: u32) {
         let (elements, nodes) = (self.len(), self.nodes.len());
         self.kinds.extend_from_slice(&other.kinds);
@@ -180,9 +180,9 @@ pub struct Group {
     pub name: Option<String>,
     /// Its number, if it has one.
     pub number: Option<i64>,
-    /// What the format calls groups like it, such as `side set`.
+    /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
-    /// What it consists of.
+    /// Its members.
     pub members: Members,
 }
 

@@ -36,10 +36,10 @@ const DASHES: [Option<[f64; 2]>; 3] = [None, Some([5.0, 2.5]), Some([1.5, 1.8])]
 /// Colour of the lines at the ticks.
 const GRID: Colour = [228, 228, 232];
 
-/// White space between the data and the frame, as a share of the range.
+/// White space between the data and the frame, as a fraction of the range.
 const MARGIN: f64 = 0.04;
 
-/// Height of the picture as a share of its width.
+/// Height of the picture, as a fraction of its width.
 const HEIGHT: f64 = 0.62;
 
 /// Edge of the marker of an isolated point, in thicknesses.
@@ -84,7 +84,7 @@ pub struct Chart<'a> {
     pub width: u32,
 }
 
-/// Where a text stands relative to its position.
+/// Alignment of a text relative to its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Anchor {
     Start,
@@ -92,7 +92,7 @@ enum Anchor {
     End,
 }
 
-/// A thing to draw; lengths in pixels, downwards from the top.
+/// An element of the drawing; lengths in pixels, downwards from the top.
 enum Shape {
     Polyline {
         points: Vec<[f64; 2]>,

@@ -15,7 +15,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// The place of the coordinate in a position.
+    /// The index of the coordinate in a position.
     pub fn index(self) -> usize {
         self as usize
     }
@@ -77,7 +77,7 @@ pub struct Scene<'a> {
     pub unit: &'a str,
     /// Line above the picture.
     pub title: &'a str,
-    /// Values at the ends of the colour bar; `None` for those that occur.
+    /// Values at the ends of the colour bar; `None` for the smallest and the largest value.
     pub range: Option<(f64, f64)>,
     /// The view of the points.
     pub view: View,

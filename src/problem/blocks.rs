@@ -1,21 +1,21 @@
-//! The blocks of a problem: its bodies and, with refinement, the parts of them by level.
+//! The blocks of a problem: its bodies or, with refinement, the parts of each body by level.
 //!
-//! A block is what has one law, one horizon and, but for parts of refined bodies, one volume for all of
-//! its points.
+//! All points of a block have the same law and horizon. They also have the same volume, except in some blocks of
+//! refined bodies.
 
 use super::{Body, HorizonRule, PointSource, Problem};
 
-/// The points of one level of a refined body fall into so many blocks.
+/// Number of blocks for each level of a refined body.
 const KINDS: usize = 3;
 
-/// What the points of a block have in common beside the level.
+/// The common property of the points of a block, in addition to their level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The volume of a cell of their level: they lie on a lattice.
+    /// Points with the cell volume of their level; they lie on a lattice.
     Whole,
-    /// Another volume, next to finer points or at the edge of the body.
+    /// Points with another volume, next to finer points or at the edge of the body.
     Partial,
-    /// Coarser points within their horizon, where it is enlarged for that.
+    /// Points with coarser points within their horizon, which is enlarged for this reason.
     AtCoarser,
 }
 
@@ -26,7 +26,7 @@ pub struct Block<'a> {
     pub body: &'a Body,
     /// The level of its points, 0 without refinement.
     pub level: u32,
-    /// What else they have in common.
+    /// The common property of its points.
     pub kind: Kind,
     /// Horizon δ, m.
     pub horizon: f64,
@@ -43,7 +43,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Edges of a cell (m), if the points lie in such.
+    /// Edges of a cell (m), if the points lie in lattice cells.
     pub fn spacing(&self) -> Option<[f64; 3]> {
         match self.body.points {
             PointSource::Lattice { spacing, .. } => Some(spacing.map(|edge| edge * self.scale())),

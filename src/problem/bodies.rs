@@ -1,4 +1,4 @@
-//! Bodies: their points, materials, bonds and damage, and what is told of them by place.
+//! Bodies with their points, materials, bonds and damage; sets of points and pre-cracks.
 
 use std::fmt;
 use std::ops::Range;
@@ -17,7 +17,7 @@ use crate::scatter::Weibull;
 pub struct Body {
     /// Its name in the deck.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// The material's name.
     pub material_name: String,
@@ -27,9 +27,9 @@ pub struct Body {
     pub damage: Option<Damage>,
     /// Horizon δ, m.
     pub horizon: f64,
-    /// Where its horizon stands in the deck: its own or that of the grid.
+    /// Span of its horizon in the deck: the horizon of the body or of the grid.
     pub horizon_place: Range<usize>,
-    /// Where its points come from.
+    /// Source of its points.
     pub points: PointSource,
 }
 
@@ -49,7 +49,7 @@ impl Body {
         self.quadrature() == Quadrature::Gauss
     }
 
-    /// Where the points of a cell lie; the centre for points from a file or a mesh.
+    /// Positions of the points in a cell; the centre for points from a file or a mesh.
     pub fn quadrature(&self) -> Quadrature {
         match self.points {
             PointSource::Lattice { quadrature, .. } => quadrature,
@@ -65,7 +65,7 @@ pub struct Material {
     pub law: Law,
     /// kg/m³.
     pub density: f64,
-    /// E and ν; for a bond-based law ν is the law's own.
+    /// E and ν; a bond-based law fixes ν.
     pub elastic: Isotropic,
     /// Viscous damping r, 1/s: a force density −r ρ u̇.
     pub damping: f64,
@@ -73,30 +73,30 @@ pub struct Material {
     pub expansion: ThermalExpansion,
 }
 
-/// What volumes near the edge of a family count.
+/// Volume correction of points near the edge of a family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VolumeCorrection {
-    /// Whole or not at all.
+    /// No correction: the factor is 1 within the horizon and 0 beyond it.
     None,
-    /// A share that falls linearly with the distance, from 1 at δ − dx/2 to 0 at δ + dx/2.
+    /// The factor falls linearly with the distance, from 1 at δ − dx/2 to 0 at δ + dx/2.
     Linear,
-    /// The same up to δ, where it falls from 1/2 to 0.
+    /// The same linear factor up to δ, where it drops from 1/2 to 0.
     LinearInside,
-    /// The share of the cell that lies within the horizon.
+    /// The factor is the fraction of the cell that lies within the horizon.
     Exact,
 }
 
-/// Where the points of a lattice cell lie.
+/// Positions of the points in a lattice cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quadrature {
-    /// One at the centre.
+    /// One point at the centre.
     Midpoint,
-    /// Two by direction, at ±√3/3 of half the edge.
+    /// Two points in each direction, at ±√3/3 of half the edge.
     Gauss,
 }
 
 impl Quadrature {
-    /// Number of points of a cell of so many dimensions.
+    /// Number of points in a cell of this dimension.
     pub fn points(self, dimension: usize) -> u32 {
         match self {
             Self::Midpoint => 1,
@@ -108,29 +108,29 @@ impl Quadrature {
 /// Random displacement of the points of shapes from the centres of their cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jitter {
-    /// The largest displacement by direction, as a share of the cell's edge.
+    /// The largest displacement in each direction, as a fraction of the cell's edge.
     pub share: f64,
     /// The seed.
     pub seed: u64,
 }
 
-/// How bonds are kept.
+/// How bonds are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FamilyRule {
-    /// As bits for bodies on a lattice, in lists for others.
+    /// In lattice families for bodies on a lattice, in lists for other bodies.
     Auto,
     /// In lists.
     List,
-    /// As bits; every body must lie on a lattice.
+    /// In lattice families; every body must lie on a lattice.
     Lattice,
 }
 
 /// The bonds between blocks.
 #[derive(Debug, Clone)]
 pub struct Interface {
-    /// The rule of pairs without one of their own.
+    /// The rule of pairs without their own rule.
     pub rule: InterfaceRule,
-    /// Pairs of bodies that have a rule or damage of their own.
+    /// Pairs of bodies with their own rule or damage.
     pub pairs: Vec<InterfacePair>,
 }
 
@@ -145,23 +145,23 @@ pub struct InterfacePair {
     pub rule: InterfaceRule,
     /// When the bonds break.
     pub damage: InterfaceDamage,
-    /// Where that stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
 }
 
 /// When the bonds between two bodies break.
 #[derive(Debug, Clone, PartialEq)]
 pub enum InterfaceDamage {
-    /// By the damage of both bodies: at the smaller of two thresholds.
+    /// By the damage laws of both bodies, at the smaller of their thresholds.
     OfBodies,
     /// Never.
     Unbreakable,
-    /// By damage of their own, whatever that of the bodies is.
+    /// By their own damage law, which replaces the damage laws of the bodies.
     Own(Damage),
 }
 
 impl InterfaceDamage {
-    /// The damage of the bonds' own, if they have any.
+    /// The bonds' own damage law, if they have one.
     pub fn own(&self) -> Option<&Damage> {
         match self {
             Self::Own(damage) => Some(damage),
@@ -179,8 +179,8 @@ impl Interface {
         })
     }
 
-    /// The rule of the bonds between two bodies; the same for both orders. Within a body each end has its
-    /// own constants.
+    /// The rule of the bonds between two bodies, independent of their order. Within a body, each end has its own
+    /// constants.
     pub fn between(&self, here: &Body, there: &Body) -> InterfaceRule {
         if here.name == there.name {
             return InterfaceRule::Own;
@@ -189,7 +189,7 @@ impl Interface {
         own.map_or(self.rule, |pair| pair.rule)
     }
 
-    /// When the bonds between two bodies break; the same for both orders. Within a body its own damage counts.
+    /// When the bonds between two bodies break, independent of their order. Within a body, its damage law decides.
     pub fn damage_between(&self, here: &Body, there: &Body) -> &InterfaceDamage {
         let own = self.pair(here, there);
         own.map_or(&InterfaceDamage::OfBodies, |pair| &pair.damage)
@@ -197,18 +197,18 @@ impl Interface {
 }
 
 impl InterfacePair {
-    /// Damage of its own, if it has any.
+    /// Its own damage law, if it has one.
     pub fn own_damage(&self) -> Option<&Damage> {
         self.damage.own()
     }
 
-    /// Whether a body is one of the two.
+    /// Whether the body is one of the pair.
     pub fn has(&self, body: &Body) -> bool {
         self.bodies.contains(&body.name)
     }
 }
 
-/// What constants the bonds between two blocks have, if there are any.
+/// Constants of the bonds between two blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InterfaceRule {
     /// No bonds join the blocks.
@@ -221,14 +221,14 @@ pub enum InterfaceRule {
     Own,
 }
 
-/// When bonds break.
+/// A damage law: when bonds break.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Damage {
-    /// What they break by.
+    /// The quantity that decides whether a bond breaks.
     pub rule: DamageRule,
-    /// How much it takes.
+    /// The toughness, from which the threshold follows.
     pub toughness: Toughness,
-    /// α in s ≥ s0 − α s_min.
+    /// α in the criterion s ≥ s0 − α s_min.
     pub alpha: f64,
     /// Scatter of the strength of the points, if there is any.
     pub weibull: Option<Weibull>,
@@ -236,21 +236,21 @@ pub struct Damage {
     pub no_failure: Vec<usize>,
 }
 
-/// What bonds break by.
+/// The quantity that decides whether a bond breaks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DamageRule {
-    /// Their stretch.
+    /// The stretch of the bond.
     CriticalStretch,
-    /// The work that they have taken.
+    /// The work done on the bond.
     Energy {
-        /// How the critical work follows.
+        /// How the critical work follows from the toughness.
         calibration: Calibration,
         /// How the work is looked at; for laws that are not bond-based.
         work: WorkRule,
     },
 }
 
-/// Three measures of how much a material resists a crack.
+/// Toughness, in one of three measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Toughness {
     /// G0, J/m².
@@ -261,7 +261,7 @@ pub enum Toughness {
     CriticalStretch(f64),
 }
 
-/// Where points come from.
+/// Source of a body's points.
 #[derive(Debug, Clone)]
 pub enum PointSource {
     /// The points of lattice cells whose centres lie within a shape.
@@ -272,7 +272,7 @@ pub enum PointSource {
         spacing: [f64; 3],
         /// A corner of a cell, m.
         origin: [f64; 3],
-        /// Where the points of a cell lie.
+        /// Positions of the points in a cell.
         quadrature: Quadrature,
     },
     /// The rows of a file.
@@ -283,20 +283,20 @@ pub enum PointSource {
         block: Option<u32>,
         /// The columns of a row, if the deck names them.
         columns: Option<Columns>,
-        /// Where the file is named in the deck.
+        /// Span of the file's name in the deck.
         span: Range<usize>,
     },
     /// The elements of a mesh.
     Mesh {
         /// Path, already relative to the working directory.
         path: PathBuf,
-        /// The group of its elements; all elements that no other body has if not given.
+        /// The group of its elements; if not given, all elements that belong to no other body.
         block: Option<GroupKey>,
         /// Metres per unit of length of the mesh.
         scale: f64,
-        /// Where the file is named in the deck.
+        /// Span of the file's name in the deck.
         span: Range<usize>,
-        /// Where the group is named in the deck.
+        /// Span of the group's name in the deck.
         block_span: Range<usize>,
     },
 }
@@ -304,7 +304,7 @@ pub enum PointSource {
 /// A region of space, lengths in m.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// Between two corners.
+    /// A box, rectangle or interval between two corners.
     Box {
         /// Lower corner.
         lower: [f64; 3],
@@ -318,11 +318,11 @@ pub enum Shape {
         /// Radius.
         radius: f64,
     },
-    /// Between the centres of its ends.
+    /// A cylinder between the centres of its ends.
     Cylinder {
         /// Centre of one end.
         from: [f64; 3],
-        /// Centre of the other.
+        /// Centre of the other end.
         to: [f64; 3],
         /// Radius.
         radius: f64,
@@ -336,9 +336,9 @@ pub enum Shape {
         /// Upper z; ∞ in the plane.
         top: f64,
     },
-    /// In any of them.
+    /// The union of shapes.
     Union(Vec<Shape>),
-    /// In the first and in none of the others.
+    /// The first shape without the parts that lie in any other shape.
     Difference(Vec<Shape>),
 }
 
@@ -347,7 +347,7 @@ pub enum Shape {
 pub struct Set {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// Which points.
     pub selector: Selector,
@@ -360,11 +360,11 @@ pub enum Selector {
     All,
     /// The points of a body, by index.
     Body(usize),
-    /// Those whose reference position makes this true.
+    /// Points whose reference position fulfils this condition.
     Where(Expression),
-    /// Those within a region.
+    /// Points within a region.
     Within(Shape),
-    /// Those with these global ids.
+    /// Points with these global ids.
     Ids {
         /// Sorted.
         ids: Vec<u64>,
@@ -373,7 +373,7 @@ pub enum Selector {
         /// Where the largest one stands in the deck.
         largest: Range<usize>,
     },
-    /// Those of a group of the meshes that bodies have their points from.
+    /// Points of a group of the meshes that define the points of bodies.
     Mesh(MeshSet),
 }
 
@@ -391,7 +391,7 @@ pub struct IdFile {
 pub struct MeshSet {
     /// The group's name or number.
     pub group: GroupKey,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     ids: OnceLock<Runs>,
 }
@@ -406,7 +406,7 @@ impl MeshSet {
         }
     }
 
-    /// Set the ids of the points; return whether they are those of an earlier call, if there was one.
+    /// Set the ids of the points. Return whether they equal the ids of an earlier call; true for the first call.
     pub fn resolve(&self, ids: Runs) -> bool {
         let ids = &ids;
         self.ids.get_or_init(|| ids.clone()) == ids
@@ -418,19 +418,19 @@ impl MeshSet {
     }
 }
 
-/// Without the ids, which are no part of the description.
+/// Omit the ids, which do not belong to the description.
 impl fmt::Debug for MeshSet {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "MeshSet({:?})", self.group)
     }
 }
 
-/// A crack that is there from the start.
+/// A pre-crack; bonds that cross it start broken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PreCrack {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// The surface.
     pub surface: Crack,
@@ -439,13 +439,13 @@ pub struct PreCrack {
 /// A surface that cuts bonds; lengths in m.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Crack {
-    /// In the plane.
+    /// A segment, in plane problems.
     Segment {
         /// One end.
         from: [f64; 3],
         /// The other.
         to: [f64; 3],
-        /// From face to face, half on each side; 0 for a cut without width.
+        /// Width of the slot, half on each side; 0 for a cut without width.
         width: f64,
     },
     /// A parallelogram.
@@ -456,7 +456,7 @@ pub enum Crack {
         edge_a: [f64; 3],
         /// The other edge from it.
         edge_b: [f64; 3],
-        /// As of a segment.
+        /// Width of the slot, half on each side of the surface; 0 for a cut without width.
         width: f64,
     },
     /// A flat disc.
@@ -467,7 +467,7 @@ pub enum Crack {
         normal: [f64; 3],
         /// Radius.
         radius: f64,
-        /// As of a segment.
+        /// Width of the slot, half on each side of the surface; 0 for a cut without width.
         width: f64,
     },
 }
@@ -483,7 +483,7 @@ impl Crack {
 }
 
 impl DamageRule {
-    /// Whether it is calibrated by what opening the body costs, and that has not been measured yet.
+    /// Whether it is calibrated with the energy that separates a block, and this energy has not been computed yet.
     pub fn is_unmeasured(self) -> bool {
         matches!(
             self,

@@ -10,12 +10,12 @@ use crate::dimension::Dimension;
 use crate::elastic::Isotropic;
 use crate::expression::Expression;
 
-/// Share of the stable step that is taken if nothing else is said.
+/// Default of the time step, as a fraction of the stable step.
 const DEFAULT_SAFETY: f64 = 0.8;
 
 impl Problem {
-    /// A problem without bodies, with a horizon (m) and an end (s), and everything else as in a deck that
-    /// does not say more.
+    /// Create a problem without bodies from a horizon (m) and an end time (s). Everything else has the defaults of a
+    /// deck.
     pub fn new(dimension: Dimension, horizon: f64, end: f64) -> Self {
         Self {
             warnings: Vec::new(),
@@ -77,8 +77,8 @@ impl Problem {
         }
     }
 
-    /// Adds a body that fills a shape with cubic cells, or square ones, of this edge (m), and a set of
-    /// its points with its name; returns the index of the set.
+    /// Add a body that fills a shape with cubic (or square) cells of this edge (m), and a set of its points with the
+    /// same name. Return the index of the set.
     pub fn add_body(
         &mut self,
         name: &str,
@@ -113,7 +113,7 @@ impl Problem {
         self.add_set(name, selector)
     }
 
-    /// Adds a set; returns its index. The set of all points has the index 0.
+    /// Add a set and return its index. The set of all points has the index 0.
     pub fn add_set(&mut self, name: &str, selector: Selector) -> usize {
         self.sets.push(Set {
             name: name.to_owned(),
@@ -123,7 +123,7 @@ impl Problem {
         self.sets.len() - 1
     }
 
-    /// Adds a crack that is there from the start.
+    /// Add a pre-crack.
     pub fn add_crack(&mut self, name: &str, surface: Crack) {
         self.cracks.push(PreCrack {
             name: name.to_owned(),
@@ -132,7 +132,7 @@ impl Problem {
         });
     }
 
-    /// Adds a load on or a support of a set, given by its index.
+    /// Add a load or a support of a set, given by the index of the set.
     pub fn add_condition(&mut self, name: &str, set: usize, action: Action) {
         self.conditions.push(Condition {
             name: name.to_owned(),
@@ -145,7 +145,7 @@ impl Problem {
         });
     }
 
-    /// Adds an initial velocity (m/s) of a set, given by its index: an expression a component.
+    /// Add an initial velocity (m/s) of a set, given by the index of the set: an expression for each component.
     pub fn add_initial_velocity(&mut self, name: &str, set: usize, velocity: Vec<Expression>) {
         self.initials.push(Initial {
             name: name.to_owned(),
@@ -158,7 +158,7 @@ impl Problem {
 }
 
 impl Action {
-    /// The key of decks that prescribes it, a traction or pressure being a body force here.
+    /// The deck's key for this condition. Traction and pressure are body forces here.
     fn quantity(&self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",
@@ -192,7 +192,7 @@ impl Material {
 }
 
 impl Damage {
-    /// Damage of all bonds alike.
+    /// Damage by critical stretch or work, without scatter, the same for all bonds.
     pub fn new(rule: DamageRule, toughness: Toughness) -> Self {
         Self {
             rule,

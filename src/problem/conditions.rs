@@ -11,11 +11,11 @@ pub struct Initial {
     pub name: String,
     /// Index of the set.
     pub set: usize,
-    /// Where the set is named.
+    /// Span of the set's name in the deck.
     pub span: Range<usize>,
-    /// Displacement (m) by component, and where it stands.
+    /// Displacement (m) by component, and its span in the deck.
     pub displacement: Option<(Vec<Expression>, Range<usize>)>,
-    /// Velocity (m/s) by component, and where it stands.
+    /// Velocity (m/s) by component, and its span in the deck.
     pub velocity: Option<(Vec<Expression>, Range<usize>)>,
 }
 
@@ -26,20 +26,19 @@ pub struct Condition {
     pub name: String,
     /// Index of the set.
     pub set: usize,
-    /// Where the set is named.
+    /// Span of the set's name in the deck.
     pub span: Range<usize>,
     /// The key of what it prescribes, such as `traction`.
     pub quantity: &'static str,
-    /// Where that stands.
+    /// Span of this key in the deck.
     pub place: Range<usize>,
-    /// Thickness (m) of the layer that carries a traction or pressure, if the deck leaves it to the
-    /// spacing.
+    /// Thickness (m) of the layer that carries a traction or pressure, if it is the spacing by default.
     pub default_depth: Option<f64>,
-    /// What it does.
+    /// The prescribed quantity and its values.
     pub action: Action,
 }
 
-/// What a condition does to its points, by component.
+/// The effect of a condition on its points, by component.
 #[derive(Debug, Clone)]
 pub enum Action {
     /// Prescribes displacement (m); `None` is free.

@@ -2,23 +2,23 @@
 
 use super::Body;
 
-/// Contact of a run.
+/// Contact rules of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
-    /// The rule of pairs without one of their own.
+    /// The rule of pairs without their own rule.
     pub rule: Option<ContactRule>,
-    /// Pairs of bodies with a rule of their own.
+    /// Pairs of bodies with their own rule.
     pub pairs: Vec<ContactPair>,
 }
 
-/// Two bodies with a rule of their own, or a body and itself.
+/// Two bodies (or one body and itself) with their own rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPair {
     /// Its name in the deck.
     pub name: String,
     /// Names of the bodies.
     pub bodies: [String; 2],
-    /// `None` where they have no contact.
+    /// The rule; `None` for no contact.
     pub rule: Option<ContactRule>,
 }
 
@@ -31,25 +31,25 @@ pub struct ContactRule {
     pub stiffness: Option<f64>,
     /// Distance at which points begin to touch, m; from their volumes if not given.
     pub radius: Option<f64>,
-    /// Coefficient of friction at rest.
+    /// Coefficient of static friction.
     pub static_friction: f64,
-    /// Coefficient of friction of points that slide.
+    /// Coefficient of sliding friction.
     pub kinetic_friction: f64,
-    /// Speed after the collision of two points as a share of that before, above 0; 1 without damping.
+    /// Relative speed of two points after a collision, divided by the speed before it; above 0, and 1 without damping.
     pub restitution: f64,
 }
 
 /// How the force follows from the overlap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactModel {
-    /// As a layer of material between the points, as thick as the horizon.
+    /// The stiffness of a material layer between the points, as thick as the horizon.
     Penalty,
     /// Short-range forces (Silling & Askari 2005, §5; Macek & Silling 2007).
     ShortRange,
 }
 
 impl Contact {
-    /// The rule of contact between points of two bodies, the same for both orders; `None` where they have none.
+    /// The rule of contact between points of two bodies, independent of their order; `None` for no contact.
     pub fn between(&self, here: &Body, there: &Body) -> Option<ContactRule> {
         let names = [&here.name, &there.name];
         let own = self.pairs.iter().find(|pair| pair.is_of(names));

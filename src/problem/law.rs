@@ -13,7 +13,7 @@ use crate::message::suggestion;
 pub struct Law {
     /// The law.
     pub declaration: &'static Declaration,
-    /// What its keys are.
+    /// The values of its keys.
     pub values: Values,
 }
 
@@ -34,8 +34,7 @@ impl Law {
         }
     }
 
-    /// Gives one of its keys a value: a number, a word, or an [expression](Expression::of_length) of a
-    /// bond's length.
+    /// Set one of its keys to a number, a word, or an [expression](Expression::of_length) of a bond's length.
     ///
     /// # Errors
     /// When the law has no such key, or the key cannot be that.
@@ -58,7 +57,7 @@ impl Law {
         Ok(self)
     }
 
-    /// Whether it can be used: all keys are given that must be, and it is there in this dimension.
+    /// Check that all required keys are given and that the law supports this dimension.
     pub fn fault(&self, dimension: Dimension) -> Option<LawFault> {
         for key in self.declaration.keys {
             let required = matches!(key.kind, Kind::Number { .. });
@@ -88,7 +87,7 @@ impl Law {
         })
     }
 
-    /// Why bodies of the law can have no such damage, if they cannot.
+    /// The reason why bodies of the law cannot have this damage; `None` if they can.
     pub fn damage_fault(&self, damage: &Damage) -> Option<String> {
         if self.declaration.breaks_by_itself() {
             return Some(format!(
@@ -143,14 +142,14 @@ impl Law {
     }
 }
 
-/// The declaration of the law of this name, or an error that names those that are there.
+/// The declaration of the law of this name, or an error that lists the known laws.
 pub fn find(name: &str) -> std::result::Result<&'static Declaration, String> {
     let mut all = declarations();
     all.find(|law| law.name == name)
         .ok_or_else(|| unknown(name, declarations().map(|law| law.name)))
 }
 
-/// Whether a key can have this value, or else what it must be.
+/// Check a value of a key; the error says which values are allowed.
 pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     match (&key.kind, value) {
         (
@@ -177,7 +176,7 @@ pub fn check(key: &Key, value: &Value) -> std::result::Result<(), String> {
     }
 }
 
-/// What a key must be, in the words of a deck's user.
+/// The values that a key allows, for error messages.
 pub fn wanted(key: &Key) -> String {
     match &key.kind {
         Kind::Number { .. } | Kind::Optional { .. } | Kind::OfLength => {

@@ -1,7 +1,6 @@
 //! The validated description of a run: every number known, every name resolved.
 //!
-//! Spans are bytes of the deck that a problem was made from; they stand in errors and warnings, and mean nothing
-//! else.
+//! Spans are byte ranges of the deck that a problem was made from. They are only used in errors and warnings.
 //!
 //! Positions and vectors have three components; those beyond the dimension are 0.
 
@@ -40,21 +39,21 @@ pub use time::*;
 /// Everything that a run needs to know.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// What the deck may say but most likely does not mean.
+    /// Warnings: allowed settings of the deck that are probably mistakes.
     pub warnings: Vec<Warning>,
-    /// One line.
+    /// Title, one line.
     pub title: String,
-    /// Where some of the values stand in the deck.
+    /// Spans of some values in the deck.
     pub places: Places,
     /// The setting.
     pub dimension: Dimension,
     /// Horizon δ of the grid, m; bodies may have their own.
     pub horizon: f64,
-    /// What volumes near the edge of a family count.
+    /// Volume correction of points near the edge of a family.
     pub volume_correction: VolumeCorrection,
     /// Random displacement of the points of shapes, if there is any.
     pub jitter: Option<Jitter>,
-    /// How bonds are kept.
+    /// How bonds are stored.
     pub family: FamilyRule,
     /// The bonds between blocks.
     pub interface: Interface,
@@ -76,8 +75,8 @@ pub struct Problem {
     pub conditions: Vec<Condition>,
     /// The time axis.
     pub time: Time,
-    /// The stages of the run in their order; without them there is one, in which all conditions act. The
-    /// last one ends with [`Self::time`], of which nothing else counts then.
+    /// The stages of the run in their order. Without stages, the run is a single stage in which all conditions act.
+    /// With stages, the last one ends with [`Self::time`], and only the end of `time` is used.
     pub stages: Vec<Stage>,
     /// The result file.
     pub output: Output,
@@ -87,11 +86,11 @@ pub struct Problem {
     pub history: History,
     /// When checkpoints are written.
     pub checkpoint: CheckpointRule,
-    /// When points are dealt out anew to the ranks.
+    /// When points are rebalanced between ranks.
     pub balance: Option<Balance>,
 }
 
-/// Where values stand in the deck whose mistakes only the points show.
+/// Spans of values whose errors are only detected after the points are generated.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Places {
     /// The horizon of the grid.

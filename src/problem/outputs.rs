@@ -1,18 +1,18 @@
-//! What is written: the result, the history, checkpoints.
+//! Outputs of a run: result, history and checkpoints.
 
 use std::ops::Range;
 
 use super::{FieldStatistics, Problem};
 use crate::component::Component;
 
-/// How often something is written.
+/// Interval between outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Interval {
     /// Seconds of simulated time.
     Seconds(f64),
     /// Time steps.
     Steps(u64),
-    /// So many seconds of simulated time, but only after multiples of so many steps.
+    /// Seconds of simulated time, but only at steps that are multiples of a number.
     SecondsAtSteps {
         /// Simulated time, s.
         seconds: f64,
@@ -24,18 +24,18 @@ pub enum Interval {
 /// When checkpoints are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CheckpointRule {
-    /// So many seconds of wall-clock time apart.
+    /// At intervals of wall-clock time, s.
     WallClock(f64),
-    /// So many steps or so much simulated time apart.
+    /// At intervals of steps or simulated time.
     Simulation(Interval),
 }
 
-/// When points are dealt out anew to the ranks.
+/// When points are rebalanced between ranks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
-    /// Steps between looks at the ranks' times.
+    /// Steps between comparisons of the ranks' times.
     pub every_steps: u64,
-    /// What the time of the slowest rank must exceed, as a multiple of the mean.
+    /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced.
     pub imbalance: f64,
 }
 
@@ -48,11 +48,11 @@ pub struct Output {
     pub every: Option<Interval>,
     /// Simulated times of further outputs in ascending order, s.
     pub times: Vec<f64>,
-    /// Which fields.
+    /// Fields that are written.
     pub fields: Vec<Field>,
     /// Whether the fields are rounded to 4-byte numbers.
     pub single: bool,
-    /// Index of the set whose points the result holds, and where it is named; `None` for all points.
+    /// Index of the set whose points the result holds, and the span of its name; `None` for all points.
     pub set: Option<(usize, Range<usize>)>,
 }
 
@@ -74,7 +74,7 @@ impl Output {
 /// The history.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// How often; without, [`Problem::row_interval`](super::Problem::row_interval) decides.
+    /// Interval of rows; if `None`, [`Problem::row_interval`](super::Problem::row_interval) decides.
     pub every: Option<Interval>,
     /// Sets whose reaction force is recorded, by component.
     pub reactions: Vec<Reaction>,
@@ -88,13 +88,13 @@ pub struct History {
     pub damage_threshold: f64,
     /// Sums and extremes of fields over sets.
     pub statistics: Vec<FieldStatistics>,
-    /// Places that are watched.
+    /// Probes: positions whose nearest point is recorded.
     pub probes: Vec<Probe>,
-    /// Fronts that are followed.
+    /// Fronts that are tracked.
     pub fronts: Vec<Front>,
-    /// Cracks whose path is found.
+    /// Cracks whose path is computed.
     pub cracks: Vec<CrackPath>,
-    /// Crack tips that are followed.
+    /// Crack tips that are tracked.
     pub tips: Vec<Tip>,
 }
 
@@ -103,16 +103,16 @@ pub struct History {
 pub struct Reaction {
     /// Index of the set.
     pub set: usize,
-    /// Where it is named.
+    /// Span of its name in the deck.
     pub span: Range<usize>,
 }
 
-/// A set on which the force of the supports along a direction is recorded.
+/// A set whose reaction force along a direction is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SupportForce {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// Index of the set.
     pub set: usize,
@@ -120,76 +120,76 @@ pub struct SupportForce {
     pub direction: [f64; 3],
 }
 
-/// A crack whose path is found.
+/// A crack whose path is computed.
 #[derive(Debug, Clone)]
 pub struct CrackPath {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
-    /// Where it starts, m.
+    /// Start position, m.
     pub from: [f64; 3],
-    /// Index of the set that is looked at.
+    /// Index of the set that is evaluated.
     pub set: usize,
-    /// What the damage must exceed.
+    /// Threshold that the damage must exceed.
     pub threshold: f64,
 }
 
-/// A place whose nearest point is followed.
+/// A probe: a position whose nearest point is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
-    /// The place, m.
+    /// The position, m.
     pub at: [f64; 3],
-    /// Fields that are recorded there, beside displacement and velocity.
+    /// Fields that are recorded in addition to displacement and velocity.
     pub fields: Vec<Field>,
 }
 
-/// A start and a way from it.
+/// A line: start and direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Where it starts, m.
+    /// Start position, m.
     pub from: [f64; 3],
     /// Unit vector.
     pub direction: [f64; 3],
 }
 
-/// How far a field has come along a line.
+/// A front: the position that a field has reached along a line.
 #[derive(Debug, Clone)]
 pub struct Front {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// The line.
     pub line: Line,
     /// Length of the line, m.
     pub length: f64,
-    /// Points up to this distance from the line count, m.
+    /// Largest distance from the line at which points are evaluated, m.
     pub radius: f64,
     /// The field.
     pub field: Field,
-    /// The number of a point.
+    /// Component or invariant of the field.
     pub component: Component,
-    /// What the size of the field must exceed.
+    /// Threshold that the absolute value of the field must exceed.
     pub threshold: f64,
 }
 
-/// The farthest point with damage in a direction.
+/// A crack tip: the farthest damaged point in a direction.
 #[derive(Debug, Clone)]
 pub struct Tip {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
-    /// Where the crack starts, and where it runs.
+    /// Start and direction of the crack.
     pub line: Line,
-    /// Index of the set that is looked at.
+    /// Index of the set that is evaluated.
     pub set: usize,
-    /// What the damage must exceed.
+    /// Threshold that the damage must exceed.
     pub threshold: f64,
 }
 
@@ -202,11 +202,11 @@ pub enum Field {
     Velocity,
     /// ü, m/s².
     Acceleration,
-    /// Internal force density, N/m³, that of contact included.
+    /// Internal force density, N/m³, including contact.
     ForceDensity,
     /// Force density of contact, N/m³.
     ContactForceDensity,
-    /// φ, share of the family's volume that is cut off.
+    /// Damage φ: fraction of the family's volume with broken bonds.
     Damage,
     /// W, J/m³.
     StrainEnergyDensity,
@@ -228,15 +228,15 @@ pub enum Field {
     /// Green–Lagrange strain ½(FᵀF − I): xx, yy, zz, xy, yz, xz, of the body in space: in plane stress it has the
     /// stretch of the law across the plane, under uniaxial stress that by ν.
     Strain,
-    /// Number of intact bonds, with points in the own family or that have the point in theirs.
+    /// Number of intact bonds with points that are in the family of the point, or have the point in their family.
     Neighbours,
     /// Number of the point's bonds that have broken since the start.
     BrokenBonds,
     /// Number of the point's bonds that have broken since the last output.
     NewlyBrokenBonds,
-    /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt of points of a law that flows, else 0.
+    /// Equivalent plastic strain ∫ √(⅔ Ė_p:Ė_p) dt for laws with plasticity, otherwise 0.
     PlasticStrainEquivalent,
-    /// 1 where a point has too few bonds left for its law and carries no force, else 0.
+    /// 1 if the point has too few intact bonds for its law and carries no force, otherwise 0.
     Singular,
     /// Temperature; the reference temperature of the material where none is prescribed, K.
     Temperature,
@@ -341,7 +341,7 @@ impl Field {
     }
 }
 
-/// The fields of a result of which nothing else is said.
+/// Default fields of a result.
 pub(crate) const DEFAULT_FIELDS: [Field; 4] = [
     Field::Displacement,
     Field::Velocity,
@@ -349,17 +349,17 @@ pub(crate) const DEFAULT_FIELDS: [Field; 4] = [
     Field::StrainEnergyDensity,
 ];
 
-/// Outputs of a run of which nothing else is said.
+/// Default number of outputs of a run.
 pub(crate) const OUTPUTS: f64 = 50.0;
 
-/// Rows of the history of such a run, and the fewest steps between them: a row takes as long as one or two steps.
+/// Default number of history rows, and the fewest steps between them: writing a row needs the time of one or two steps.
 const ROWS: f64 = 500.0;
 const STEPS_A_ROW: u64 = 20;
 
-/// Wall-clock time between checkpoints of such a run, s.
+/// Default wall-clock time between checkpoints, s.
 pub(crate) const DEFAULT_CHECKPOINT: f64 = 600.0;
 
-/// Damage above which a point of such a run counts as cracked.
+/// Default damage above which a point counts as cracked.
 pub(crate) const DEFAULT_DAMAGE_THRESHOLD: f64 = 0.35;
 
 impl Problem {

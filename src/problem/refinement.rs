@@ -9,47 +9,48 @@ use super::InterfaceRule;
 /// Refinement of the grid (Dipasquale et al. 2014, §2).
 #[derive(Debug, Clone)]
 pub struct Refinement {
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
-    /// The finest level: the spacing there is that of the grid divided by 2^levels.
+    /// The finest level; its spacing is the spacing of the grid divided by 2^levels.
     pub levels: u32,
     /// The horizons of the levels.
     pub rule: HorizonRule,
-    /// What the horizon of points is multiplied by that have a coarser level within it.
+    /// Factor on the horizon of points with a coarser level inside their horizon.
     pub interface_factor: f64,
-    /// Which horizons the bonds between points of one body with different ones have: each end its own, or both the
+    /// Horizon of bonds between points of one body with different horizons: each end uses its own, or both use the
     /// mean.
     pub bonds: InterfaceRule,
-    /// What is refined from the start.
+    /// Regions that are refined from the start.
     pub regions: Vec<RefinedRegion>,
-    /// What is refined during the run, if anything.
+    /// Criteria of refinement during the run, if there are any.
     pub trigger: Option<Trigger>,
 }
 
-/// What makes the points within the horizon of a point be refined, one level at a time; any of them.
+/// Criteria that make a point a trigger; one is enough. All points within the horizon of a trigger are refined, one
+/// level at a time.
 #[derive(Debug, Clone)]
 pub struct Trigger {
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
-    /// Steps between looks.
+    /// Steps between evaluations of the criteria.
     pub every_steps: u64,
-    /// Least strain energy density, as a share of the largest of all points.
+    /// Smallest strain energy density of a trigger, as a fraction of the maximum over all points.
     pub energy: Option<f64>,
-    /// Least damage.
+    /// Smallest damage of a trigger.
     pub damage: Option<f64>,
     /// A condition on reference position and time.
     pub condition: Option<Expression>,
-    /// Which points can be triggers at all, by reference position and time.
+    /// A condition on reference position and time that every trigger must fulfil.
     pub only: Option<Expression>,
-    /// Time (s) out of reach of triggers, and of points that miss bonds, after which points become coarser again;
-    /// never if not given.
+    /// Time (s) after which points become coarser again if no trigger and no point with broken bonds is in reach; never
+    /// if not given.
     pub coarsen_after: Option<f64>,
 }
 
-/// How the horizon goes with the spacing from level to level.
+/// How the horizon depends on the spacing of a level.
 #[derive(Debug, Clone, PartialEq)]
 pub enum HorizonRule {
-    /// δ convergence: m = δ/dx is the same.
+    /// δ convergence: m = δ/dx is the same on all levels.
     Delta,
     /// δm convergence: m of each level from 1 on.
     DeltaM(Vec<f64>),
@@ -60,10 +61,10 @@ pub enum HorizonRule {
 pub struct RefinedRegion {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// Points of lower levels are refined until they have this level.
     pub level: u32,
-    /// Which points, by reference position.
+    /// Condition on the reference position that selects the points.
     pub condition: Expression,
 }

@@ -10,11 +10,11 @@ use crate::expression::Expression;
 pub struct Rigid {
     /// Its name.
     pub name: String,
-    /// Where it stands in the deck.
+    /// Its span in the deck.
     pub span: Range<usize>,
     /// Its shape.
     pub shape: RigidShape,
-    /// Its centre at the start, m; of a half space, a point of its surface.
+    /// Its initial centre, m; for a half space, a point on its surface.
     pub centre: [f64; 3],
     /// How it moves.
     pub motion: RigidMotion,
@@ -44,9 +44,9 @@ pub enum RigidShape {
         /// Half its edges.
         half: [f64; 3],
     },
-    /// All that lies behind a plane.
+    /// The half space behind a plane.
     HalfSpace {
-        /// Out of the half space, a unit vector.
+        /// Outward unit normal of the half space.
         normal: [f64; 3],
     },
 }
@@ -54,9 +54,9 @@ pub enum RigidShape {
 /// How a rigid body moves.
 #[derive(Debug, Clone)]
 pub enum RigidMotion {
-    /// By this displacement (m): one expression of t for each component; no rotation.
+    /// By a prescribed displacement (m), one expression of t for each component, without rotation.
     Driven(Vec<Expression>),
-    /// By the forces on it.
+    /// Freely, by the forces on it.
     Free {
         /// Its mass, kg.
         mass: f64,
@@ -64,13 +64,13 @@ pub enum RigidMotion {
         velocity: [f64; 3],
         /// Angular velocity at the start, 1/s.
         angular_velocity: [f64; 3],
-        /// Force at its centre, N, an expression of t a component; may be empty.
+        /// Force at its centre, N: an expression of t for each component; may be empty.
         force: Vec<Expression>,
     },
 }
 
 impl Problem {
-    /// Whether points can touch one another or a rigid body.
+    /// Whether the problem has any contact, between points or with a rigid body.
     pub fn has_contact(&self) -> bool {
         self.contact.is_some() || !self.rigid.is_empty()
     }

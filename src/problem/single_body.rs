@@ -1,4 +1,4 @@
-//! A problem with one body only, as a block of its lattice without loads.
+//! Problems with a single body, as a block of its lattice without loads.
 
 use super::{PointSource, Problem, Shape, StepRule};
 

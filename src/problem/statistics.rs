@@ -10,19 +10,19 @@ use crate::component::Component;
 pub struct FieldStatistics {
     /// Their name.
     pub name: String,
-    /// Where they stand in the deck.
+    /// Their span in the deck.
     pub span: Range<usize>,
     /// Index of the set.
     pub set: usize,
     /// The field.
     pub field: Field,
-    /// The number of a point.
+    /// Component or invariant of the field.
     pub component: Component,
-    /// One column each.
+    /// The recorded quantities; one column for each.
     pub of: Vec<Statistic>,
 }
 
-/// A number that follows from the values a of the points of a set and their volumes V.
+/// A number computed from the values a and volumes V of the points of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Statistic {
     /// Σ a.
@@ -62,7 +62,7 @@ impl Statistic {
                 "Pa" => "Pa m^3",
                 "J/m^3" => "J",
                 "K" => "K m^3",
-                // Of a field without a unit.
+                // The field has no unit.
                 _ => "m^3",
             },
         }

@@ -14,7 +14,7 @@ pub struct ThermalExpansion {
 }
 
 impl ThermalExpansion {
-    /// Free stretch in the directions of a setting by one kelvin, with Poisson's ratio ν.
+    /// Free stretch per kelvin in the directions of a setting, 1/K, for Poisson's ratio ν.
     ///
     /// Where strain is 0 across these directions, the stress there adds to the free stretch: (1 + ν) α in plane strain,
     /// (1 + ν)/(1 − ν) α under uniaxial strain. Otherwise it is α.
@@ -38,7 +38,7 @@ impl Problem {
         actions.any(|action| matches!(action, Action::Temperature(_)))
     }
 
-    /// Whether temperatures change during a run, so that they do work that the energy balance does not know.
+    /// Whether temperatures change during a run. Their work is missing from the energy balance.
     pub fn temperature_changes(&self) -> bool {
         let stages = self.all_stages();
         let acts_always = |index: usize| stages.iter().all(|stage| stage.acting[index]);

@@ -1,4 +1,4 @@
-//! The time axis, stages, and how points come to move.
+//! The time axis, stages, and solution methods.
 
 use super::Problem;
 
@@ -9,38 +9,38 @@ pub struct Time {
     pub end: f64,
     /// The step.
     pub step: StepRule,
-    /// How the points come to move.
+    /// The solution method.
     pub method: Method,
-    /// How many times its density a body has in the equation of motion.
+    /// Factor on the density in the equation of motion.
     pub density_scale: f64,
-    /// How the step follows the number of bonds that break in it, if it does.
+    /// Settings of a step that adapts to the number of broken bonds, if this is requested.
     pub adaptive: Option<Adaptive>,
 }
 
-/// How the step follows the number of bonds that break in it.
+/// A time step that adapts to the number of bonds that break in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
-    /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
+    /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a smaller dt.
     pub most_broken: u64,
-    /// A step that breaks no more bonds of any point is calm.
+    /// Largest number of bonds of one point that may break in a calm step.
     pub stable_broken: u64,
-    /// Calm steps in a row before the step is raised.
+    /// Number of consecutive calm steps before dt is raised.
     pub steps: u64,
-    /// What the step is multiplied with when one is undone.
+    /// Factor on dt when a step is repeated.
     pub reduce: f64,
-    /// What it is multiplied with when it is raised.
+    /// Factor on dt when it is raised.
     pub raise: f64,
-    /// The smallest step, s; `None` is a hundredth of the largest.
+    /// The smallest step, s; `None` for 1/100 of the largest.
     pub smallest: Option<f64>,
-    /// The largest step, s; `None` is the one that [`Time::step`] says.
+    /// The largest step, s; `None` for the step of [`Time::step`].
     pub largest: Option<f64>,
 }
 
-/// The smallest step as a share of the largest, where the deck does not say.
+/// Default of the smallest step, as a fraction of the largest.
 const SMALLEST_SHARE: f64 = 0.01;
 
 impl Adaptive {
-    /// The smallest and the largest step (s) of a stage for which a step (s) was chosen.
+    /// The smallest and the largest step (s) of a stage, from the step (s) chosen for it.
     pub fn limits(&self, step: f64) -> [f64; 2] {
         let largest = self.largest.unwrap_or(step);
         let smallest = self.smallest.unwrap_or(SMALLEST_SHARE * largest);
@@ -51,33 +51,33 @@ impl Adaptive {
 /// A stage of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Its end, counted from the start of the run, and how it gets there.
+    /// Its end, measured from the start of the run, and its time settings.
     pub time: Time,
     /// Whether each condition acts.
     pub acting: Vec<bool>,
 }
 
-/// How the points come to move.
+/// The solution method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// By the equation of motion, with velocity Verlet.
+    /// Integration of the equation of motion with velocity Verlet.
     Explicit,
-    /// From one equilibrium to the next; t is the load parameter, and [`Time::step`] is not used.
+    /// One equilibrium per load step, by relaxation; t is the load parameter, and [`Time::step`] is not used.
     Relaxation(Relaxation),
-    /// As [`Method::Relaxation`], by Newton's method.
+    /// One equilibrium per load step, by Newton's method; otherwise as [`Method::Relaxation`].
     Static(Static),
 }
 
-/// How Newton's method finds equilibria.
+/// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Static {
     /// Number of load steps.
     pub load_steps: u64,
-    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
     pub tolerance: f64,
-    /// The most iterations of a load step without a bond that breaks.
+    /// Largest number of iterations of a load step in which no bond breaks.
     pub max_iterations: u64,
-    /// How often a load step may be halved.
+    /// How many times a load step may be halved.
     pub max_halvings: u64,
 }
 
@@ -91,7 +91,7 @@ impl Method {
         }
     }
 
-    /// What to change in a deck where it finds no equilibrium.
+    /// Advice for error messages: what to change in the deck if the method finds no equilibrium.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {
@@ -101,7 +101,7 @@ impl Method {
         }
     }
 
-    /// The number of load steps, if it finds equilibria.
+    /// The number of load steps, if the method computes equilibria.
     pub fn load_steps(&self) -> Option<u64> {
         match self {
             Self::Explicit => None,
@@ -111,28 +111,28 @@ impl Method {
     }
 }
 
-/// How equilibria are found.
+/// Settings of the relaxation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relaxation {
     /// Number of load steps.
     pub load_steps: u64,
-    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
     pub tolerance: f64,
-    /// The most iterations of a load step.
+    /// Largest number of iterations of a load step.
     pub iterations: u64,
 }
 
 /// How the time step is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepRule {
-    /// This fraction of the stable step.
+    /// Automatic: this fraction of the stable step.
     Automatic(f64),
     /// Fixed, s.
     Fixed(f64),
 }
 
 impl Problem {
-    /// The stages of the run, of which there is at least one.
+    /// The stages of the run; there is at least one.
     pub fn all_stages(&self) -> Vec<Stage> {
         if self.stages.is_empty() {
             return vec![Stage {
@@ -159,39 +159,38 @@ impl Problem {
         stages.any(|stage| matches!(stage.time.method, Method::Relaxation(_)))
     }
 
-    /// Whether Newton's method finds the equilibria of any stage.
+    /// Whether any stage uses Newton's method.
     pub fn has_newton(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| matches!(stage.time.method, Method::Static(_)))
     }
 
-    /// Whether the step of any stage follows the number of bonds that break in it.
+    /// Whether any stage has a step that adapts to the number of broken bonds.
     pub fn adapts(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.adaptive.is_some())
     }
 
-    /// Whether bodies have another density in the equation of motion of any stage.
+    /// Whether any stage scales the density in the equation of motion.
     pub fn scales_density(&self) -> bool {
         let mut stages = self.all_stages().into_iter();
         stages.any(|stage| stage.time.density_scale != 1.0)
     }
 
-    /// Whether a stage that follows the equation of motion has another density scale than the one before it, which does so
-    /// too.
+    /// Whether two consecutive stages integrate the equation of motion with different density scales.
     pub fn changes_density_scale(&self) -> bool {
         self.stages.windows(2).any(changes_density_scale)
     }
 }
 
 impl Time {
-    /// Whether the method finds a sequence of equilibria.
+    /// Whether the method computes a sequence of equilibria.
     pub fn is_quasi_static(&self) -> bool {
         self.method.load_steps().is_some()
     }
 }
 
-/// Whether two stages in a row follow the equation of motion with different density scales.
+/// Whether two consecutive stages integrate the equation of motion with different density scales.
 pub(crate) fn changes_density_scale(pair: &[Stage]) -> bool {
     let [before, after] = [&pair[0].time, &pair[1].time];
     let moves = !before.is_quasi_static() && !after.is_quasi_static();

@@ -1,4 +1,4 @@
-//! Bodies, and what is told of their points by place: sets and cracks.
+//! Grammar of bodies, sets of points and pre-cracks.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,8 @@ use crate::deck::spanned::Spanned;
 pub struct Body {
     /// Name of the material.
     pub material: Text,
-    /// Name of the damage law; without it bonds never break, except those of `softening_pmb` and of a pair with damage of its own.
+    /// Name of the damage law. Without one, bonds never break. Exceptions are bonds of `softening_pmb`, and pairs of
+    /// bodies with their own damage law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
     /// The shape that is filled with lattice points.
@@ -23,19 +24,19 @@ pub struct Body {
     /// The file or mesh that the points come from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<Spanned<Points>>,
-    /// Lattice spacing of this body in m; that of `[grid]` if not given.
+    /// Lattice spacing of this body in m; the spacing of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
-    /// The points of a cell of this body: `"midpoint"` or `"gauss"`; as in `[grid]` if not given.
+    /// Positions of the points in a cell of this body: `"midpoint"` or `"gauss"`; the value of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<Spanned<Quadrature>>,
-    /// Horizon of this body in m; that of `[grid]` if not given.
+    /// Horizon of this body in m; the horizon of `[grid]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub horizon: Option<Number>,
 }
 
-/// Points from a file with rows `x y [z] volume block`, separated by commas or spaces, or with the columns that its
-/// header names, or from the elements of a mesh; exactly one of `file` and `mesh`.
+/// Points from a file or from the elements of a mesh; exactly one of `file` and `mesh`. Rows of a file are `x y [z]
+/// volume block`, separated by commas or spaces, unless a header names other columns.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Points {
@@ -45,10 +46,10 @@ pub struct Points {
     /// Path of the mesh, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Text>,
-    /// Take only the rows with this block number, or the elements of this group; all if not given.
+    /// Block number of the rows, or group of the elements, that the body uses; all if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block: Option<Spanned<GroupName>>,
-    /// Names of the columns of a file without a header: coordinates, `volume`, `block`, any others.
+    /// Names of the columns of a file without a header: coordinates, `volume`, `block`, and any other names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<Spanned<Vec<String>>>,
     /// Metres per unit of length of the mesh; 1 if not given.
@@ -104,9 +105,9 @@ pub enum Shape {
         /// Upper z.
         top: Number,
     },
-    /// Whatever lies in one of the shapes.
+    /// The union of the shapes.
     Union(Spanned<Vec<Spanned<Shape>>>),
-    /// Whatever lies in the first shape and in none of the others.
+    /// The first shape without the parts that lie in any other shape.
     Difference(Spanned<Vec<Spanned<Shape>>>),
 }
 
@@ -126,10 +127,10 @@ pub struct Set {
     /// Path of a file with the points' numbers, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Number that the file gives to the first point; 0 if not given.
+    /// Number of the first point in the file; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_id: Option<Spanned<u64>>,
-    /// A group of the meshes that bodies have their points from.
+    /// A group of the meshes that define the points of bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<Spanned<GroupName>>,
 }
@@ -144,7 +145,7 @@ pub enum Crack {
         from: Vector,
         /// The other end.
         to: Vector,
-        /// Width in m of a cut with two faces, half on each side; 0 if not given.
+        /// Width of a slot in m, half on each side of the segment; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]
         width: Option<Number>,
     },
@@ -156,7 +157,7 @@ pub enum Crack {
         edge_a: Vector,
         /// The edge from the corner to the other neighbouring one.
         edge_b: Vector,
-        /// As of a segment.
+        /// Width of a slot in m, half on each side of the surface; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]
         width: Option<Number>,
     },
@@ -168,7 +169,7 @@ pub enum Crack {
         normal: Vector,
         /// Radius.
         radius: Number,
-        /// As of a segment.
+        /// Width of a slot in m, half on each side of the surface; 0 if not given.
         #[serde(skip_serializing_if = "Option::is_none")]
         width: Option<Number>,
     },

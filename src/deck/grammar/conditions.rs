@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Text;
 use crate::deck::number::{Number, Vector};
 
-/// Initial values of a set; expressions of x, y, z, one a component.
+/// Initial values of a set: an expression of x, y and z for each component.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
@@ -21,8 +21,8 @@ pub struct Initial {
     pub velocity: Option<Vector>,
 }
 
-/// A load, support or temperature of a set; exactly one of the quantities. Values are expressions of x, y, z, t,
-/// one a component; the string `"free"` leaves a component of a motion free.
+/// A load, support or temperature of a set; exactly one of the quantities. The value is an expression of x, y, z and t
+/// for each component. The string `"free"` does not prescribe a component of displacement or velocity.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {

@@ -7,33 +7,36 @@ use super::{Tables, Text};
 use crate::deck::number::Number;
 use crate::deck::spanned::Spanned;
 
-/// Contact between points that no bond joins: of different bodies, and of one body, such as the faces of a crack. Bodies do
-/// not bond to one another then, unless `[interface]` says so.
+/// Contact between points that no bond joins, in different bodies or in the same body (such as the faces of a crack).
+/// With this section, bodies are bonded to one another only if `[interface]` requests it.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// `"penalty"` (if not given): as a layer of material between the points, as thick as the horizon. `"short-range"`: short-range forces, as Silling
-    /// & Askari (2005), Peridigm and LAMMPS have them. `"none"`: only pairs with a rule of their own touch.
+    /// `"penalty"` (the default): the stiffness is that of a material layer as thick as the horizon. `"short-range"`:
+    /// short-range forces of Silling & Askari (2005), as in Peridigm and LAMMPS. `"none"`: contact only between pairs
+    /// with their own rule.
     #[serde(default = "penalty")]
     pub model: Spanned<ContactName>,
-    /// Pa: Young's modulus of that layer, by default of both materials in series; or the spring constant of short-range
-    /// forces, by default 15 times the smaller bulk modulus.
+    /// With `"penalty"`, Young's modulus of the layer in Pa; by default the modulus of both materials in series. With
+    /// `"short-range"`, the spring constant in Pa; by default 15 times the smaller bulk modulus.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// Distance at which points begin to touch, m: by default the mean edge of their cells, 1.35 times that for short-range
-    /// forces. Points that begin nearer touch below their first distance (0.9 of it with short-range forces).
+    /// Distance in m at which contact begins. The default is the mean edge of the two cells, or 1.35 times this edge
+    /// with `"short-range"`. For points that start closer, contact begins below their initial distance (0.9 of it with
+    /// `"short-range"`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Coefficient of friction; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
-    /// Coefficient of friction of points that stick; `friction` if not given.
+    /// Coefficient of static friction; `friction` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// Speed of two points after their collision as a share of that before, from 0.01 to 1; 1 (no damping) if not given.
+    /// Relative speed of two points after a collision, divided by the speed before it; from 0.01 to 1. The default is 1
+    /// (no damping).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
-    /// Pairs of bodies with a rule of their own, by any name.
+    /// Pairs of bodies with their own rule, by a freely chosen name.
     #[serde(default)]
     pub pair: Tables<ContactPair>,
 }
@@ -42,24 +45,24 @@ pub struct Contact {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactPair {
-    /// Names of the two bodies, in any order; the same one twice for a body with itself.
+    /// Names of the two bodies, in any order; the same name twice for contact of a body with itself.
     pub bodies: Spanned<Vec<Text>>,
-    /// As in `[contact]`, whose value holds if not given.
+    /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<Spanned<ContactName>>,
-    /// As in `[contact]`, whose value holds if not given.
+    /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
-    /// As in `[contact]`, whose value holds if not given.
+    /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
-    /// As in `[contact]`, whose value holds if not given.
+    /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<Number>,
-    /// As in `[contact]`, whose value holds if not given.
+    /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_friction: Option<Number>,
-    /// As in `[contact]`, whose value holds if not given.
+    /// As in `[contact]`; the value of `[contact]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution: Option<Number>,
 }

@@ -1,4 +1,4 @@
-//! Numbers of things.
+//! Positive integers of a deck.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -8,7 +8,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A number of things, at least 1, that TOML can write: its integers end at 2⁶³.
+/// A count of at least 1 and below 2⁶³, the limit of TOML integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Count(NonZeroU64);
@@ -20,7 +20,7 @@ impl Count {
         Self(NonZeroU64::new(number).expect("not 0"))
     }
 
-    /// As a plain number.
+    /// The count as a `u64`.
     pub fn get(self) -> u64 {
         self.0.get()
     }

@@ -11,32 +11,33 @@ use crate::deck::spanned::Spanned;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
-    /// Edge of a lattice cell in m, or a list with one a dimension; for bodies given as shapes.
+    /// Edge of a lattice cell in m, or a list with one edge for each dimension; for bodies given as shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing: Option<Spanned<Edges>>,
     /// Horizon δ in m: points up to this distance are bonded.
     pub horizon: Number,
-    /// A corner of a lattice cell in m; points lie at the centres of cells. If not given, 0 in each direction, or the lower
-    /// face of the first body that is a whole number of cells long and would not be filled exactly from 0.
+    /// Position in m of a corner of a lattice cell. The default in each direction follows from the first body that is a
+    /// whole number of cells long between flat faces: 0 if cells from 0 fill it exactly, otherwise its lower face.
+    /// Without such a body, the default is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Vector>,
-    /// What the volumes of points near the edge of a family count: `"exact"`, `"linear"` or `"none"`; if not
-    /// given, `"exact"` where all points are centres of square or cubic cells, and else `"none"`.
+    /// Volume correction of points near the edge of a family: `"exact"`, `"linear"` or `"none"`. The default is
+    /// `"exact"` if all points are centres of square or cubic cells, otherwise `"none"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_correction: Option<Spanned<VolumeCorrection>>,
-    /// The points of a lattice cell: `"midpoint"` or `"gauss"`.
+    /// Positions of the points in a lattice cell: `"midpoint"` or `"gauss"`.
     #[serde(default)]
     pub quadrature: Quadrature,
-    /// How far points of shapes are moved at random from the centres of their cells: by direction by up to this share of
-    /// the spacing, below 0.5. Not at all if not given.
+    /// Largest random displacement of the points of shapes from their cell centres in each direction, in spacings;
+    /// below 0.5. Points are not displaced if this is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter: Option<Number>,
-    /// Seed of `jitter`: other numbers move the points otherwise; 0 if not given.
+    /// Seed of the random displacements of `jitter`; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
-    /// How bonds are kept: `"lattice"`, one bit each, for points on a regular grid (those of a file
-    /// may be), `"list"` for any, or `"auto"`, a lattice where possible. Bonds between bodies on
-    /// different grids are always listed. Results differ by rounding only.
+    /// How bonds are stored. `"lattice"` uses one bit per bond and needs points on a regular grid; points from a file
+    /// can form one. `"list"` works for any points. `"auto"` uses a lattice where possible. Bonds between bodies on
+    /// different grids are always stored in lists. The choice changes results by rounding only.
     #[serde(default = "automatic")]
     pub family: Spanned<Family>,
 }
@@ -45,15 +46,15 @@ fn automatic() -> Spanned<Family> {
     Spanned::new(0..0, Family::Auto)
 }
 
-/// How bonds are kept.
+/// How bonds are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
-    /// As lattices where bodies have them, else in lists.
+    /// In lattice families for bodies on a lattice, otherwise in lists.
     Auto,
-    /// A list for each point.
+    /// In a neighbour list of each point.
     List,
-    /// Fixed offsets for all points.
+    /// In one bit per lattice offset.
     Lattice,
 }
 
@@ -61,24 +62,24 @@ pub enum Family {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VolumeCorrection {
-    /// Points within the horizon count whole.
+    /// No correction: points within the horizon have their full volume.
     None,
-    /// Points count clamp((δ + dx/2 − |ξ|)/dx, 0, 1), those beyond the horizon too (PA-HHB).
+    /// The factor on the volume is clamp((δ + dx/2 − |ξ|)/dx, 0, 1), also for points beyond the horizon (PA-HHB).
     Linear,
     /// As `linear`, without points beyond the horizon (LAMMPS; Dipasquale et al. 2014, eq. 1 with eq. 10).
     LinearInside,
-    /// Points count the share of their cell within the horizon.
+    /// The factor on the volume is the fraction of the cell that lies within the horizon.
     Exact,
 }
 
-/// The points of a lattice cell.
+/// Positions of the points in a lattice cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Quadrature {
-    /// One at the centre.
+    /// One point at the centre.
     #[default]
     Midpoint,
-    /// 2 in 1-D, 4 in the plane, 8 in 3-D.
+    /// The Gauss points: 2 in 1-D, 4 in the plane, 8 in 3-D.
     Gauss,
 }
 
@@ -86,12 +87,12 @@ pub enum Quadrature {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interface {
-    /// What constants they have: `"own"`, `"average"` or `"minimum"`. With `"own"` each end exerts its
-    /// half with its own modulus and horizon; else both have the mean or the smaller of each. `"none"`:
-    /// there are none, however near the bodies are. If not given, `"own"`, or `"none"` with `[contact]`.
+    /// Constants of the bonds between blocks. `"own"`: each end exerts its half of the force with its own modulus and
+    /// horizon. `"average"` and `"minimum"`: both ends use the mean or the smaller modulus and horizon. `"none"`:
+    /// blocks are not bonded, whatever their distance. The default is `"own"`, or `"none"` with `[contact]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Pairs of bodies with a rule or damage of their own, by any name.
+    /// Pairs of bodies with their own rule or damage law, by a freely chosen name.
     #[serde(default)]
     pub pair: Tables<Pair>,
 }
@@ -102,28 +103,30 @@ pub struct Interface {
 pub struct Pair {
     /// Names of the two bodies, in any order.
     pub bodies: Spanned<Vec<Text>>,
-    /// As for all pairs, whose rule it is if not given.
+    /// As in `[interface]`; the rule of `[interface]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rule: Option<Spanned<Rule>>,
-    /// Name of the damage law of these bonds, whatever that of the bodies is, or `"none"`: they never break. If neither this
-    /// nor `strength` is given, they break at the smaller threshold of both bodies.
+    /// Name of the damage law of these bonds, which replaces the damage laws of the bodies. With `"none"` these bonds
+    /// never break. If neither this nor `strength` is given, the bonds break at the smaller threshold of the two
+    /// bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Text>,
-    /// Stress in Pa, normal to the interface, at which these bonds begin to open; their critical stretch follows.
+    /// Stress in Pa, normal to the interface, at which these bonds begin to break. The critical stretch follows from
+    /// it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strength: Option<Number>,
 }
 
-/// What constants bonds between blocks have, if there are any.
+/// Constants of the bonds between blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
     /// No bonds.
     None,
-    /// Means.
+    /// The means of the moduli and of the horizons.
     Average,
-    /// The smaller.
+    /// The smaller modulus and horizon.
     Minimum,
-    /// Those of each end.
+    /// Each end uses its own constants.
     Own,
 }

@@ -56,7 +56,7 @@ pub fn common_keys() -> impl Iterator<Item = &'static str> + Clone {
     [DENSITY].into_iter().chain(constants).chain(others)
 }
 
-/// As an enumeration of laws would be, whose names are looked at later.
+/// Deserialize like an enum of laws; the law's name is checked later.
 impl<'de> Deserialize<'de> for Material {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct MaterialVisitor;
@@ -100,7 +100,7 @@ impl JsonSchema for Material {
     }
 }
 
-/// What a key of every law's table is, for editors.
+/// Schema of a key that every law's table has.
 fn meaning(key: &str) -> &'static str {
     match key {
         DENSITY => "Density in kg/m³.",
@@ -160,13 +160,13 @@ impl Serialize for Material {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Damage {
-    /// A bond breaks for good at a critical stretch.
+    /// A bond breaks permanently at a critical stretch.
     CriticalStretch(Spanned<CriticalStretch>),
-    /// A bond breaks for good when it has taken a work.
+    /// A bond breaks permanently when the work done on it reaches a critical value.
     Energy(Spanned<BondEnergy>),
 }
 
-/// Critical stretch, from one of three measures of toughness.
+/// Critical stretch, given by exactly one of three measures of toughness.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CriticalStretch {
@@ -179,13 +179,13 @@ pub struct CriticalStretch {
     /// The critical stretch s0 itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub critical_stretch: Option<Number>,
-    /// α in s ≥ s0 − α s_min; 0 if not given, a plain critical stretch.
+    /// α in the criterion s ≥ s0 − α s_min; 0 if not given, which is a constant critical stretch.
     #[serde(default = "default_alpha")]
     pub alpha: Number,
-    /// Modulus m of a Weibull distribution of the strength of the points, 1 or more; all are equally strong if not given.
+    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weibull_modulus: Option<Number>,
-    /// Seed of `weibull_modulus`: other numbers distribute the strength otherwise; 0 if not given.
+    /// Seed of the random strengths of `weibull_modulus`; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
     /// Sets of points whose bonds never break.
@@ -193,7 +193,7 @@ pub struct CriticalStretch {
     pub no_failure: Vec<Text>,
 }
 
-/// The work of bonds, from one of two measures of toughness.
+/// Critical work of bonds, given by exactly one of two measures of toughness.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BondEnergy {
@@ -203,27 +203,28 @@ pub struct BondEnergy {
     /// Fracture toughness K_Ic in Pa·√m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_toughness: Option<Number>,
-    /// How the critical work follows: "energy" (all bonds across an area take the fracture energy), "opening"
-    /// (opening a block of the body, which is tried before the run, costs it), "willberg2022" (as in Willberg et al. 2022,
-    /// eq. 16 and 18), "perilab" (as PeriLab computes it; 2-D and 3-D) or "peridigm2021" (as Peridigm computed it in 2021; 2-D).
+    /// How the critical work follows from the toughness. "energy": breaking all bonds across an area dissipates the
+    /// fracture energy. "opening": separating a block of the body costs the fracture energy; this is computed before
+    /// the run. "willberg2022": eq. 16 and 18 of Willberg et al. (2022). "perilab": as PeriLab computes it; 2-D and
+    /// 3-D. "peridigm2021": as Peridigm computed it in 2021; 2-D.
     #[serde(default = "default_calibration")]
     pub calibration: Spanned<Calibration>,
-    /// Whether only bonds that are longer than at the start break; if not, pressed ones break too, as in a
-    /// shear crack.
+    /// Whether only bonds that are longer than initially can break. Otherwise compressed bonds break too, as in a shear
+    /// crack.
     #[serde(default = "yes")]
     pub tension_only: bool,
-    /// How much of this is corrected, from 0 to 1: bonds beside surfaces hold more than those inside at the same strain, for
-    /// their points have fewer of them, so that a body breaks at its surfaces first. 0 if not given; with 1 their critical work
-    /// is larger by as much.
+    /// Degree of the surface correction of the critical work, from 0 to 1; 0 if not given. Points beside surfaces have
+    /// fewer bonds, so each bond stores more energy at the same strain and the body breaks at its surfaces first. With
+    /// 1, the critical work of these bonds is larger by the same factor.
     #[serde(default = "nothing")]
     pub family_correction: Number,
-    /// α: the threshold is that of a stretch s0 − α s_min in place of s0; 0 if not given.
+    /// α: the threshold is computed for the stretch s0 − α s_min instead of s0; 0 if not given.
     #[serde(default = "nothing")]
     pub alpha: Number,
-    /// Modulus m of a Weibull distribution of the strength of the points, 1 or more; all are equally strong if not given.
+    /// Modulus m ≥ 1 of a Weibull distribution of the points' strength; all points are equally strong if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weibull_modulus: Option<Number>,
-    /// Seed of `weibull_modulus`: other numbers distribute the strength otherwise; 0 if not given.
+    /// Seed of the random strengths of `weibull_modulus`; 0 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<Spanned<u64>>,
     /// Sets of points whose bonds never break.
@@ -238,7 +239,7 @@ pub enum Calibration {
     /// From the energy of all bonds across an area.
     #[default]
     Energy,
-    /// From what opening a block costs, which is measured.
+    /// From the computed energy that separates a block.
     Opening,
     /// As printed in Willberg et al. 2022.
     Willberg2022,

@@ -1,8 +1,7 @@
 //! The deck's grammar: what may stand in the TOML file, section by section.
 //!
-//! Every number may be a string with an expression of the `[parameters]`; all values are SI.
-//! Unknown keys are errors. Choices are tables named by the choice (`[material.glass.pmb]`), which
-//! keeps the place of an error.
+//! Every number may be a string with an expression of the `[parameters]`. All values are in SI units. Unknown keys are
+//! errors. Choices are tables named by the choice (`[material.glass.pmb]`), which keeps the place of an error.
 
 mod bodies;
 mod conditions;
@@ -46,7 +45,7 @@ pub type Tables<T> = IndexMap<String, Spanned<T>>;
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deck {
-    /// One line for summaries and pictures.
+    /// Title, one line for summaries and pictures.
     #[serde(default)]
     pub title: Text,
     /// `"1d"`, `"plane-stress"`, `"plane-strain"` or `"3d"`.
@@ -60,10 +59,10 @@ pub struct Deck {
     /// Condition across a 1-D body: `"uniaxial-stress"` (if not given) or `"uniaxial-strain"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub constraint: Option<Spanned<ConstraintName>>,
-    /// Named numbers for use in expressions; may build on one another.
+    /// Named numbers for use in expressions; a parameter may refer to other parameters.
     #[serde(default)]
     pub parameters: IndexMap<Text, Number>,
-    /// Values by time, by name, for use in expressions of `t`.
+    /// Tables of values over time, by name, for use in expressions of `t`.
     #[serde(default)]
     pub table: Tables<Table>,
     /// Spacing and horizon.
@@ -101,7 +100,7 @@ pub struct Deck {
     pub condition: Tables<Condition>,
     /// End time and step.
     pub time: Spanned<Time>,
-    /// The stages of the run in their order; without them there is one, that of `[time]`.
+    /// The stages of the run in their order; if none is given, `[time]` is the only stage.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stage: Vec<Spanned<Stage>>,
     /// What is written to the result, and how often.
@@ -110,10 +109,10 @@ pub struct Deck {
     /// What is written to the history, and how often.
     #[serde(default)]
     pub history: Spanned<History>,
-    /// How often the run can be continued from.
+    /// When checkpoints are written.
     #[serde(default)]
     pub checkpoint: Spanned<Checkpoint>,
-    /// When points are dealt out anew to the ranks; never if not given.
+    /// When points are rebalanced between ranks; never if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balance: Option<Spanned<Balance>>,
 }
@@ -124,7 +123,7 @@ pub enum DimensionName {
     /// A bar.
     #[serde(rename = "1d")]
     Line,
-    /// A thin plate, free of stress across its thickness.
+    /// A thin plate without stress across its thickness.
     #[serde(rename = "plane-stress")]
     PlaneStress,
     /// A slice of a long body, without strain along it.

@@ -1,4 +1,4 @@
-//! What is written: the result, the history, checkpoints.
+//! Grammar of the outputs: result, history and checkpoints.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -104,19 +104,19 @@ impl JsonSchema for Outputs {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Simulated time between outputs in s; a fiftieth of the run if neither `every_steps` nor `times` is given.
+    /// Simulated time between outputs in s; 1/50 of the run if neither `every_steps` nor `times` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
     /// Steps between outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
-    /// Simulated times of outputs in s, beside those of an interval if one is given.
+    /// Simulated times of outputs in s, in addition to those of `every` or `every_steps`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<Vector>,
     /// Names of the fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<Text>>,
-    /// Of the fields that change in time: `"double"`, 8 bytes a number, or `"single"`, 4 bytes.
+    /// Precision of the fields that change in time: `"double"` (8 bytes per number) or `"single"` (4 bytes).
     #[serde(default)]
     pub precision: Precision,
     /// The set whose points the result holds; all points if not given.
@@ -124,14 +124,14 @@ pub struct Output {
     pub set: Option<Text>,
 }
 
-/// How long the numbers of a result are.
+/// Precision of the numbers in a result.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// 8 bytes: every bit.
+    /// 8 bytes per number, without loss.
     #[default]
     Double,
-    /// 4 bytes: seven digits.
+    /// 4 bytes per number, about seven digits.
     Single,
 }
 
@@ -139,11 +139,11 @@ pub enum Precision {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct History {
-    /// Simulated time between rows in s. If neither is given, a five-hundredth of the run, and 20 steps where
-    /// the whole run is explicit.
+    /// Simulated time between rows in s. If neither `every` nor `every_steps` is given, rows are 1/500 of the run
+    /// apart, and at least 20 steps if the whole run is explicit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Number>,
-    /// Steps between rows; with `every` rows are written at multiples of so many steps only.
+    /// Steps between rows. Together with `every`, rows are only written at multiples of this number of steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<Spanned<Count>>,
     /// Sets whose reaction force is recorded, by component.
@@ -152,10 +152,10 @@ pub struct History {
     /// Forces of supports along a direction, by name.
     #[serde(default)]
     pub force: Tables<SupportForce>,
-    /// Whether fragments are counted, and the largest one weighed; not if not given.
+    /// Whether the number of fragments and the mass of the fragment with the most points are recorded; false if not given.
     #[serde(default)]
     pub fragments: bool,
-    /// Whether the angular momentum about the origin is recorded; not if not given. Plane problems and solids.
+    /// Whether the angular momentum about the origin is recorded (plane problems and solids); false if not given.
     #[serde(default)]
     pub angular_momentum: Spanned<bool>,
     /// Points with more damage than this count as cracked in the damage extent; 0.35 if not given.
@@ -164,16 +164,16 @@ pub struct History {
     /// Sums, means and extremes of fields over sets and bodies, by name.
     #[serde(default)]
     pub field: Tables<FieldStatistics>,
-    /// Places whose nearest point is followed, by name.
+    /// Probes by name; each records the values of the point nearest to a position.
     #[serde(default)]
     pub probe: Tables<Probe>,
-    /// Fronts that are followed along lines, by name.
+    /// Fronts that are tracked along lines, by name.
     #[serde(default)]
     pub front: Tables<Front>,
-    /// Cracks whose path and length are found, by name; plane problems.
+    /// Cracks whose path and length are computed, by name; plane problems only.
     #[serde(default)]
     pub crack: Tables<CrackPath>,
-    /// Crack tips that are followed, by name.
+    /// Crack tips that are tracked, by name.
     #[serde(default)]
     pub tip: Tables<Tip>,
 }
@@ -194,16 +194,15 @@ pub struct Checkpoint {
     pub every_time: Option<Number>,
 }
 
-/// Points are dealt out anew to the ranks when these have become unequal: their times in the loops over
-/// bonds are compared now and then. Results do not depend on it.
+/// Points are rebalanced when rank loads drift apart. The ranks' times in the loops over bonds are compared at regular
+/// intervals. Results do not depend on the rebalancing.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Balance {
-    /// Steps between looks at the times; 500 if not given.
+    /// Steps between comparisons of the ranks' times; 500 if not given.
     #[serde(default = "default_look")]
     pub every_steps: Spanned<Count>,
-    /// The time of the slowest rank, as a multiple of the mean, above which points are dealt out anew;
-    /// 1.2 if not given.
+    /// Time of the slowest rank, as a multiple of the mean, above which points are rebalanced; 1.2 if not given.
     #[serde(default = "default_imbalance")]
     pub imbalance: Number,
 }
@@ -216,43 +215,44 @@ fn default_imbalance() -> Number {
     default_number(1.2)
 }
 
-/// The force of the supports on a set along a direction.
+/// Reaction force of a set, projected on a direction.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SupportForce {
     /// The set.
     pub set: Text,
-    /// The direction in which the force counts, of any length.
+    /// Direction on which the force is projected; a vector of any length.
     pub direction: Vector,
 }
 
-/// A crack: the lines through the middle of the damage that hangs together from a place on, each
-/// branch by itself.
+/// A crack path: the centre lines of the damaged region that is connected to a start position, one line for each
+/// branch.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackPath {
-    /// Where the crack starts, m; damage within one horizon of it belongs to the crack.
+    /// Start position of the crack, m; damage within one horizon of it belongs to the crack.
     pub from: Vector,
-    /// The points that are looked at; all if not given.
+    /// The set of points that are evaluated; all points if not given.
     #[serde(default = "super::all_points")]
     pub set: Text,
-    /// What the damage must exceed; `damage_threshold` if not given.
+    /// Threshold that the damage must exceed; `damage_threshold` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold: Option<Number>,
 }
 
-/// A place to watch.
+/// A probe at a position.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// The place in m; the nearest point is followed.
+    /// Position in m; the probe records the nearest point.
     pub at: Vector,
-    /// Names of output fields that are recorded beside displacement and velocity, such as `"stress"` and `"strain"`.
+    /// Names of output fields, such as `"stress"` and `"strain"`, that are recorded in addition to displacement and
+    /// velocity.
     #[serde(default)]
     pub fields: Vec<Text>,
 }
 
-/// Sums and extremes of a field over a set or body; a column each.
+/// Sums and extremes of a field over a set or body; one history column for each.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldStatistics {
@@ -265,11 +265,11 @@ pub struct FieldStatistics {
     /// A set or a body; all points if not given.
     #[serde(default = "super::all_points")]
     pub set: Text,
-    /// What is recorded.
+    /// The quantities that are recorded.
     pub of: Spanned<Vec<Spanned<Statistic>>>,
 }
 
-/// A number that follows from the values of a set.
+/// A number computed from the values of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Statistic {
@@ -285,20 +285,20 @@ pub enum Statistic {
     Maximum,
 }
 
-/// A front: how far a field has come along a line. Of the points near the line, the farthest one above
-/// the threshold; from there to the next point ahead, linear interpolation to where the threshold is
+/// A front: the position that a field has reached along a line. It starts from the farthest point near the line whose
+/// value exceeds the threshold. Linear interpolation to the next point ahead gives the position where the threshold is
 /// crossed.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Front {
-    /// Where the line starts, m.
+    /// Start of the line, m.
     pub from: Vector,
-    /// Where it leads, of any length.
+    /// Direction of the line; a vector of any length.
     pub direction: Vector,
-    /// Length of the line in m; to the end of the bodies if not given.
+    /// Length of the line in m; if not given, the line extends to the end of the bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length: Option<Number>,
-    /// Points up to this distance from the line count, in m; the horizon if not given.
+    /// Largest distance in m from the line at which points are evaluated; the horizon if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
     /// Name of an output field.
@@ -307,23 +307,23 @@ pub struct Front {
     /// The magnitude of a vector if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub component: Option<Text>,
-    /// What the size of the field must exceed, in the unit of the field.
+    /// Threshold that the absolute value of the field must exceed, in the unit of the field.
     pub threshold: Number,
 }
 
-/// A crack tip: the farthest point of a set, in one direction, with more damage than a threshold; from
-/// there on as for a [`Front`].
+/// A crack tip: the farthest point of a set in one direction whose damage exceeds a threshold. The position is then
+/// interpolated as for a [`Front`].
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tip {
-    /// Where the length of the crack is counted from, m.
+    /// Position from which the length of the crack is measured, m.
     pub from: Vector,
-    /// Where the crack runs, of any length; its own length is counted along this.
+    /// Direction of the crack, a vector of any length; the length of the crack is measured along it.
     pub direction: Vector,
-    /// The points that are looked at; all if not given.
+    /// The set of points that are evaluated; all points if not given.
     #[serde(default = "super::all_points")]
     pub set: Text,
-    /// What the damage must exceed; `damage_threshold` if not given.
+    /// Threshold that the damage must exceed; `damage_threshold` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold: Option<Number>,
 }

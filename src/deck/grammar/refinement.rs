@@ -7,57 +7,58 @@ use super::{Count, Tables};
 use crate::deck::number::Number;
 use crate::deck::spanned::Spanned;
 
-/// Refinement: points of bodies given as shapes get new ones around them at half the spacing, level by
-/// level; neighbours differ by one level at most.
+/// Refinement of bodies given as shapes: around selected points, new points are inserted at half the spacing, level by
+/// level. Neighbours differ by at most one level.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
-    /// The finest level: the spacing there is that of the grid divided by 2^levels.
+    /// The finest level; its spacing is the spacing of the grid divided by 2^levels.
     pub levels: Spanned<u64>,
-    /// How horizons go with the spacing: `"delta"`, m = δ/dx stays, or `"delta-m"`, m rises.
+    /// How the horizon depends on the spacing: with `"delta"`, m = δ/dx is constant; with `"delta-m"`, m rises with the
+    /// level.
     #[serde(default)]
     pub rule: HorizonRule,
-    /// With `"delta-m"`: m of the levels from 1 on; by 1 more from level to level if not given.
+    /// With `"delta-m"`: m of each level from 1 on. If not given, m rises by 1 from level to level.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m: Option<Spanned<Vec<Number>>>,
-    /// What the horizon of points is multiplied by that have a coarser level within it, so that their
-    /// families do not lose volume; √2 with `"delta"` and 1 with `"delta-m"` if not given.
+    /// Factor on the horizon of points with a coarser level inside their horizon, so that their families do not lose
+    /// volume. The default is √2 with `"delta"` and 1 with `"delta-m"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_factor: Option<Number>,
-    /// The bonds between levels: `"own"`, each end exerts its half with its own horizon, or `"average"`, both have
-    /// the mean of the horizons.
+    /// Bonds between levels: with `"own"`, each end exerts its half of the force with its own horizon; with
+    /// `"average"`, both ends use the mean horizon.
     #[serde(default)]
     pub bonds: LevelBonds,
-    /// What is refined from the start, by any name.
+    /// Regions that are refined from the start, by a freely chosen name.
     #[serde(default)]
     pub region: Tables<RefinedRegion>,
-    /// What is refined during the run; nothing if not given.
+    /// Criteria of refinement during the run; no refinement during the run if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trigger: Option<Spanned<Trigger>>,
 }
 
-/// Points that make all within their horizon be refined, one level at a time; at least one of `energy`,
-/// `damage` and `where`, any of which is enough.
+/// Triggers of refinement: all points within the horizon of a trigger point are refined, one level at a time. A point
+/// is a trigger if it fulfils any of the given `energy`, `damage` and `where`; at least one must be given.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trigger {
-    /// Steps between looks; 20 if not given.
+    /// Steps between evaluations of the criteria; 20 if not given.
     #[serde(default = "default_look")]
     pub every_steps: Spanned<Count>,
-    /// The strain energy density, as a share of the largest of all points at that moment.
+    /// Smallest strain energy density of a trigger, as a fraction of the current maximum over all points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Number>,
-    /// The damage.
+    /// Smallest damage of a trigger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damage: Option<Number>,
     /// A condition on the reference position and t.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<Number>,
-    /// A condition on the reference position and t without which a point is no trigger.
+    /// A condition on the reference position and t that every trigger must fulfil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only: Option<Number>,
-    /// Time (s) out of reach of triggers, and of points that miss bonds, after which points become coarser again, by
-    /// one level at a look; never if not given.
+    /// Time in s after which points become coarser again, by one level per evaluation, if no trigger and no point with
+    /// broken bonds has been in reach. Never if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarsen_after: Option<Number>,
 }
@@ -66,25 +67,25 @@ fn default_look() -> Spanned<Count> {
     Spanned::new(0..0, Count::new(20))
 }
 
-/// How the horizon goes with the spacing from level to level.
+/// How the horizon depends on the spacing of a level.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HorizonRule {
-    /// δ/dx stays.
+    /// δ/dx is the same on all levels.
     #[default]
     Delta,
     /// δ/dx rises with the level.
     DeltaM,
 }
 
-/// Which horizons the bonds between levels have.
+/// Horizons of the bonds between levels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelBonds {
-    /// Each end its own.
+    /// Each end uses its own horizon.
     #[default]
     Own,
-    /// Both ends the mean.
+    /// Both ends use the mean horizon.
     Average,
 }
 
@@ -95,7 +96,7 @@ pub struct RefinedRegion {
     /// A condition on the reference position.
     #[serde(rename = "where")]
     pub condition: Number,
-    /// The level that points there get at least; the finest if not given.
+    /// Lowest level of points in this region; the finest level if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub level: Option<Spanned<u64>>,
 }

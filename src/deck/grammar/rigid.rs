@@ -7,34 +7,34 @@ use super::Shape;
 use crate::deck::number::{Number, Vector};
 use crate::deck::spanned::Spanned;
 
-/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Points touch it where half the edge of their cell
-/// reaches its surface, or as near as they began.
+/// A rigid body: driven by its `motion`, free with its `mass`, or fixed. Contact with a point begins when its distance
+/// to the surface is half the edge of its cell, or its initial distance if that is smaller.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rigid {
     /// `box`, `sphere`, `cylinder`, or `disc` in the plane; or a `half_space`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<Spanned<Shape>>,
-    /// All that lies behind a plane, or a line.
+    /// The half space behind a plane, or behind a line in plane problems.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_space: Option<Spanned<HalfSpace>>,
-    /// Displacement in m, an expression of t a component.
+    /// Displacement in m: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<Vector>,
-    /// Mass in kg, in the plane that of the whole thickness: the body is free then.
+    /// Mass in kg, which makes the body free; in plane problems, the mass of the whole thickness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<Number>,
     /// Velocity of a free body at the start, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
-    /// Angular velocity of a free body at the start, 1/s: a vector, in the plane one number.
+    /// Initial angular velocity of a free body, 1/s: a vector, or one number in plane problems.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angular_velocity: Option<Spanned<Vec<Number>>>,
-    /// Force at the centre of a free body in N, an expression of t a component.
+    /// Force at the centre of a free body in N: an expression of t for each component.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force: Option<Vector>,
-    /// Young's modulus, Pa, of the layer between points and surface, half a horizon thick; that of the points' material if
-    /// not given.
+    /// Young's modulus in Pa of the layer between points and surface, which is half a horizon thick. The modulus of the
+    /// points' material if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Number>,
     /// As in `[contact]`.
@@ -52,8 +52,8 @@ pub struct Rigid {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {
-    /// A point of its surface, m.
+    /// A point on the surface of the half space, m.
     pub through: Vector,
-    /// Out of the half space, of any length.
+    /// Outward normal of the half space; a vector of any length.
     pub normal: Vector,
 }

@@ -1,4 +1,5 @@
-//! The sections of a deck: how their headers are written, which of them others refer to, and what a restart may change.
+//! The sections of a deck: the form of their headers, whether other sections refer to them, and what a restart may
+//! change.
 
 use std::ops::Range;
 
@@ -12,7 +13,7 @@ pub struct Section {
     pub path: &'static str,
     /// How its header is written.
     pub form: Form,
-    /// Whether its tables are there only to be referred to by their names.
+    /// Whether its tables have an effect only where another section refers to them by name.
     pub referred_to: bool,
     /// What a restart may change of it.
     pub restart: Restart,
@@ -58,9 +59,9 @@ pub const SECTIONS: [Section; 38] = [
     Section::new("thickness", Key, Fixed),
     Section::new("cross_section", Key, Fixed),
     Section::new("constraint", Key, Fixed),
-    // Parameters count where they are used.
+    // Parameters are compared where they are used.
     Section::new("parameters", Table, Free),
-    // Tables count where they are used, too.
+    // Tables are compared where they are used, too.
     Section::new("table", Named, Free).referred_to(),
     Section::new("grid", Table, Fixed),
     Section::new("interface", Table, Fixed),
@@ -146,12 +147,12 @@ pub struct NamedTable<'a> {
     pub section: &'static str,
     /// Its name.
     pub name: &'a str,
-    /// Where it stands.
+    /// Its place in the deck.
     pub span: Range<usize>,
 }
 
 impl Deck {
-    /// The tables with names, section by section.
+    /// The named tables, section by section.
     pub fn named_tables(&self) -> Vec<NamedTable<'_>> {
         fn add<'a, T>(
             found: &mut Vec<NamedTable<'a>>,
@@ -198,7 +199,7 @@ impl Deck {
 mod tests {
     use super::*;
 
-    /// The fields of a struct of the grammar, from the error of the reader.
+    /// The fields of a struct of the grammar, read from a deserialization error.
     fn fields(deck: &str) -> Vec<String> {
         let error = toml::from_str::<Deck>(deck).unwrap_err();
         let fields = error.message().split('`').skip(3).step_by(2);

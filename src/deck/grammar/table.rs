@@ -7,23 +7,24 @@ use super::Text;
 use crate::deck::number::{Number, default_number};
 use crate::deck::spanned::Spanned;
 
-/// A value by time, linear between rows: expressions of `t` may use its name. The rows are columns of a file or stand here.
+/// A value over time, linear between rows. Expressions of `t` may use its name. The rows come from a file or from this
+/// table.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
     /// Text file whose first row names its columns, relative to the deck.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<Text>,
-    /// Name of the column of values; the other one if there are two and this is not given.
+    /// Name of the column of values. If not given and the file has two columns, the column that is not the time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<Text>,
     /// Name of the column of times in s; if not given, `t` or `time`, or else the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Text>,
-    /// Times in s, each above the one before, in place of a file.
+    /// Strictly increasing times in s, instead of a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<Spanned<Vec<Number>>>,
-    /// As many values.
+    /// Values at these times.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values: Option<Spanned<Vec<Number>>>,
 }

@@ -1,4 +1,4 @@
-//! The time axis, stages, and how points come to move.
+//! Grammar of the time axis, the stages, and the methods of time integration and equilibrium.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,24 +16,23 @@ pub struct Time {
     /// A fixed time step in s; automatic if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
-    /// Automatic step as a fraction of the stable one.
+    /// Automatic step as a fraction of the stable step.
     #[serde(default = "default_safety")]
     pub safety: Number,
-    /// How the points come to move: `"explicit"`, by the equation of motion, or `"relaxation"` or `"static"`, from one
-    /// equilibrium to the next.
+    /// Solution method: `"explicit"` integrates the equation of motion; `"relaxation"` and `"static"` compute one
+    /// equilibrium per load step.
     #[serde(default = "explicit")]
     pub method: Spanned<Method>,
-    /// How equilibria are found.
+    /// Settings of the relaxation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Spanned<Relaxation>>,
-    /// How Newton's method finds equilibria.
+    /// Settings of Newton's method.
     #[serde(rename = "static", skip_serializing_if = "Option::is_none")]
     pub newton: Option<Spanned<Static>>,
-    /// How many times its density a body has in the equation of motion; more than 1 to take larger steps
-    /// through slow loading.
+    /// Factor on the density in the equation of motion; a factor above 1 permits larger steps during slow loading.
     #[serde(default = "default_density_scale")]
     pub density_scale: Number,
-    /// The step follows the number of bonds that break in it.
+    /// Settings of a step that adapts to the number of bonds that break in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
 }
@@ -46,32 +45,32 @@ fn default_safety() -> Number {
     default_number(0.8)
 }
 
-/// A stage of the run. What it does not say is as in `[time]`.
+/// A stage of the run. Keys that are not given are as in `[time]`.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
-    /// When it ends, s; the last stage ends with the run.
+    /// End of the stage in s; the last stage ends with the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end: Option<Number>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Spanned<Method>>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub safety: Option<Number>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Spanned<Relaxation>>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(rename = "static", skip_serializing_if = "Option::is_none")]
     pub newton: Option<Spanned<Static>>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_scale: Option<Number>,
-    /// As in `[time]`.
+    /// As in `[time]`; the value of `[time]` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<Spanned<Adaptive>>,
     /// Names of the loads and supports that act; all if neither this nor `off` is given.
@@ -86,7 +85,7 @@ fn explicit() -> Spanned<Method> {
     Spanned::new(0..0, Method::Explicit)
 }
 
-/// How the points come to move.
+/// The solution method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
@@ -99,7 +98,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Its name in a deck.
+    /// The name of the method in a deck.
     pub fn name(self) -> &'static str {
         match self {
             Self::Explicit => "explicit",
@@ -108,35 +107,35 @@ impl Method {
         }
     }
 
-    /// Whether it finds equilibria.
+    /// Whether the method computes equilibria.
     pub fn is_quasi_static(self) -> bool {
         self != Self::Explicit
     }
 }
 
-/// A step that follows the number of bonds that break in it.
+/// A time step that adapts to the number of bonds that break in it.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// A step that breaks more bonds of any point is undone, and made again with a shorter one.
+    /// Largest number of bonds of one point that may break in a step; otherwise the step is repeated with a smaller dt.
     #[serde(default = "default_most_broken")]
     pub most_broken: Count,
-    /// A step that breaks no more bonds of any point is calm.
+    /// Largest number of bonds of one point that may break in a calm step.
     #[serde(default = "default_stable_broken")]
     pub stable_broken: Spanned<u64>,
-    /// Calm steps in a row before the step is raised.
+    /// Number of consecutive calm steps before dt is raised.
     #[serde(default = "default_calm_steps")]
     pub steps: Count,
-    /// What the step is multiplied with when one is undone.
+    /// Factor on dt when a step is repeated.
     #[serde(default = "default_reduce")]
     pub reduce: Number,
-    /// What it is multiplied with when it is raised.
+    /// Factor on dt when it is raised.
     #[serde(default = "default_raise")]
     pub raise: Number,
-    /// The smallest step in s; a hundredth of the largest if not given.
+    /// The smallest step in s; 1/100 of the largest if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smallest: Option<Number>,
-    /// The largest step in s; that of `step` or `safety` if not given.
+    /// The largest step in s; the step given by `step` or `safety` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest: Option<Number>,
 }
@@ -161,17 +160,17 @@ fn default_raise() -> Number {
     default_number(1.5)
 }
 
-/// How equilibria are found.
+/// Settings of the relaxation.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Relaxation {
     /// Number of load steps.
     #[serde(default = "default_load_steps")]
     pub load_steps: Count,
-    /// What the forces that are out of balance may be, as a share of loads and reactions.
+    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions.
     #[serde(default = "default_tolerance")]
     pub tolerance: Number,
-    /// The most iterations of a load step.
+    /// Largest number of iterations of a load step.
     #[serde(default = "default_iterations")]
     pub iterations: Count,
 }
@@ -198,21 +197,21 @@ fn default_iterations() -> Count {
     Count::new(100_000)
 }
 
-/// How Newton's method finds equilibria.
+/// Settings of Newton's method.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Static {
-    /// Number of load steps; that of the relaxation if not given.
+    /// Number of load steps; the value of the relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<Count>,
-    /// What the forces that are out of balance may be, as a share of loads and reactions; that of the relaxation if not
-    /// given.
+    /// Largest residual: norm of the unbalanced force, divided by that of loads and reactions. The value of the
+    /// relaxation if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Number>,
-    /// The most iterations of a load step.
+    /// Largest number of iterations of a load step.
     #[serde(default = "default_max_iterations")]
     pub max_iterations: Count,
-    /// How often a load step without an equilibrium is halved.
+    /// How many times a load step without an equilibrium may be halved.
     #[serde(default = "default_max_halvings")]
     pub max_halvings: Spanned<u64>,
 }

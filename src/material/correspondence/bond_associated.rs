@@ -66,7 +66,7 @@ impl Declared for BondAssociated {
         invariants: of_stress,
         ..Declaration::new(
             "bond_associated_correspondence",
-            "of the stress at a deformation gradient of each bond's own",
+            "from a classical stress, evaluated at a deformation gradient for each bond",
             build,
         )
     }];

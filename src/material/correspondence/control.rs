@@ -42,7 +42,8 @@ pub enum Control {
 
 pub const KIND: Key = Key {
     name: "zero_energy",
-    meaning: "what works against motions that leave the deformation gradient as it is",
+    meaning: "control of zero-energy modes, the motions that do not change the deformation \
+              gradient",
     kind: Kind::Word(&[
         Word::new("dispersion"),
         Word::new("wan2019"),
@@ -53,7 +54,8 @@ pub const KIND: Key = Key {
 
 pub const COEFFICIENT: Key = Key {
     name: "zero_energy_coefficient",
-    meaning: "G of \"silling2017\": the force against such a motion over that of a bond-based solid",
+    meaning: "G of \"silling2017\": force against a zero-energy mode, divided by that of a \
+              bond-based solid",
     kind: Kind::Number {
         range: f64::MIN_POSITIVE..f64::INFINITY,
         words: "above 0",

@@ -63,8 +63,8 @@ const ANGLES: [&str; 3] = ["angle_1", "angle_2", "angle_3"];
 pub const fn entry(name: &'static str) -> Key {
     Key {
         name,
-        meaning: "an entry of Hooke's matrix in Voigt's order xx, yy, zz, yz, xz, xy, Pa; 0 if not given \
-                  where others are",
+        meaning: "an entry of Hooke's matrix in Voigt's order xx, yy, zz, yz, xz, xy, Pa; 0 if \
+                  only other entries are given",
         kind: Kind::Optional {
             range: f64::NEG_INFINITY..f64::INFINITY,
             words: "a number",
@@ -86,8 +86,8 @@ pub const fn modulus(name: &'static str) -> Key {
 pub const fn ratio(name: &'static str) -> Key {
     Key {
         name,
-        meaning: "a Poisson's ratio of an orthotropic solid: the strain along the second axis over that \
-                  along the first, when it is pulled along the first, with the sign changed",
+        meaning: "a Poisson's ratio of an orthotropic solid: in tension along the first axis, \
+                  minus the strain along the second axis divided by the strain along the first",
         kind: Kind::Optional {
             range: f64::NEG_INFINITY..f64::INFINITY,
             words: "a number",
@@ -98,8 +98,8 @@ pub const fn ratio(name: &'static str) -> Key {
 pub const fn angle(name: &'static str) -> Key {
     Key {
         name,
-        meaning: "Bunge's angles, degrees, by which the axes of the material are turned: about z, then x, \
-                  then z; in the plane the first alone",
+        meaning: "Bunge's Euler angles of the material's axes, degrees: rotation about z, then \
+                  x, then z; in the plane only the first",
         kind: Kind::Number {
             range: -360.0..360.0,
             words: "between -360 and 360",

@@ -98,7 +98,7 @@ impl Declared for Correspondence {
         invariants,
         ..Declaration::new(
             "correspondence",
-            "of the stress at the family's deformation gradient",
+            "from a classical stress, evaluated at the deformation gradient of the family",
             build,
         )
     }];

@@ -43,8 +43,8 @@ pub struct Plastic {
 
 pub const YIELD_STRESS: Key = Key {
     name: "yield_stress",
-    meaning: "σ_y, Pa, at which an isotropic body with the first `stress` yields when it is pulled along an \
-              axis (von Mises); elastic if not given",
+    meaning: "yield stress σ_y in uniaxial tension, Pa (von Mises); only isotropic, with the \
+              default `stress`; elastic if not given",
     kind: Kind::Optional {
         range: f64::MIN_POSITIVE..f64::INFINITY,
         words: "above 0",
@@ -53,7 +53,8 @@ pub const YIELD_STRESS: Key = Key {
 
 pub const HARDENING: Key = Key {
     name: "hardening_modulus",
-    meaning: "H, Pa, by which the yield stress grows with the equivalent plastic strain; 0 if not given",
+    meaning: "hardening modulus H, Pa: slope of the yield stress over the equivalent plastic \
+              strain; 0 if not given",
     kind: Kind::Optional {
         range: 0.0..f64::INFINITY,
         words: "at least 0",
