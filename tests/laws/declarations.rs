@@ -119,8 +119,8 @@ fn a_law_of_a_problem_in_rust_is_checked_before_the_run() {
     let found = fault::<3>(&body(space, law("elastic_plastic_pmb"), None));
     assert_eq!(
         found.unwrap(),
-        "[body.cube] law `elastic_plastic_pmb`: needs `yield_stretch`: the stretch s_y, pulled or \
-         pushed, at which a bond yields"
+        "[body.cube] law `elastic_plastic_pmb`: needs `yield_stretch`: stretch s_y at which a bond yields, in tension \
+         and in compression"
     );
     let found = fault::<1>(&body(line, law("ordinary"), None)).unwrap();
     assert!(found.contains("has no 1-D form"), "{found}");
