@@ -51,6 +51,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Creation};
 use crate::problem::Problem;
 use crate::solver::calibration::calibrated;
+use crate::solver::conditions::output_members;
 use crate::solver::observers::{ContactWatch, HistoryRow};
 use crate::solver::repartition::BalanceWatch;
 use crate::solver::{Simulation, Stepper};
@@ -184,6 +185,10 @@ impl<'a> Job<'a> {
         let mut interrupt = || self.check_signals();
         let mut simulation = Simulation::<D>::set_up(self.problem, self.comm, &mut interrupt)?;
         simulation.check()?;
+        // Before any file is created or replaced.
+        for output in self.problem.outputs() {
+            output_members(self.problem, output, self.comm, &simulation.model)?;
+        }
         let mut survey = Survey::new(&mut simulation);
         if let Some(deck) = &self.options.deck {
             let warnings = survey.warnings.into_iter();
@@ -300,16 +305,11 @@ impl<'a> Job<'a> {
             let is_checked = due || complete || stepper.load_step().has_failed;
             let is_agreed = watch.end_iteration(step) || is_checked;
             let mut decision = if is_agreed {
-                let votes = Votes {
-                    stop: stepper.is_stop_requested(),
-                    is_wrong: stepper.wrong_request().is_some(),
-                    factors: stepper.load_factors().fingerprint(),
-                };
-                watch.decide(self.comm, step, votes)
+                watch.decide(self.comm, step, Votes::of(stepper))
             } else {
                 Decision::default()
             };
-            if decision.has_wrong_request || decision.factors_differ {
+            if decision.has_wrong_request {
                 return Ok(LoopEnd::Failed(self.wrong_request(stepper)));
             }
             let mut saves = complete || decision.checkpoint || decision.stop.is_some();
@@ -330,8 +330,13 @@ impl<'a> Job<'a> {
                         contact = None;
                     }
                     recorder.record(stepper, self.observer)?;
-                    let stop = u64::from(stepper.is_stop_requested());
-                    if decision.stop.is_none() && comm::total(self.comm, stop) > 0 {
+                    // The observer has seen the row and may have made requests, which the checkpoint below must not save
+                    // if the ranks differ.
+                    let requests = Votes::of(stepper).agree(self.comm);
+                    if requests.are_wrong {
+                        return Ok(LoopEnd::Failed(self.wrong_request(stepper)));
+                    }
+                    if decision.stop.is_none() && requests.stop {
                         decision.stop = Some(Reason::Observer);
                         saves = true;
                     }

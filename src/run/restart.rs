@@ -71,8 +71,8 @@ fn match_counters<const D: usize>(
     if !simulation.problem.has_damage() {
         return;
     }
-    let mut names = header.further.iter();
-    let names = names.by_ref().filter(|result| result.counts_newly_broken);
+    let further = header.further.iter();
+    let names = further.filter(|result| result.counts_newly_broken);
     let names: Vec<&String> = names.map(|result| &result.name).collect();
     let others = saved.columns.len().saturating_sub(names.len());
     let old = saved.columns.split_off(others);

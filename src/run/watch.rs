@@ -4,6 +4,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::comm::Communicator;
 use crate::problem::CheckpointRule;
+use crate::solver::Stepper;
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 
@@ -28,21 +29,64 @@ pub struct Decision {
     pub checkpoint: bool,
     /// Stop, with the reason.
     pub stop: Option<Reason>,
-    /// The observer of a rank has made a wrong request.
+    /// The observer of a rank has made a wrong request, or the observers have set different load factors.
     pub has_wrong_request: bool,
-    /// The observers of the ranks have set different load factors.
-    pub factors_differ: bool,
 }
 
 /// What the observer of this rank has asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Votes {
-    /// Stop the run.
+    stop: bool,
+    is_wrong: bool,
+    /// Fingerprint of all load factors that were set.
+    factors: f64,
+}
+
+/// What the observers of all ranks have asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Requests {
+    /// One of them wants to stop the run.
     pub stop: bool,
-    /// The request was wrong.
-    pub is_wrong: bool,
-    /// Fingerprint of the load factors.
-    pub factors: f64,
+    /// One of them was wrong, or the load factors differ by rank.
+    pub are_wrong: bool,
+}
+
+impl Votes {
+    /// The requests of this rank's observer so far.
+    pub fn of<const D: usize>(stepper: &Stepper<'_, D>) -> Self {
+        Self {
+            stop: stepper.is_stop_requested(),
+            is_wrong: stepper.wrong_request().is_some(),
+            factors: stepper.load_factors().fingerprint(),
+        }
+    }
+
+    /// Entries whose maxima over all ranks are those of [`Requests::of_maxima`].
+    fn entries(self) -> [f64; 4] {
+        let flag = |set: bool| f64::from(u8::from(set));
+        [
+            flag(self.stop),
+            flag(self.is_wrong),
+            self.factors,
+            -self.factors,
+        ]
+    }
+
+    /// The requests of all ranks. Collective.
+    pub fn agree(self, comm: &dyn Communicator) -> Requests {
+        let mut entries = self.entries();
+        comm.max(&mut entries);
+        Requests::of_maxima(entries)
+    }
+}
+
+impl Requests {
+    fn of_maxima([stop, is_wrong, largest, least]: [f64; 4]) -> Self {
+        Self {
+            stop: stop > 0.0,
+            are_wrong: is_wrong > 0.0 || largest != -least,
+        }
+    }
 }
 
 /// Reason of a stop before the end.
@@ -137,30 +181,32 @@ impl<'a> Watch<'a> {
             start.elapsed().as_secs_f64() + reserve + 2.0 * self.cost.as_secs_f64() >= limit
         });
         let flag = |set: bool| f64::from(u8::from(set));
+        let requests = observer.entries();
         let mut votes = [
             flag(self.signals.is_some_and(Signals::stop)),
             flag(late),
             flag(due || self.signals.is_some_and(Signals::take_request)),
             per_iteration,
-            flag(observer.stop),
-            flag(observer.is_wrong),
-            observer.factors,
-            -observer.factors,
+            requests[0],
+            requests[1],
+            requests[2],
+            requests[3],
         ];
         comm.max(&mut votes);
+        let [.., stop, is_wrong, largest, least] = votes;
+        let requests = Requests::of_maxima([stop, is_wrong, largest, least]);
         let iterations = (INTERVAL / votes[3].max(1e-9)) as u64;
         self.next_decision = self.iterations + iterations.clamp(1, MAX_ITERATIONS);
         self.last_decision = (Instant::now(), self.iterations);
         Decision {
             checkpoint: votes[2] > 0.0 || self.is_scheduled(step),
-            stop: match (votes[0] > 0.0, votes[1] > 0.0, votes[4] > 0.0) {
+            stop: match (votes[0] > 0.0, votes[1] > 0.0, requests.stop) {
                 (true, _, _) => Some(Reason::Signal),
                 (_, true, _) => Some(Reason::WallTime),
                 (_, _, true) => Some(Reason::Observer),
                 _ => None,
             },
-            has_wrong_request: votes[5] > 0.0,
-            factors_differ: votes[6] != -votes[7],
+            has_wrong_request: requests.are_wrong,
         }
     }
 

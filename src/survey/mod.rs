@@ -17,6 +17,8 @@ pub use interior::{Interior, interior};
 pub use size::{Size, size};
 pub use speed::{Speed, speed};
 
+use rayon::prelude::*;
+
 use crate::comm::total;
 use crate::damage::{CriticalStretch, DamageLaw};
 use crate::error::Warning;
@@ -254,8 +256,9 @@ fn points_on_cracks<const D: usize>(simulation: &Simulation<'_, D>, warnings: &m
         .iter()
         .filter(|crack| !crack.surface.has_width())
     {
-        let found = (0..model.owned()).filter(|point| is_on(&crack.surface, point));
-        let points = total(simulation.comm, found.count() as u64);
+        let own = (0..model.owned()).into_par_iter();
+        let found = own.filter(|point| is_on(&crack.surface, point)).count();
+        let points = total(simulation.comm, found as u64);
         if points > D as u64 {
             let message = format!(
                 "[crack.{}]: passes through {points} points, which count to one side of it, so the cut lies beside them; \
@@ -333,45 +336,51 @@ fn few_neighbours<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: 
 
 fn time<const D: usize>(simulation: &Simulation<'_, D>, warnings: &mut Vec<Warning>) {
     let problem = simulation.problem;
-    let mut warn = |message: String| {
-        warnings.push(Warning::new(message).at(&problem.places.step));
-    };
+    let places = &problem.places;
+    let mut warn = |place, message: String| warnings.push(Warning::new(message).at(place));
     let clock = simulation.clock;
     let (step, stable) = (clock.step(), simulation.scaled_stable_step());
     if step > stable && !simulation.is_quasi_static() {
-        warn(format!(
-            "[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s"
-        ));
+        let message =
+            format!("[time] step: {step:.4e} s is larger than the stable one, {stable:.4e} s");
+        warn(&places.step, message);
     }
     let rule = simulation.time_rule().adaptive;
     if let Some(largest) = rule.and_then(|rule| rule.largest)
         && largest > stable
     {
-        warn(format!(
+        let message = format!(
             "[time] adaptive largest: {largest:.4e} s is larger than the stable one, {stable:.4e} s"
-        ));
+        );
+        warn(&places.step, message);
     }
     let last = simulation.last_step();
     if last > MANY_STEPS {
-        warn(format!(
+        let message = format!(
             "[time] end: the run takes {:.1e} steps of {step:.4e} s; check the units of the end, the moduli and the \
              densities",
             last as f64
-        ));
+        );
+        warn(&places.end, message);
     }
     if last < FEW_STEPS && !simulation.is_quasi_static() {
-        warn(format!(
+        let message = format!(
             "[time] end: the run has only {last} step(s) of {step:.4e} s; check the units of the end, the lengths and \
              the moduli"
-        ));
+        );
+        warn(&places.end, message);
     }
-    if let Some(Interval::Seconds(every)) = problem.output.every
-        && every > problem.time.end
-    {
-        warn(format!(
-            "[output] every: {} s is longer than the run, {} s; only its first and last states are written",
-            format_number(every),
-            format_number(problem.time.end)
-        ));
+    for output in problem.outputs() {
+        if let Some(Interval::Seconds(every)) = output.every
+            && every > problem.time.end
+        {
+            let message = format!(
+                "{} every: {} s is longer than the run, {} s; only its first and last states are written",
+                output.section(),
+                format_number(every),
+                format_number(problem.time.end)
+            );
+            warnings.push(Warning::new(message));
+        }
     }
 }

@@ -110,11 +110,15 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
     Ok(())
 }
 
-/// The path of a file beside a result. The name begins with that of a further result, such as `result_edge.vtkhdf`.
+/// The path of a file beside a result. The name begins with the stem of a further result, such as `result_edge.vtkhdf`;
+/// no field begins with `result_`.
 pub fn beside(result: &Path, name: &str) -> PathBuf {
     let stem = result.file_stem().unwrap_or_default().to_string_lossy();
-    let further = stem.strip_prefix("result_");
-    let further = further.map_or(String::new(), |further| format!("{further}_"));
+    let further = if stem.starts_with("result_") {
+        format!("{stem}_")
+    } else {
+        String::new()
+    };
     result.with_file_name(format!("{further}{name}"))
 }
 
@@ -582,15 +586,15 @@ fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Re
     let count = bodies
         .iter()
         .fold(0.0, |most: f64, body| most.max(body + 1.0)) as usize;
-    let is_scattered = |body: usize| {
-        let own = || {
-            let both = positions.iter().zip(&bodies);
-            both.filter(|(_, own)| **own as usize == body)
-        };
+    let mut of_bodies = vec![Vec::new(); count];
+    for (position, body) in positions.iter().zip(&bodies) {
+        of_bodies[*body as usize].push(*position);
+    }
+    let is_scattered = |own: Vec<[f64; 3]>| {
         let mut combinations = 1.0;
         let mut points = 0;
         for d in 0..dimension {
-            let mut along: Vec<f64> = own().map(|(position, _)| position[d]).collect();
+            let mut along: Vec<f64> = own.iter().map(|position| position[d]).collect();
             along.sort_unstable_by(f64::total_cmp);
             points = along.len();
             let (Some(first), Some(last)) = (along.first(), along.last()) else {
@@ -604,7 +608,7 @@ fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Re
         }
         combinations > MOST_COMBINATIONS * (points as f64).powf(1.5)
     };
-    Ok((0..count).map(is_scattered).collect())
+    Ok(of_bodies.into_iter().map(is_scattered).collect())
 }
 
 /// The field to draw: the named one, or else the most wanted one that changes with time.

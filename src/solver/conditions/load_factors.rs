@@ -12,6 +12,8 @@ pub struct LoadFactors {
     present: Vec<f64>,
     /// At the last equilibrium; the present ones in explicit stages.
     at_equilibrium: Vec<f64>,
+    /// A hash of all requests since the start or restart of the run.
+    requests: u64,
 }
 
 impl LoadFactors {
@@ -22,6 +24,7 @@ impl LoadFactors {
             requested: ones.clone(),
             present: ones.clone(),
             at_equilibrium: ones,
+            requests: 0,
         }
     }
 
@@ -33,6 +36,11 @@ impl LoadFactors {
     /// Request a factor for a condition.
     pub fn set(&mut self, condition: usize, factor: f64) {
         self.requested[condition] = factor;
+        for word in [condition as u64, factor.to_bits()] {
+            self.requests = (self.requests ^ word)
+                .wrapping_mul(MULTIPLIER)
+                .rotate_left(29);
+        }
     }
 
     /// The factors of the present loads.
@@ -67,11 +75,9 @@ impl LoadFactors {
         self.settle();
     }
 
-    /// A whole number below 2⁵² that tells different factors apart.
+    /// A whole number below 2⁵² that tells different sequences of requests apart.
     pub fn fingerprint(&self) -> f64 {
-        let words = self.requested.iter().map(|factor| factor.to_bits());
-        let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(MULTIPLIER).rotate_left(29);
-        (words.fold(0, mix) >> 12) as f64
+        (self.requests >> 12) as f64
     }
 
     /// All of it, as a checkpoint holds it; empty where all factors are 1.
@@ -103,6 +109,7 @@ impl LoadFactors {
             requested: next(),
             present: next(),
             at_equilibrium: next(),
+            requests: 0,
         }
     }
 }
@@ -117,7 +124,8 @@ mod tests {
         assert_eq!(factors.words(), [0; 0]);
         factors.set(1, 0.5);
         assert_eq!((factors.get(1), factors.present()), (0.5, &[1.0, 1.0][..]));
-        assert_eq!(LoadFactors::of_words(&factors.words(), 2), factors);
+        let restarted = LoadFactors::of_words(&factors.words(), 2);
+        assert_eq!(restarted.words(), factors.words());
         assert_eq!(factors.words().len(), factors.word_count());
         factors.begin_load_step();
         assert_eq!(factors.present(), [1.0, 0.5]);
@@ -125,5 +133,10 @@ mod tests {
         factors.settle();
         assert_eq!(factors.at_equilibrium(), [1.0, 0.5]);
         assert_ne!(factors.fingerprint(), LoadFactors::new(2).fingerprint());
+        // Ranks that set different factors are told apart, even if the last ones are equal.
+        let mut other = LoadFactors::new(2);
+        other.set(1, 0.25);
+        other.set(1, 0.5);
+        assert_ne!(factors.fingerprint(), other.fingerprint());
     }
 }

@@ -291,7 +291,7 @@ fn nearest(meeting: &Meeting, [first, second]: &[Vec<Candidate>; 2]) -> Option<C
                 order.then(found.ids.cmp(&than.ids)).is_lt()
             };
             let limit = if meeting.pair.were_bonded {
-                PASSED * spacing
+                PASSED * spacing.min(reference)
             } else {
                 spacing.min(NEARER * reference)
             };
