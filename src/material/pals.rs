@@ -123,8 +123,11 @@ fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
     sum
 }
 
-/// Polynomials of degree 2 in the components of n or N, by the coefficients of their monomials.
-type Quadratic = [([usize; 3], f64)];
+/// The exponents and the coefficient of a monomial of degree 2 in the components of n or N.
+type Monomial = ([usize; 3], f64);
+
+/// A polynomial of degree 2 in the components of n or N.
+type Quadratic = [Monomial];
 
 /// The sum of the product of two polynomials over a family, from those of the monomials of degree 4.
 fn product(sums: &[f64], first: &Quadratic, second: &Quadratic) -> f64 {
@@ -163,7 +166,7 @@ fn nearest<const D: usize>(
     sums: &[f64],
     constant: f64,
     one: &Quadratic,
-    conditions: &[(Vec<([usize; 3], f64)>, f64)],
+    conditions: &[(Vec<Monomial>, f64)],
 ) -> Fit<D> {
     let count = conditions.len();
     let matrix = DMatrix::from_fn(count, count, |r, c| {
