@@ -127,7 +127,8 @@ fn sphere_error(n: usize, file: &Path) -> f64 {
             let [time, upper, lower, residual] = row[..] else {
                 unreachable!()
             };
-            assert!(residual <= 1e-4 && (upper + lower).abs() < 1e-3 * upper);
+            // The residual of 1e-4 of all forces lets those of the two plates differ by 0.6 %.
+            assert!(residual <= 1e-4 && (upper + lower).abs() < 1e-2 * upper);
             // E = 1 Pa, ν = 1/4, R = 1 m.
             (upper / (4.0 / 3.0 / (1.0 - 0.0625) * (0.04 * time).powf(1.5)) - 1.0).abs()
         };
