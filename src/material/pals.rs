@@ -176,10 +176,15 @@ fn nearest<const D: usize>(
         let (polynomial, wanted) = &conditions[r];
         wanted - constant * product(sums, polynomial, one)
     });
-    let decomposition = matrix.svd(true, true);
-    let limit = RANK * decomposition.singular_values.max();
-    let multipliers = decomposition.solve(&missing, limit);
-    let multipliers = multipliers.unwrap_or_else(|_| DVector::zeros(count));
+    // The decomposition of numbers that are not finite would not end.
+    let multipliers = if matrix.iter().chain(missing.iter()).all(|x| x.is_finite()) {
+        let decomposition = matrix.svd(true, true);
+        let limit = RANK * decomposition.singular_values.max();
+        decomposition.solve(&missing, limit).ok()
+    } else {
+        None
+    };
+    let multipliers = multipliers.unwrap_or_else(|| DVector::zeros(count));
     let scaled = |polynomial: &Quadratic, factor: f64| -> Vec<_> {
         let each = polynomial.iter();
         each.map(|(exponents, value)| (*exponents, value * factor))

@@ -115,6 +115,10 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let wanted = DVector::from_fn(rows.len(), |r, _| {
         shear_modulus * isotropic(rows[r]) * multiplicity(rows[r]).sqrt()
     });
+    // The decomposition of numbers that are not finite would not end.
+    if matrix.iter().chain(wanted.iter()).any(|x| !x.is_finite()) {
+        return SMatrix::zeros();
+    }
     let decomposition = matrix.svd(true, true);
     let limit = RANK * decomposition.singular_values.max();
     let Ok(solution) = decomposition.solve(&wanted, limit) else {

@@ -131,7 +131,7 @@ fn each_result_has_its_own_times_fields_and_points() {
     let mut plot = fissure(1);
     plot.arg("plot").arg(all.join("result_often.vtkhdf"));
     succeed(plot.args(["--field", "broken_bonds"]));
-    assert!(all.join("often_broken_bonds.png").exists());
+    assert!(all.join("result_often_broken_bonds.png").exists());
 
     // No file is replaced without a word.
     std::fs::remove_file(all.join("result.vtkhdf")).unwrap();
