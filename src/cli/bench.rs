@@ -26,7 +26,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// Its table in the deck.
+    /// Return the material table of the deck.
     fn in_deck(self) -> &'static str {
         match self {
             Self::Pmb => "pmb = { density = 2440, youngs_modulus = 72e9 }",
@@ -40,7 +40,7 @@ impl Law {
         }
     }
 
-    /// A damage law under which no bond breaks.
+    /// Return a damage table with a threshold that no bond reaches.
     fn damage(self) -> &'static str {
         match self {
             Self::Pmb | Self::Lps => "critical_stretch = { critical_stretch = 1e3, alpha = 0 }",
@@ -48,7 +48,7 @@ impl Law {
         }
     }
 
-    /// Passes over the bonds per step.
+    /// Return the number of passes over the bonds per step.
     fn passes(self) -> u64 {
         match self {
             Self::Pmb => 1,
@@ -56,8 +56,8 @@ impl Law {
         }
     }
 
-    /// Floating-point operations of the equations per bond and end, for known ξ and |ξ|; see
-    /// docs/src/developers/performance.md.
+    /// Return the number of floating-point operations per directed bond, for known ξ and |ξ|. With `failure`,
+    /// include the test for failure. See docs/src/developers/performance.md.
     fn operations(self, failure: bool) -> u64 {
         match self {
             Self::Pmb => 23 + u64::from(failure),
@@ -71,7 +71,7 @@ impl Law {
 /// Storage of the bonds.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Family {
-    /// Automatic: one bit per bond, as the block is a lattice.
+    /// Automatic choice: one bit per bond, because the block is a lattice.
     Auto,
     /// One bit per bond.
     Lattice,
@@ -80,7 +80,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// Its name in the deck.
+    /// Return the name in the deck.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -90,30 +90,30 @@ impl Family {
     }
 }
 
-/// The largest share of the points that can touch: cracks must be more than a bond apart.
+/// Largest fraction of the points that can touch other points: cracks must be more than a bond length apart.
 const MOST_TOUCHING: f64 = 0.25;
 
-/// Strain by which the faces of cracks are pressed on each other.
+/// Strain of the block, which presses the faces of the cracks against each other.
 const PRESSED: f64 = -1e-5;
 
-/// Parse the share of the points that touch.
+/// Parse the fraction of the points that touch other points.
 pub fn touching_share(text: &str) -> std::result::Result<f64, String> {
     let share = text.parse().ok();
     let share = share.filter(|share| (0.0..=MOST_TOUCHING).contains(share));
     share.ok_or_else(|| format!("must be a number from 0 to {MOST_TOUCHING}"))
 }
 
-/// Number of cracks through the block, across x, whose faces are the wanted share of its points.
+/// Return the number of cracks across x whose faces contain the requested fraction of the points.
 fn cracks(arguments: &BenchArguments) -> u64 {
     let share = arguments.contact.unwrap_or(0.0);
     (0.5 * share * arguments.points[0] as f64).round() as u64
 }
 
-/// Minimum memory traffic per point and step of the motion in 3-D, bytes: displacement, velocity and
-/// response read and written, block read, displacement written for the bond loops.
+/// Minimum memory traffic of the motion in 3-D per point and step, bytes. Displacement, velocity and response
+/// are read and written, the block is read, and displacement is written once more for the bond loops.
 const MOTION_BYTES: u64 = 170;
-/// Minimum memory traffic per point and pass over the bonds in 3-D, bytes: reference, displacement and
-/// volume read, response read and written.
+/// Minimum memory traffic of a pass over the bonds in 3-D per point, bytes. Reference position, displacement
+/// and volume are read, and response is read and written.
 const PASS_BYTES: u64 = 120;
 
 /// Parse `N` or `X,Y,Z` into the edges of a block, in points.
@@ -131,7 +131,7 @@ pub fn edges(text: &str) -> std::result::Result<[u64; 3], String> {
     }
 }
 
-/// The deck of the problem. Bonds are slightly stretched, because zeros could be faster.
+/// Return the deck of the problem. A small initial displacement avoids zeros, which could be faster.
 fn deck(arguments: &BenchArguments) -> String {
     let law = arguments.law.in_deck();
     let breaking = arguments.law.damage();
@@ -182,7 +182,7 @@ fn warm_up(arguments: &BenchArguments) -> u32 {
     arguments.steps.div_ceil(10)
 }
 
-/// Measure on all ranks and print.
+/// Run the benchmark on all ranks, and print the figures on rank 0.
 pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
     launch::on_all_ranks(|world| {
         let threads = launch::threads(arguments.threads);
@@ -223,7 +223,8 @@ fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<
     let bonds_bytes = total(speed.bond_bytes);
     let halo_bytes = total(sent.bytes) / steps;
     let mean = |time: Duration| total(time.as_nanos() as u64) / 1e9 / world.size() as f64 / steps;
-    // Only the first exchange of a step was repeated; those of further passes send less.
+    // The measurement without overlap repeats the first exchange of a step only. Exchanges of further passes
+    // send less data, so the measured time is scaled by the number of bytes.
     let as_many = halo_bytes * steps / total(alone.bytes).max(1.0);
     let mut phases = vec![
         phase("bonds", times.forces.bonds),

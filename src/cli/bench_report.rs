@@ -41,13 +41,13 @@ pub struct Figures {
     pub instructions: Instructions,
     /// Bonds can break.
     pub failure: bool,
-    /// Share of the points that touch others, if there is contact.
+    /// Fraction of the points that touch other points; `None` without contact.
     pub touching: Option<f64>,
     /// Points along each edge.
     pub edges: [u64; 3],
     /// Number of points.
     pub points: f64,
-    /// Number of neighbours of all points.
+    /// Number of directed bonds: neighbours, summed over all points.
     pub bonds: f64,
     /// Number of ranks.
     pub ranks: usize,
@@ -61,41 +61,41 @@ pub struct Figures {
     pub warm_up: f64,
     /// Set-up time of the slowest rank.
     pub set_up: f64,
-    /// Phases of the loop; the last is the total.
+    /// Phases of the time loop; the last entry is the total.
     pub phases: Vec<Phase>,
-    /// Memory of all ranks; the last is the peak.
+    /// Memory of all ranks at several stages, bytes; the last entry is the peak.
     pub memory: Vec<(&'static str, f64)>,
     /// Bytes sent per step.
     pub halo_bytes: f64,
-    /// Communication time per step that is not overlapped, mean over the ranks, s.
+    /// Communication time per step that does not overlap with computation, mean over the ranks, s.
     pub messages_time: f64,
-    /// Communication time per step without overlap, s.
+    /// Communication time per step if nothing overlaps, mean over the ranks, s.
     pub messages_time_alone: f64,
-    /// Messages per step.
+    /// Number of messages per step.
     pub messages: f64,
-    /// Those of the rank that sends most.
+    /// Number of messages per step of the rank that sends most.
     pub most_messages: f64,
-    /// Ghosts.
+    /// Number of ghosts of all ranks.
     pub ghosts: f64,
-    /// Those of the rank that has most.
+    /// Number of ghosts of the rank that has most.
     pub most_ghosts: f64,
-    /// Limits of the machine, if they were measured.
+    /// Limits of the machine; `None` if the limits were not measured.
     pub limits: Option<Limited>,
 }
 
 impl Figures {
-    /// Time of the loop on the slowest rank, s.
+    /// Return the time of the loop on the slowest rank, s.
     fn seconds(&self) -> f64 {
         self.phases.last().map_or(f64::NAN, |phase| phase.slowest)
     }
 
-    /// Neighbours visited per second.
+    /// Return the number of neighbours visited per second.
     fn updates(&self) -> f64 {
         self.bonds * self.steps / self.seconds()
     }
 
-    /// Fraction of the communication time that overlaps with interior bonds; NaN without messages. Waiting
-    /// for other ranks can make it negative.
+    /// Return the fraction of the communication time that overlaps with interior bonds; NaN without messages.
+    /// The fraction is at least 0, although waiting for other ranks can give a negative number.
     fn hidden(&self) -> f64 {
         if self.messages > 0.0 {
             (1.0 - self.messages_time / self.messages_time_alone).max(0.0)
@@ -104,7 +104,7 @@ impl Figures {
         }
     }
 
-    /// Mean time of contact over that of the bonds, if there is contact.
+    /// Return the mean time of contact divided by that of the bonds; `None` without contact.
     fn contact_over_bonds(&self) -> Option<f64> {
         let mean = |name: &str| {
             let phase = self.phases.iter().find(|phase| phase.name == name)?;
@@ -118,7 +118,7 @@ impl Figures {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Print a table, or one line of JSON.
+    /// Print a table, or one line of JSON if `json`.
     pub fn print(&self, json: bool) {
         if json {
             outln!("{}", self.json())
@@ -215,7 +215,7 @@ impl Figures {
         }
     }
 
-    /// One JSON object; names include the unit.
+    /// Return the figures as one JSON object; the names include the unit.
     fn json(&self) -> String {
         let mut entries = Map::new();
         let mut add =

@@ -16,8 +16,8 @@ use super::check_report as section;
 use super::report::Report;
 use super::{CheckArguments, Verbosity, each, launch, print};
 
-/// Limits of a dry run, which keep it within some seconds and 1 GB: lattice cells, points, and bonds
-/// counted at both ends.
+/// Limits of a dry run, which then takes some seconds and 1 GB: number of lattice cells, of points, and of
+/// directed bonds.
 const MAX_CELLS: f64 = 1e7;
 const MAX_POINTS: f64 = 2e6;
 const MAX_BONDS: f64 = 1.5e8;
@@ -48,7 +48,7 @@ fn report_one(path: &Path, arguments: &CheckArguments, verbosity: Verbosity) -> 
         path,
         deck: &deck,
         ranks: arguments.ranks,
-        // With --quiet, nothing is printed.
+        // Nothing is printed with --quiet, so skip the slow measurements.
         measure: verbosity != Verbosity::Quiet,
         json: arguments.json,
     };
@@ -66,7 +66,7 @@ pub struct Request<'a> {
     pub ranks: u32,
     /// Measure the time per step and the separation energies.
     measure: bool,
-    /// Report as a line of JSON.
+    /// Print the report as one line of JSON.
     json: bool,
 }
 
@@ -74,12 +74,12 @@ pub struct Request<'a> {
 pub struct TimeEstimate {
     /// Stable step, s.
     pub stable_step: f64,
-    /// For each stage: first step (s) and number of steps.
+    /// First time step (s) and number of steps of each stage.
     pub steps: Vec<(f64, f64)>,
     pub cost: Cost,
 }
 
-/// The report on a deck; errors name places in it by spans.
+/// Return the report on a deck. Errors refer to positions in the deck by spans.
 fn report(request: &Request) -> Result<String> {
     let problem = request.deck.problem()?;
     let ranks = request.ranks as usize;
@@ -96,14 +96,14 @@ fn report(request: &Request) -> Result<String> {
     }
 }
 
-/// The interior of each body, where it can be computed.
+/// Compute the interior properties of each body; `None` for a body without such properties.
 fn interiors(problem: &Problem) -> Vec<Option<Interior>> {
     (0..problem.bodies.len())
         .map(|body| interior(problem, body))
         .collect()
 }
 
-/// Report a dry run.
+/// Perform a dry run and return the report.
 fn simulate(problem: &Problem, request: &Request) -> Result<String> {
     let run = dry_run(problem, request.ranks, request.measure)?;
     let (survey, dimension) = (&run.survey, problem.dimension.count());
@@ -143,7 +143,7 @@ fn simulate(problem: &Problem, request: &Request) -> Result<String> {
     Ok(report.text)
 }
 
-/// Report estimates for a run that is too large for a dry run.
+/// Return a report of estimates for a run that is too large for a dry run.
 fn estimate(problem: &Problem, request: &Request, size: &Size) -> Result<String> {
     let interiors = interiors(problem);
     let stable = interiors

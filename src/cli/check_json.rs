@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::check::{Request, TimeEstimate};
 
-/// The figures of a dry run.
+/// Return the figures of a dry run.
 pub fn simulated(
     problem: &Problem,
     request: &Request,
@@ -63,7 +63,7 @@ pub fn simulated(
     Value::Object(report)
 }
 
-/// The figures of a run that is too large for a dry run.
+/// Return the figures of a run that is too large for a dry run.
 pub fn estimated(
     problem: &Problem,
     request: &Request,
@@ -92,7 +92,7 @@ pub fn estimated(
     Value::Object(report)
 }
 
-/// The report on an invalid deck.
+/// Return the report on an invalid deck.
 pub fn invalid(deck: &str, message: &str) -> Value {
     json!({ "deck": deck, "valid": false, "error": message })
 }
@@ -108,7 +108,7 @@ fn heading(problem: &Problem, request: &Request, is_estimate: bool) -> Map<Strin
     }))
 }
 
-/// What the deck says of a body, and properties of its interior.
+/// Return the deck's data on a body, with the interior properties of the body.
 fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map<String, Value> {
     let elastic = body.material.elastic;
     let laws = block_laws(problem, &Block::unrefined(body));
@@ -150,7 +150,7 @@ fn described(problem: &Problem, body: &Body, interior: Option<&Interior>) -> Map
     entry
 }
 
-/// Figures of a body's points.
+/// Return the figures of a body's points.
 fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String, Value> {
     let mut entry = object(json!({
         "points": figures.points,
@@ -166,7 +166,7 @@ fn measured(problem: &Problem, body: &Body, figures: &BodyFigures) -> Map<String
         let range = json!({ "least": least, "median": median, "most": most });
         entry.insert("neighbours".to_owned(), range);
     }
-    // Bonds to other bodies may have damage of their own.
+    // Bonds to other bodies can break by the damage law of their interface.
     let pairs = &problem.interface.pairs;
     let has_own = |pair: &InterfacePair| pair.damage.own().is_some();
     let has_pair = |pair: &InterfacePair| has_own(pair) && pair.bodies.contains(&body.name);
@@ -213,7 +213,7 @@ fn warnings(deck: &Deck, warnings: &[fissure::error::Warning]) -> Value {
     warnings.iter().map(text).collect()
 }
 
-/// The entries of an object.
+/// Return the entries of a JSON object; no entries for any other value.
 fn object(value: Value) -> Map<String, Value> {
     match value {
         Value::Object(entries) => entries,

@@ -19,7 +19,7 @@ use fissure::survey::{BodyFigures, Cost, Interior, Survey};
 use super::format::{bytes, count, duration, si};
 use super::report::Report;
 
-/// Title, dimension and files of the deck.
+/// Append path, title, dimension and horizon of the deck.
 pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.heading(format_args!(
         "{} is a valid deck: {}",
@@ -33,7 +33,7 @@ pub fn heading(report: &mut Report, problem: &Problem, deck: &Path) {
     report.line("horizon", si(problem.horizon, "m"));
 }
 
-/// Warnings of likely mistakes.
+/// Append the warnings, with positions in the deck.
 pub fn warnings(report: &mut Report, deck: &Deck, warnings: &[Warning]) {
     for warning in warnings {
         let warning = deck.locate_warning(warning.clone());
@@ -41,7 +41,7 @@ pub fn warnings(report: &mut Report, deck: &Deck, warnings: &[Warning]) {
     }
 }
 
-/// Material and laws of a body.
+/// Append the material and the laws of a body.
 pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     report.heading(format_args!("body {}", body.name));
     report.line("material", &body.material_name);
@@ -67,7 +67,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("critical energy", format_args!("{:.4e} J/m⁶", law.critical));
                 }
             }
-            // Bonds that soften break by their law.
+            // Without a damage section, this law comes from a softening material, which has no alpha.
             if body.damage.is_some() {
                 report.line("alpha", damage.alpha());
             }
@@ -93,7 +93,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
     }
 }
 
-/// Figures of a body's points.
+/// Append the figures of a body's points.
 pub fn figures(report: &mut Report, body: &Body, figures: &BodyFigures, dimension: usize) {
     report.line("points", count(figures.points));
     let of_shape = figures.shape_volume.map(|volume| {
@@ -124,7 +124,7 @@ fn place(position: &[f64]) -> String {
     format!("[{}] m", entries.join(", "))
 }
 
-/// Properties of the interior of a body, beside the exact values.
+/// Append the computed properties of the interior of a body, with the exact values.
 pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interior>) {
     let Some(interior) = interior else {
         return;
@@ -160,7 +160,7 @@ pub fn interior(report: &mut Report, problem: &Problem, interior: Option<&Interi
     }
 }
 
-/// Separation energy of a body with energy-based damage.
+/// Append the separation energies of a body with energy-based damage.
 pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     let Some(damage) = &problem.bodies[body].damage else {
         return;
@@ -179,10 +179,10 @@ pub fn parting(report: &mut Report, problem: &Problem, body: usize) {
     }
 }
 
-/// The most bodies of which every pair is listed.
+/// Largest number of bodies for which every pair is listed.
 const MOST_PAIRS: usize = 6;
 
-/// The bonds between bodies.
+/// Append the numbers of bonds between bodies, and their damage.
 pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     if problem.bodies.len() < 2 {
         return;
@@ -212,7 +212,7 @@ pub fn joints(report: &mut Report, problem: &Problem, survey: &Survey) {
     }
 }
 
-/// Thresholds of the bonds of a pair with damage of its own, one if both ends have the same.
+/// Format the damage thresholds at both ends of the bonds of a pair; a single number if both are equal.
 fn pair_damage(laws: [DamageLaw; 2]) -> String {
     let [first, second] = laws.map(|law| format!("{:.4e}", law.critical()));
     let values = if first == second {
@@ -226,7 +226,7 @@ fn pair_damage(laws: [DamageLaw; 2]) -> String {
     }
 }
 
-/// Which bodies touch, and by which rule.
+/// Append the contact rules of bodies and pairs of bodies.
 pub fn contact(report: &mut Report, problem: &Problem) {
     let Some(contact) = &problem.contact else {
         return;
@@ -265,7 +265,7 @@ pub fn contact(report: &mut Report, problem: &Problem) {
     }
 }
 
-/// The rigid bodies.
+/// Append the rigid bodies.
 pub fn rigid(report: &mut Report, problem: &Problem) {
     if !problem.rigid.is_empty() {
         report.heading("rigid bodies");
@@ -303,7 +303,7 @@ pub fn rigid(report: &mut Report, problem: &Problem) {
     }
 }
 
-/// Cracks and probes.
+/// Append the cracks and probes.
 pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension: usize) {
     if !problem.cracks.is_empty() {
         report.heading("cracks");
@@ -327,7 +327,7 @@ pub fn places(report: &mut Report, problem: &Problem, survey: &Survey, dimension
     }
 }
 
-/// The sets.
+/// Append the sets with their numbers of points.
 pub fn sets(report: &mut Report, problem: &Problem, survey: &Survey) {
     report.heading("sets");
     for (set, size) in problem.sets.iter().zip(&survey.sets) {
@@ -336,7 +336,7 @@ pub fn sets(report: &mut Report, problem: &Problem, survey: &Survey) {
     }
 }
 
-/// Numbers of points and bonds.
+/// Append the numbers of points and bonds.
 pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     let trigger = problem
         .refinement
@@ -351,7 +351,7 @@ pub fn size(report: &mut Report, problem: &Problem, points: u64, bonds: u64) {
     report.line("bonds", count(bonds));
 }
 
-/// Memory and disk space; `ghosts` is relative to owned points.
+/// Append the memory and disk space. `ghosts` is the number of ghosts divided by that of owned points.
 pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     let memory = bytes(cost.memory_of_a_rank(ranks, ghosts));
     report.line(
@@ -384,14 +384,14 @@ pub fn cost(report: &mut Report, cost: &Cost, ranks: u32, ghosts: f64) {
     );
 }
 
-/// End time and stable step.
+/// Append the end time and the stable step.
 pub fn time(report: &mut Report, problem: &Problem, stable: f64) {
     report.heading("time");
     report.line("end", si(problem.time.end, "s"));
     report.line("stable step", si(stable, "s"));
 }
 
-/// First step and number of steps of each stage.
+/// Append the first step and the number of steps of each stage.
 pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     let stages = problem.all_stages();
     if let ([stage], [(step, steps)]) = (&stages[..], steps) {
@@ -422,7 +422,7 @@ pub fn steps(report: &mut Report, problem: &Problem, steps: &[(f64, f64)]) {
     }
 }
 
-/// The largest step of a stage, if above the first one (s).
+/// Format the largest step (s) of a stage; empty unless the largest step exceeds the first step.
 fn largest_step(time: &Time, first: f64) -> String {
     match time.adaptive.and_then(|rule| rule.largest) {
         Some(largest) if largest > first => format!(" at first, then up to {}", si(largest, "s")),
@@ -437,7 +437,8 @@ fn note_on_steps(time: &Time) -> &'static str {
     }
 }
 
-/// Estimated run time of the steps and of an iteration of a load step, from the measured time per step (s).
+/// Append the estimated run time of the steps, or of one iteration of a load step. `seconds` is the measured
+/// time per step, s.
 pub fn run_time(
     report: &mut Report,
     problem: &Problem,

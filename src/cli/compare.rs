@@ -13,11 +13,11 @@ use super::format::{count, si};
 use super::progress::Progress;
 use super::{Verbosity, outln, print, result_file};
 
-/// Compare two results, such as that of a new version or machine with an earlier one.
+/// Compare two results, for example of two versions or machines.
 ///
-/// Matches outputs and rows of the history by time and points by id. Prints for each field and each
-/// column of the history the largest difference, that difference relative to the largest value of the
-/// field in A, and where it is. Attributes, which describe the run, are not compared.
+/// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
+/// largest difference, the ratio to the largest value in A, and the location. Attributes, which describe the
+/// run, are not compared.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -29,16 +29,16 @@ Examples:
 
 Exit codes: 0 equal within the tolerance, 1 different, 2 the arguments are wrong or a file cannot be read.")]
 pub struct CompareArguments {
-    /// The first result: a .vtkhdf file or its folder.
+    /// First result: a .vtkhdf file or its folder.
     #[arg(value_name = "A")]
     first: PathBuf,
 
-    /// The second result.
+    /// Second result.
     #[arg(value_name = "B")]
     second: PathBuf,
 
-    /// Largest allowed difference relative to the largest value of a field in A, or of one field or
-    /// column with NAME=VALUE; may be repeated [default: 0, equal to the bit].
+    /// Allowed difference, relative to the largest value of a field or column in A. NAME=VALUE applies to one
+    /// field or column. May be repeated [default: 0, equal to the bit].
     #[arg(long, value_name = "[NAME=]VALUE", value_parser = tolerance)]
     tolerance: Vec<(Option<String>, f64)>,
 }
@@ -79,7 +79,7 @@ impl<'a> Tolerances<'a> {
         found.map_or(self.general, |(_, value)| *value)
     }
 
-    /// Reject a name that is neither a field nor a column.
+    /// Check that every named tolerance refers to a field or a column.
     fn check(&self, comparison: &Comparison) -> Result<()> {
         let both = || comparison.fields.iter().chain(&comparison.columns);
         for (name, _) in &self.named {
@@ -98,7 +98,8 @@ impl<'a> Tolerances<'a> {
 /// Compare two results.
 ///
 /// # Errors
-/// Of kind `Run` if the results differ; of kind `Input` if a file cannot be read or a tolerance names no field.
+/// Of kind `Run` if the results differ. Of kind `Input` if a file cannot be read or a tolerance has an
+/// unknown name.
 pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
     let as_input = |error: Error| Error {
         kind: ErrorKind::Input,
@@ -112,7 +113,8 @@ pub fn run(arguments: &CompareArguments, verbosity: Verbosity) -> Result<()> {
     Err(Error::run(message))
 }
 
-/// Compare two results and print the comparison; return the kinds of differences, for a message.
+/// Compare two results and print the comparison. Return the kinds of differences for the error message; empty
+/// if the results agree.
 fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec<String>> {
     let paths = [&arguments.first, &arguments.second].map(|path| result_file(path));
     let [first, second] = [
@@ -167,7 +169,7 @@ fn differences(arguments: &CompareArguments, verbosity: Verbosity) -> Result<Vec
     Ok(reasons)
 }
 
-/// The printed text.
+/// Format the comparison.
 fn report(
     comparison: &Comparison,
     tolerances: &Tolerances,
@@ -205,10 +207,10 @@ fn report(
     text
 }
 
-/// Longest list of names that is printed in full.
+/// Largest number of names that a list shows in full.
 const LONGEST_LIST: usize = 8;
 
-/// A line with what only one of the results has.
+/// Append a line with the names that only one of the results has.
 fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     if !list.is_empty() {
         let shown = list[..list.len().min(LONGEST_LIST)].join(", ");
@@ -220,7 +222,8 @@ fn only(text: &mut String, name: &str, what: &str, list: &[String]) {
     }
 }
 
-/// A table of differences; equal quantities are listed in it or counted below it.
+/// Append a table of differences. With `lists_equal`, the table includes equal quantities; otherwise their
+/// number is appended.
 fn table(
     text: &mut String,
     heading: &str,
@@ -270,7 +273,7 @@ fn table(
     }
 }
 
-/// Component, point and time of a difference.
+/// Format the component, point and time of a difference.
 fn location(difference: &Difference, place: &Place) -> String {
     let component = match difference.components.get(place.component) {
         Some(name) => format!("{name}, "),

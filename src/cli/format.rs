@@ -1,6 +1,6 @@
 //! Formatting of numbers, times and sizes.
 
-/// Values from here on are formatted without prefix.
+/// Values of this size and above are formatted without an SI prefix.
 const TOO_LARGE: f64 = 1e16;
 
 /// Format a value with an SI prefix and its unit, such as `50.0 µs`.
@@ -29,7 +29,7 @@ pub fn si(value: f64, unit: &str) -> String {
     }
 }
 
-/// A number with the format precision as its number of significant digits.
+/// A number that prints with as many significant digits as the format precision.
 struct Digits(f64);
 
 impl std::fmt::Display for Digits {

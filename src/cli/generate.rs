@@ -9,7 +9,7 @@ use fissure::error::Result;
 
 use super::{CommandLine, Verbosity, file_error, outln, print};
 
-/// Print the JSON Schema of decks, with which editors complete keys and mark mistakes.
+/// Print the JSON Schema of decks, with which editors complete keys and mark errors.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -19,7 +19,7 @@ A first line `#:schema ./fissure.schema.json` in a deck makes editors with taplo
 TOML) use it.")]
 pub struct SchemaArguments {}
 
-/// Print the completions of a shell.
+/// Print the completion script of a shell.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -27,7 +27,7 @@ Examples:
   fissure completions zsh > ~/.zfunc/_fissure
   fissure completions fish > ~/.config/fish/completions/fissure.fish")]
 pub struct CompletionsArguments {
-    /// The shell.
+    /// Shell that runs the script.
     shell: Shell,
 }
 
@@ -37,14 +37,14 @@ pub struct CompletionsArguments {
 Example:
   fissure man ~/.local/share/man/man1 && man fissure-run")]
 pub struct ManArguments {
-    /// The folder; it is created if it is missing.
+    /// Folder of the man pages; created if missing.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
 
 /// Print a job script for Slurm.
 ///
-/// Edit the lines between the marks `edit`: partition, account, modules.
+/// Before use, edit the lines between the marks `edit`: partition, account, modules.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -52,7 +52,7 @@ Examples:
   fissure slurm chain > chain.sbatch && sbatch chain.sbatch plate.toml /scratch/plate
   fissure slurm array > array.sbatch && sbatch --array=1-12 array.sbatch plate.toml loads.txt /scratch/loads")]
 pub struct SlurmArguments {
-    /// Which script.
+    /// Script to print.
     script: Script,
 }
 
@@ -61,9 +61,9 @@ pub struct SlurmArguments {
 enum Script {
     /// One run on nodes × ranks × cores per rank.
     Hybrid,
-    /// A run longer than the time limit: requeues itself and continues.
+    /// A run longer than the time limit: the job requeues itself and continues.
     Chain,
-    /// A deck over a table of parameters, one row a task.
+    /// Runs of one deck with a table of parameters, one row per task.
     Array,
 }
 
@@ -75,7 +75,7 @@ pub fn schema() -> Result<()> {
     print(&format!("{:#}\n", deck::schema()))
 }
 
-/// Print the completions of a shell.
+/// Print the completion script of a shell.
 ///
 /// # Errors
 /// If the output cannot be written.
@@ -117,7 +117,7 @@ pub fn slurm(arguments: &SlurmArguments) -> Result<()> {
 }
 
 impl Script {
-    /// The script of slurm/, such that it needs no other file of the repository.
+    /// Return the script of slurm/ with the file `launch` included, so that no other file is needed.
     fn text(self) -> String {
         let (name, script) = match self {
             Self::Hybrid => ("hybrid", include_str!("../../slurm/hybrid.sbatch")),

@@ -13,7 +13,8 @@ use super::{Verbosity, errln, file_error, outln};
 
 /// Translate a deck of Peridigm, PeriLab or LAMMPS.
 ///
-/// Writes a commented deck, and lists what became of each key: taken, approximated or left out, and why.
+/// Writes a commented deck. Lists for each key whether the key was translated, approximated or left out, and
+/// why.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -22,10 +23,10 @@ Examples:
   fissure import in.peri                        writes in.peri.toml
   fissure import model.yaml --from peridigm     skip the detection")]
 pub struct ImportArguments {
-    /// The deck: YAML, XML or an input script.
+    /// Deck to translate: YAML, XML or an input script.
     deck: PathBuf,
 
-    /// The new deck [default: the name of the deck with the ending .toml].
+    /// Path of the new deck [default: the name of the deck with the ending .toml].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 
@@ -33,12 +34,12 @@ pub struct ImportArguments {
     #[arg(long, value_enum, value_name = "CODE")]
     from: Option<From>,
 
-    /// Replace a deck that is already there.
+    /// Replace an existing deck.
     #[arg(long)]
     overwrite: bool,
 }
 
-/// A code whose decks are read.
+/// A code whose decks can be translated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum From {
     /// Peridigm.
@@ -127,7 +128,7 @@ pub fn import(arguments: &ImportArguments, verbosity: Verbosity) -> Result<()> {
     Ok(())
 }
 
-/// The default path of the new deck.
+/// Return the default path of the new deck.
 fn default_target(deck: &Path) -> PathBuf {
     let endings = ["yaml", "yml", "xml", "peridigm"];
     let ending = deck.extension().and_then(|ending| ending.to_str());

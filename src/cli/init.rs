@@ -1,4 +1,4 @@
-//! `fissure init`: commented decks to start from.
+//! `fissure init`: commented example decks.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -10,27 +10,27 @@ use fissure::error::{Error, Result};
 
 use super::{Verbosity, file_error, outln};
 
-/// Write a commented deck to start from.
+/// Write a commented example deck.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   fissure init plate.toml && fissure run plate.toml
   fissure init beam.toml --template three-point-bending")]
 pub struct InitArguments {
-    /// Name of the new deck.
+    /// Path of the new deck; without an ending, .toml is added.
     name: PathBuf,
 
-    /// What it describes.
+    /// Example to write.
     #[arg(long, value_enum, default_value_t = Template::CrackBranching)]
     template: Template,
 }
 
-/// A deck to start from.
+/// An example deck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Template {
     /// Fast fracture: a crack branches in a glass plate under sudden tension.
     CrackBranching,
-    /// The same on a grid that is refined where the crack runs.
+    /// Fast fracture: the same plate on a grid that is refined along the crack.
     RefinedGrid,
     /// Slow loading with fracture: a notched beam is bent until it breaks.
     ThreePointBending,
@@ -40,12 +40,12 @@ enum Template {
     Cantilever,
     /// A solid: a round crack grows in a glass cube.
     PennyCrack,
-    /// A solid that is hit: edge-on impact on a ceramic tile.
+    /// A solid under impact: edge-on impact on a ceramic tile.
     Impact,
 }
 
 impl Template {
-    /// The text of the deck.
+    /// Return the text of the deck.
     fn text(self) -> &'static str {
         match self {
             Self::CrackBranching => deck::EXAMPLE,

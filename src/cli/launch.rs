@@ -11,12 +11,12 @@ use fissure::run::start_mpi;
 
 use super::{errln, finish};
 
-/// Number of threads that is accepted on any host.
+/// Number of threads that is accepted on any host, whatever its number of cores.
 const ALWAYS_ALLOWED_THREADS: usize = 64;
 
-/// Start MPI, run `body` on all ranks and finalise MPI. Errors of `body` must be equal on all ranks.
+/// Start MPI, run `body` on all ranks and finalise MPI. `body` must return the same error on all ranks.
 pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
-    // Read first: MPI may set these variables for a single process.
+    // MPI may set these variables for a single process, so read them before MPI starts.
     let (started, rank) = (started(), rank_from_environment());
     let world = match start_mpi() {
         Ok(world) => world,
@@ -25,19 +25,19 @@ pub fn on_all_ranks(body: impl FnOnce(&World) -> Result<ExitCode>) -> ExitCode {
     if let Err(error) = joined(started, world.size()) {
         let speaks = rank.unwrap_or(0) == 0;
         if !speaks {
-            // The launcher kills all processes as soon as one fails.
+            // The launcher kills all processes when one fails. Wait until rank 0 has printed the error.
             std::thread::sleep(EXIT_DELAY);
         }
         return finish(Err(error), speaks);
     }
     let speaks = world.rank() == 0;
-    // A panic on one rank would make the others hang; its message has been printed.
+    // A panic on one rank would make the other ranks hang, so abort all. The panic message has been printed.
     catch_unwind(AssertUnwindSafe(|| body(&world)))
         .unwrap_or_else(|_| world.abort(1))
         .unwrap_or_else(|error| finish(Err(error), speaks))
 }
 
-/// Delay of the other processes, so that the first one can print an error.
+/// Delay before the other processes exit, so that rank 0 can print an error.
 const EXIT_DELAY: Duration = Duration::from_secs(1);
 
 /// Environment variables with the number of launched processes, innermost launcher first.
@@ -49,14 +49,14 @@ const SIZES: [&str; 5] = [
     "SLURM_STEP_NUM_TASKS",
 ];
 
-/// The number of launched processes and its variable; `None` without a launcher.
+/// Return the variable with the number of launched processes, and that number; `None` without a launcher.
 fn started() -> Option<(&'static str, usize)> {
     SIZES
         .iter()
         .find_map(|name| Some((*name, number(&[name])?)))
 }
 
-/// Reject a launcher of another MPI, whose processes would run independently.
+/// Check that launcher and MPI library match. Otherwise, the processes would run independently.
 ///
 /// # Errors
 /// If MPI has one rank but the launcher started several processes.
@@ -76,14 +76,14 @@ fn joined(started: Option<(&str, usize)>, ranks: usize) -> Result<()> {
     }
 }
 
-/// The value of the first of some environment variables that is a number.
+/// Return the first number among the values of some environment variables.
 fn number(names: &[&str]) -> Option<usize> {
     names
         .iter()
         .find_map(|name| std::env::var(name).ok()?.parse().ok())
 }
 
-/// The rank of this process, from the launcher's environment; `None` without a launcher.
+/// Return the rank of this process, from the launcher's environment; `None` without a launcher.
 pub fn rank_from_environment() -> Option<usize> {
     number(&[
         "OMPI_COMM_WORLD_RANK",
@@ -93,7 +93,7 @@ pub fn rank_from_environment() -> Option<usize> {
     ])
 }
 
-/// Number of ranks on this host, from the launcher's environment.
+/// Return the number of ranks on this host, from the launcher's environment.
 pub fn ranks_on_host() -> usize {
     number(&[
         "OMPI_COMM_WORLD_LOCAL_SIZE",
@@ -104,13 +104,13 @@ pub fn ranks_on_host() -> usize {
     .max(1)
 }
 
-/// Number of cores available to this process.
+/// Return the number of cores available to this process.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Number of threads: as requested, else Slurm's cores per task, else an even share of the available
-/// cores.
+/// Return the number of threads: as requested, else Slurm's cores per task, else an even share of the
+/// available cores.
 pub fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
@@ -122,18 +122,18 @@ pub fn threads(asked: Option<u16>) -> usize {
         .unwrap_or_else(share)
 }
 
-/// The launcher has bound this process to a part of the host's cores.
+/// Test whether the launcher has bound this process to a part of the host's cores.
 fn is_bound() -> bool {
     cores() < cores_of_host()
 }
 
-/// Number of cores of this host.
+/// Return the number of cores of this host.
 fn cores_of_host() -> usize {
     let list = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
     cores_in(&list).max(cores())
 }
 
-/// Number of cores in a Linux CPU list such as `0-3,8`.
+/// Return the number of cores in a Linux CPU list such as `0-3,8`.
 pub fn cores_in(list: &str) -> usize {
     let range = |range: &str| match range.split_once('-') {
         Some((first, last)) => match (first.parse::<usize>(), last.parse::<usize>()) {
@@ -172,7 +172,7 @@ fn warning(threads: usize) -> Option<String> {
 /// Start the threads of this rank.
 ///
 /// # Errors
-/// If there are far more threads than cores, or the system refuses.
+/// If there are far more threads than cores, or the system cannot start the threads.
 pub fn start_threads(threads: usize) -> Result<()> {
     let most = ALWAYS_ALLOWED_THREADS.max(4 * cores_of_host());
     if threads > most {
@@ -181,7 +181,7 @@ pub fn start_threads(threads: usize) -> Result<()> {
             cores_of_host()
         )));
     }
-    // This thread is one of the pool: handing work to another thread would add some microseconds.
+    // This thread joins the pool, because handing work to another thread takes some microseconds.
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .use_current_thread()

@@ -1,6 +1,6 @@
 //! Limits of this machine: memory bandwidth and floating-point rate of all threads of all ranks at once.
 //!
-//! Each figure is the best of several repetitions, because other processes can only slow one down.
+//! Each figure is the best of several repetitions, because other processes can only slow a repetition down.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -29,11 +29,11 @@ pub fn measure(comm: &dyn Communicator, threads: usize) -> Limits {
 /// Repetitions of each measurement.
 const REPETITIONS: usize = 10;
 
-/// Time of `work` on the slowest rank, with all threads of all ranks at once, s; the best of several
-/// repetitions.
+/// Return the time of `work` on the slowest rank, s, with all threads of all ranks at once: the best of
+/// several repetitions.
 fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     let once = |_| {
-        // A barrier.
+        // The sum acts as a barrier.
         comm.sum(&mut [0]);
         let start = Instant::now();
         rayon::broadcast(|_| work());
@@ -44,7 +44,7 @@ fn seconds(comm: &dyn Communicator, work: impl Fn() + Sync) -> f64 {
     (0..REPETITIONS).map(once).fold(f64::INFINITY, f64::min)
 }
 
-/// Size of the arrays over that of the last-level cache.
+/// Size of the arrays divided by that of the last-level cache.
 const CACHES: usize = 4;
 
 fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
@@ -70,7 +70,7 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
     24.0 * length as f64 * rayon::current_num_threads() as f64 / seconds
 }
 
-/// Last-level cache per thread, bytes.
+/// Return the size of the last-level cache per thread, bytes.
 fn share_of_cache(threads: usize) -> usize {
     let read = |name: &str| {
         let path = format!("/sys/devices/system/cpu/cpu0/cache/index3/{name}");
@@ -84,7 +84,7 @@ fn share_of_cache(threads: usize) -> usize {
     kibibytes.unwrap_or(1 << 16) * 1024 / busy.min(sharing).max(1)
 }
 
-/// a = b + s c.
+/// Compute a = b + s c.
 fn triad(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
     #[cfg(target_arch = "x86_64")]
     {
@@ -93,7 +93,7 @@ fn triad(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
             return unsafe { triad_avx512(a, b, c, s) };
         }
         if is_x86_feature_detected!("avx2") {
-            // SAFETY: as above.
+            // SAFETY: the instruction set is available.
             return unsafe { triad_avx2(a, b, c, s) };
         }
     }
@@ -119,11 +119,11 @@ fn triad_any(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {
     }
 }
 
-/// Number of independent sums: above the latency of a multiply-add (4 or 5 cycles) × throughput (2 per
-/// cycle).
+/// Number of independent sums. More than latency (4 or 5 cycles) × throughput (2 per cycle) of multiply-adds,
+/// so that no multiply-add waits for another.
 const SUMS: usize = 12;
 
-/// Multiply-adds per sum and repetition, which take some 30 ms.
+/// Multiply-adds per sum and repetition; a repetition takes some 30 ms.
 const LENGTH: u32 = 8_000_000;
 
 fn arithmetic(comm: &dyn Communicator) -> f64 {
@@ -133,12 +133,12 @@ fn arithmetic(comm: &dyn Communicator) -> f64 {
     operations * rayon::current_num_threads() as f64 / seconds
 }
 
-/// A function with [`LENGTH`] × [`SUMS`] multiply-adds in the widest vectors, and their width.
+/// Return a function with [`LENGTH`] × [`SUMS`] multiply-adds in the widest vectors, and the vector width.
 fn multiply_adds() -> (fn(f64, f64), usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        /// A version for one instruction set.
+        /// Function for one instruction set.
         macro_rules! version {
             ($feature:literal, $splat:ident, $multiply_add:ident) => {{
                 #[target_feature(enable = $feature)]
@@ -152,7 +152,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
                     }
                     black_box(sums);
                 }
-                // SAFETY: returned only if the instruction set is available.
+                // SAFETY: the closure is returned only if the instruction set is available.
                 |factor, term| unsafe { work(factor, term) }
             }};
         }
@@ -166,7 +166,7 @@ fn multiply_adds() -> (fn(f64, f64), usize) {
     (multiply_adds_any, 2)
 }
 
-/// Separate multiplications and additions, for instruction sets without fused ones.
+/// Perform multiplications and additions, for instruction sets without fused multiply-adds.
 fn multiply_adds_any(factor: f64, term: f64) {
     let mut sums = [[term; 2]; SUMS];
     for _ in 0..LENGTH {

@@ -23,7 +23,7 @@ mod sweep;
 mod version;
 mod wall_time;
 
-/// Print a line; write errors, such as a closed pipe, are ignored so that they do not end a run.
+/// Print a line to standard output. Ignore write errors, so that a closed pipe does not end a run.
 macro_rules! outln {
     ($($words:tt)*) => {{
         use std::io::Write as _;
@@ -32,7 +32,7 @@ macro_rules! outln {
 }
 pub(crate) use outln;
 
-/// As [`outln`], for warnings and errors.
+/// Print a line to standard error, otherwise like [`outln`].
 macro_rules! errln {
     ($($words:tt)*) => {{
         use std::io::Write as _;
@@ -53,8 +53,8 @@ use fissure::error::{Error, Result};
 
 /// Peridynamics for batch jobs: cracks that start, run and branch by themselves.
 ///
-/// A run is described by a deck, a TOML file. Results are equal to the bit on any number of MPI
-/// ranks and threads.
+/// A deck, which is a TOML file, describes a run. Results are equal to the bit on any number of MPI ranks and
+/// threads.
 #[derive(Parser)]
 #[command(version, propagate_version = true, arg_required_else_help = true)]
 #[command(after_help = "\
@@ -78,11 +78,11 @@ struct CommandLine {
     #[command(subcommand)]
     command: Command,
 
-    /// Print nothing but errors.
+    /// Print errors only.
     #[arg(short, long, global = true)]
     quiet: bool,
 
-    /// Print more.
+    /// Print more: partition, storage of bonds, vector instructions, time step.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     verbose: bool,
 }
@@ -107,8 +107,8 @@ enum Command {
 
 /// Run a deck, alone or under mpirun.
 ///
-/// Writes result.vtkhdf (opens in ParaView 5.12 and later), result.xdmf (for older ParaView) and
-/// history.csv into the output folder, and crack_NAME.csv for each crack whose path the deck asks for.
+/// Writes result.vtkhdf (for ParaView 5.12 and later), result.xdmf (for older ParaView) and history.csv to
+/// the output folder. Also writes crack_NAME.csv for each crack whose path the deck requests.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -129,18 +129,18 @@ FISSURE_INSTRUCTIONS (avx2, avx512) limits it.
 SIGTERM, SIGINT or SIGUSR1 to any rank: all finish the step, write a checkpoint and leave with exit
 code 75; a second signal ends the rank at once. SIGUSR2: write a checkpoint and go on.")]
 struct RunArguments {
-    /// The deck.
+    /// Deck to run.
     deck: PathBuf,
 
-    /// Folder for the result [default: out/ and the deck's name].
+    /// Folder of the result [default: out/ and the deck's name].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 
-    /// Threads of each rank [default: the cores of the rank].
+    /// Threads of each rank [default: number of cores of the rank].
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Replace a result that is already there.
+    /// Replace an existing result.
     #[arg(long)]
     overwrite: bool,
 
@@ -148,20 +148,20 @@ struct RunArguments {
     #[arg(long, conflicts_with = "overwrite")]
     restart: bool,
 
-    /// Write a checkpoint and stop in time before this limit [default: the end of the Slurm job].
+    /// Write a checkpoint and stop before this limit [default: the end of the Slurm job].
     #[arg(long, value_name = "HH:MM[:SS]", value_parser = wall_time::wall_time)]
     wall_time: Option<Duration>,
 
-    /// Put the keys of another deck over those of this one; may be repeated.
+    /// Override keys of the deck with those of another deck; may be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
+    /// Override a parameter or any key of the deck; give a key with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
 
-/// Split `NAME=VALUE`.
+/// Split `NAME=VALUE` at the first `=`, and trim both parts.
 fn assignment(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
@@ -173,10 +173,10 @@ fn assignment(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
-/// Validate a deck and show what it would do, without running it.
+/// Validate decks and print their figures, without running them.
 ///
-/// Makes the points and finds the bonds on this machine; where these are too many, it estimates their
-/// numbers instead.
+/// Creates the points and finds the bonds on this machine. If a deck is too large for that, the numbers of
+/// points and bonds are estimated.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -185,15 +185,15 @@ Examples:
   fissure check -q *.toml                       whether decks are right
   fissure check --json plate.toml | jq .points  figures for scripts")]
 struct CheckArguments {
-    /// One or more decks; all are checked.
+    /// Decks to check.
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Put the keys of another deck over those of this one; may be repeated.
+    /// Override keys of the decks with those of another deck; may be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
+    /// Override a parameter or any key of the decks; give a key with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 
@@ -201,36 +201,36 @@ struct CheckArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     ranks: u32,
 
-    /// Print the figures in SI units as JSON, one line a deck; for an invalid deck, its error.
+    /// Print the figures in SI units as JSON, one line per deck; for an invalid deck, print its error.
     #[arg(long)]
     json: bool,
 }
 
-/// Print a deck with every default filled in.
+/// Print decks with every default filled in.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
   fissure explain plate.toml > plate_in_full.toml")]
 struct DeckArguments {
-    /// The deck, or several.
+    /// Decks to print.
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
 
-    /// Put the keys of another deck over those of this one; may be repeated.
+    /// Override keys of the decks with those of another deck; may be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Override a parameter of the deck, or any key, named with its section; may be repeated.
+    /// Override a parameter or any key of the decks; give a key with its section; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
 }
 
 /// Measure the speed of the time loop on a fixed problem, alone or under mpirun.
 ///
-/// A cubic lattice with 122 neighbours within the horizon, a fixed step, no output. Prints the bond
-/// updates per second and core, the time by phase, the memory of the whole process, the halo, and
-/// which part of what the machine can do that is: its bandwidth and its rate of arithmetic are
-/// measured on the same threads. docs/src/developers/performance.md explains the figures.
+/// The problem is a cubic lattice with 122 neighbours within the horizon, a fixed time step and no output.
+/// Prints the bond updates per second and core, the time by phase, the memory of the whole process and the
+/// halo. Measures the memory bandwidth and the arithmetic rate of the same threads, and prints the fraction
+/// of each that the time loop reaches. docs/src/developers/performance.md explains the figures.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -242,7 +242,7 @@ Examples:
 
 FISSURE_INSTRUCTIONS=avx2 limits the vector instructions of the loops.")]
 struct BenchArguments {
-    /// The law of the bonds.
+    /// Material law.
     #[arg(long, value_enum, default_value_t = bench::Law::Pmb)]
     law: bench::Law,
 
@@ -250,28 +250,28 @@ struct BenchArguments {
     #[arg(long, value_enum, default_value_t = bench::Family::Auto)]
     family: bench::Family,
 
-    /// Bonds cannot break; otherwise each is tested in every step, and none breaks.
+    /// Omit damage. Without this option, each bond is tested for failure in every step, but none breaks.
     #[arg(long)]
     no_failure: bool,
 
-    /// Contact between points that no bond joins. This share of the points, 0 to 0.25, touches others, at the faces of
-    /// closed cracks.
+    /// Add contact. SHARE, from 0 to 0.25, is the fraction of the points that touch other points, on the
+    /// faces of closed cracks.
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Points of a cube (the nearest one is taken), or the edges of a block: X,Y,Z.
+    /// Number of points of a cube, rounded to the nearest cube, or edges X,Y,Z of a block in points.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 
-    /// Measured time steps, after 10 % warm-up steps.
+    /// Number of measured time steps, after 10 % warm-up steps.
     #[arg(short, long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
 
-    /// Threads of each rank [default: the cores of the rank].
+    /// Threads of each rank [default: number of cores of the rank].
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Skip the measurement of the machine's limits, which takes some 100 MiB and seconds.
+    /// Skip the measurement of the machine's limits, which needs some 100 MiB and several seconds.
     #[arg(long)]
     no_limits: bool,
 
@@ -301,11 +301,11 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            // Under a launcher, a rank that exits early makes it kill rank 0 before rank 0 prints the
-            // error; inside MPI, all ranks exit together.
+            // A launcher kills all ranks when one rank exits with an error, perhaps before rank 0 has printed
+            // the message. With MPI running, all ranks exit together.
             let _together = (error.exit_code() != 0 && rank.is_some()).then(World::start);
             if speaks {
-                // A closed output is ignored.
+                // Ignore write errors, such as a closed pipe.
                 let _ = error.print();
             }
             return ExitCode::from(error.exit_code() as u8);
@@ -337,10 +337,10 @@ pub fn main() -> ExitCode {
     finish(outcome, true)
 }
 
-/// Run `work` on all decks, also after an error. All errors but the last are printed.
+/// Run `work` on all decks, even after an error. Print all errors except the last one, which is returned.
 ///
 /// # Errors
-/// The last error.
+/// Returns the last error of `work`.
 fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<()> {
     let mut latest = Ok(());
     for deck in decks {
@@ -354,7 +354,7 @@ fn each(decks: &[PathBuf], mut work: impl FnMut(&Path) -> Result<()>) -> Result<
     latest
 }
 
-/// Print the output of a command; a closed pipe is not an error.
+/// Print text to standard output; a closed pipe is not an error.
 ///
 /// # Errors
 /// If the output cannot be written.
@@ -372,7 +372,7 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// The exit code of an outcome; an error is printed if `prints`.
+/// Return the exit code of an outcome. Print an error of the outcome if `prints`.
 fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -386,7 +386,7 @@ fn finish(outcome: Result<()>, prints: bool) -> ExitCode {
     }
 }
 
-/// The result file that a path names: the file itself, or `result.vtkhdf` in a folder.
+/// Return the path of a result file: `path` itself, or `result.vtkhdf` inside if `path` is a folder.
 fn result_file(path: &Path) -> PathBuf {
     if path.is_dir() {
         path.join("result.vtkhdf")
@@ -395,7 +395,7 @@ fn result_file(path: &Path) -> PathBuf {
     }
 }
 
-/// The error of a file that the command reads or writes.
+/// Return the error of a failed file operation. `doing` is the operation, such as `read`.
 fn file_error(path: &std::path::Path, doing: &str, error: &std::io::Error) -> Error {
     Error::run(format!("cannot {doing} {}: {error}", path.display()))
 }

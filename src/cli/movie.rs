@@ -15,7 +15,7 @@ use super::{Verbosity, file_error, outln, result_file};
 
 /// Draw a field over time as an animated PNG, which browsers and slides play.
 ///
-/// Axes, size and range of the colours are the same in all frames.
+/// All frames have the same axes, size and range of colours.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -25,7 +25,7 @@ Examples:
   fissure movie out/plate --frames frames                   for ffmpeg:
   ffmpeg -framerate 10 -i frames/frame_%04d.png -pix_fmt yuv420p plate.mp4")]
 pub struct MovieArguments {
-    /// The result, a .vtkhdf file or its folder.
+    /// Result: a .vtkhdf file or its folder.
     result: PathBuf,
 
     #[command(flatten)]
@@ -39,19 +39,20 @@ pub struct MovieArguments {
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     rate: u16,
 
-    /// Where to draw to, .png or .apng [default: the names of field and component and `_movie.png`, beside the result].
+    /// Path of the film, .png or .apng [default: beside the result, named after field and component with
+    /// `_movie.png`].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 
-    /// Write the frames as PNG files frame_0000.png, … into a new or empty folder instead.
+    /// Write the frames as PNG files frame_0000.png, … to a new or empty folder, instead of a film.
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     frames: Option<PathBuf>,
 }
 
-/// Draw a film.
+/// Draw the film of a result.
 ///
 /// # Errors
-/// If the file is not a result, what is to be drawn is not in it, or a file cannot be written.
+/// If the file is not a result, the field or component is missing, or a file cannot be written.
 pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     let file = result_file(&arguments.result);
     let result = ResultReader::open(&file)?;
@@ -70,7 +71,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     if let Some(folder) = &arguments.frames {
         create_folder(folder)?;
     }
-    // Each output is read twice: for the range of all, and for its frame.
+    // Each output is read twice: first for the range of colours of all frames, then to draw a frame.
     let count = chosen.len() as u64;
     let mut progress = Progress::new(verbosity > Verbosity::Quiet, "frame", 0, 2 * count);
     let mut frame: Option<Frame> = None;
@@ -130,7 +131,7 @@ pub fn movie(arguments: &MovieArguments, verbosity: Verbosity) -> Result<()> {
     Ok(())
 }
 
-/// Create the folder of the frames, or take an empty one.
+/// Create the folder of the frames; an existing folder must be empty.
 fn create_folder(folder: &Path) -> Result<()> {
     let created = std::fs::create_dir_all(folder).and_then(|()| std::fs::read_dir(folder));
     let mut entries = created.map_err(|error| file_error(folder, "create", &error))?;
@@ -143,7 +144,7 @@ fn create_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Times in the same unit with the same decimals in all frames.
+/// Format of times: one unit and one number of decimals for all frames.
 struct Clock {
     factor: f64,
     unit: &'static str,

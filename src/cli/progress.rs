@@ -8,11 +8,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::format::si;
 
-/// Time of the first line, s.
+/// Time from the start to the first line, s.
 const FIRST_LINE: f64 = 5.0;
 /// Minimum interval between lines, s.
 const MINUTE: f64 = 60.0;
-/// Minimum interval relative to the elapsed time; a day has some sixty lines.
+/// Minimum interval between lines, as a fraction of the elapsed time. A run of a day prints some sixty lines.
 const RELATIVE_INTERVAL: f64 = 0.1;
 
 /// Width of the bar in characters.
@@ -26,7 +26,7 @@ pub enum Progress {
     Bar(ProgressBar),
     /// Periodic lines.
     Lines {
-        /// What is counted, such as `step`.
+        /// Name of a step in the output, such as `step`.
         noun: &'static str,
         /// Start of the display.
         start: Instant,
@@ -34,13 +34,14 @@ pub enum Progress {
         first: u64,
         /// Number of the last step.
         last: u64,
-        /// Time of the next line, s.
+        /// Time from the start to the next line, s.
         due: f64,
     },
 }
 
 impl Progress {
-    /// A display for work from step `first` to step `last`, called `noun`.
+    /// Create a display for work from step `first` to step `last`. `noun` is the name of a step in the
+    /// output.
     pub fn new(shown: bool, noun: &'static str, first: u64, last: u64) -> Self {
         if !shown {
             return Self::Silent;
@@ -65,7 +66,8 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Update after a step that ends at `time` (s); `steps` is the current estimate of their number.
+    /// Update the display after a step that ends at `time` (s). `steps` is the current estimate of the last
+    /// step.
     pub fn update(&mut self, step: u64, steps: u64, time: f64) {
         match self {
             Self::Silent => {}
@@ -108,7 +110,7 @@ impl Progress {
         }
     }
 
-    /// End the display; `complete` at the end of the run.
+    /// End the display. `complete` is true at the end of the run.
     pub fn finish(&self, complete: bool) {
         match self {
             Self::Bar(bar) if complete => bar.finish(),
@@ -118,7 +120,7 @@ impl Progress {
     }
 }
 
-/// Time of the next line after one at `elapsed`, s.
+/// Return the time from the start to the next line, s, after a line at `elapsed`.
 fn next_line(elapsed: f64) -> f64 {
     if elapsed < MINUTE {
         MINUTE

@@ -5,7 +5,7 @@ use std::fmt::{Display, Write};
 /// The text of a report.
 #[derive(Default)]
 pub struct Report {
-    /// The lines.
+    /// Lines of the report.
     pub text: String,
 }
 

@@ -23,7 +23,7 @@ const STOPPED: u8 = 75;
 /// Run a deck on all ranks and finalise MPI.
 pub fn run(arguments: &RunArguments, verbosity: Verbosity) -> ExitCode {
     let started = Instant::now();
-    // Before MPI, whose start takes a while; until then, a signal ends the process.
+    // MPI takes a while to start, so install the signal handlers first. An earlier signal ends the process.
     let signals = Signals::listen();
     launch::on_all_ranks(|world| {
         let signals = agree(world, signals)?;
@@ -55,7 +55,7 @@ fn run_deck(
     let stem = arguments.deck.file_stem().unwrap_or_default();
     let folder = arguments.output.clone();
     let hosts = world.hosts();
-    // Paths need not be UTF-8; attributes of the result are.
+    // Paths may have any bytes, but attributes of the result must be UTF-8.
     let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let command_line: Vec<String> = words.collect();
     let options = Options {
@@ -103,12 +103,12 @@ fn run_deck(
     Ok(outcome)
 }
 
-/// Prints the messages and the progress of a run.
+/// Observer that prints the messages and the progress of a run.
 struct Log {
     rank: usize,
-    /// This rank prints more than errors and warnings.
+    /// This rank prints messages and progress, not only errors and warnings.
     prints: bool,
-    /// This rank prints verbose messages too.
+    /// This rank also prints verbose messages.
     verbose: bool,
     title: String,
     /// Names of the bodies.

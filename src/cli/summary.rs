@@ -5,7 +5,7 @@ use fissure::run::{Outcome, Phases, Summary};
 
 use super::format::{count, si};
 
-/// Print the figures of a run with at least one step; for rank 0.
+/// Print the figures of a run with at least one step. For rank 0.
 pub fn print(outcome: &Outcome, threads: usize) {
     let summary = &outcome.summary;
     let (energies, broken) = match &outcome.last_row {
@@ -29,7 +29,7 @@ pub fn print(outcome: &Outcome, threads: usize) {
     line("ranks × threads", format!("{} × {threads}", summary.ranks));
     line("instructions", summary.instructions.to_owned());
     line("checkpoints", count(summary.checkpoints));
-    // With refinement, the number is that of the last points only.
+    // With refinement, the number of bonds is known for the last points only, so the rate is omitted.
     let regrids = summary.seconds.regridding > 0.0;
     if !regrids {
         line("bond updates", si(bond_updates(summary), "/s"));
@@ -63,11 +63,11 @@ pub fn print(outcome: &Outcome, threads: usize) {
     );
 }
 
-/// The phases that are omitted if 0.
+/// Phases that are omitted if their time is 0.
 const CONTACT: &str = "contact";
 const REGRIDDING: &str = "other points";
 
-/// Names and times (s) of the phases.
+/// Return the names and times (s) of the phases.
 fn phases(seconds: &Phases) -> [(&'static str, f64); 10] {
     [
         ("set-up", seconds.set_up),
@@ -83,7 +83,7 @@ fn phases(seconds: &Phases) -> [(&'static str, f64); 10] {
     ]
 }
 
-/// Bond updates per second of the time loop, counted at both ends.
+/// Return the directed bond updates per second of the time loop.
 fn bond_updates(summary: &Summary) -> f64 {
     let seconds = &summary.seconds;
     let time_loop = seconds.bonds + seconds.halo + seconds.contact + seconds.motion;

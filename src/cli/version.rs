@@ -5,7 +5,7 @@ use fissure::comm::mpi;
 use fissure::lanes::instructions::{BUILT, Instructions};
 use fissure::output;
 
-/// Print version, libraries and instruction sets.
+/// Print the versions of program and libraries, and the instruction sets.
 pub fn print() {
     let best = Instructions::of_this_machine();
     let all = BUILT.join(", ");

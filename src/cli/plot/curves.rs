@@ -13,10 +13,10 @@ use crate::cli::{Verbosity, file_error, outln};
 /// The default of `--x`.
 const TIME: &str = "time";
 
-/// Most columns in the default name of a picture.
+/// Largest number of columns in the default name of a picture.
 const MOST_NAMED: usize = 3;
 
-/// The columns of a file.
+/// The columns of a history.
 struct Table {
     path: PathBuf,
     columns: Vec<StoredColumn>,
@@ -25,7 +25,7 @@ struct Table {
 /// Draw columns of one or more histories as curves.
 ///
 /// # Errors
-/// If a file has no such column or cannot be read or written.
+/// If a file lacks a column, cannot be read or cannot be written.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let first = &arguments.results[0];
     let tables: Vec<Table> = arguments
@@ -132,7 +132,7 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
 }
 
 impl Table {
-    /// Read a CSV file, or the history of a result or of the result in a folder.
+    /// Read a CSV file, the history of a result file, or `history.csv` in a folder.
     fn read(path: &Path) -> Result<Self> {
         let path = if path.is_dir() {
             path.join("history.csv")
@@ -175,10 +175,10 @@ impl Table {
     }
 }
 
-/// Read a CSV file whose first row has names like `time [s]`.
+/// Read a CSV file whose first row has names such as `time [s]`.
 ///
 /// # Errors
-/// If it cannot be read, or a row has other than one number a column.
+/// If the file cannot be read, or a row does not have one number per column.
 pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| Error::input(format!("cannot read {}: {error}", path.display())))?;
@@ -213,7 +213,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<StoredColumn>> {
     Ok(columns)
 }
 
-/// Short names of runs that tell them apart: those of the folders, with as many parents as needed.
+/// Return short, distinct names of runs: the folder of each history, with as many parent folders as needed.
 fn run_names(tables: &[Table]) -> Vec<String> {
     let parts = |table: &Table| -> Vec<String> {
         let absolute = std::path::absolute(&table.path).unwrap_or_else(|_| table.path.clone());
@@ -240,7 +240,7 @@ fn run_names(tables: &[Table]) -> Vec<String> {
         sorted.len() == names.len()
     };
     let found = (1..=deepest).map(names).find(distinct);
-    // Several files in one folder differ in their own names.
+    // Files in one folder are named by their file names instead.
     found.unwrap_or_else(|| {
         let name = |table: &Table| {
             let stem = table.path.file_stem().unwrap_or_default();

@@ -15,8 +15,8 @@ use picture::PictureArguments;
 
 /// Draw a field of a result, or curves of a history.
 ///
-/// Plane problems are drawn as they are, solids in an oblique view or as a slice. With `--y`, or of CSV
-/// files, columns are drawn as curves.
+/// Plane problems are drawn in their plane, solids in an oblique view or as a slice. With `--y`, or if a
+/// RESULT is a CSV file, columns are drawn as curves.
 #[derive(Args)]
 #[command(after_help = "\
 Examples, fields:
@@ -31,14 +31,14 @@ Examples, curves:
   fissure plot out/plate/history.csv --y kinetic_energy,strain_energy -o energies.svg
   fissure plot out/a out/b out/c --x probe_u_y --y reaction_top_y")]
 pub struct PlotArguments {
-    /// The result, a .vtkhdf file or its folder; for curves one or more of them or of CSV files.
+    /// Result: a .vtkhdf file or its folder. For curves, one or more results or CSV files.
     #[arg(required = true, value_name = "RESULT")]
     results: Vec<PathBuf>,
 
     #[command(flatten)]
     picture: PictureArguments,
 
-    /// Time in s (the nearest output is taken), `last` or `all`.
+    /// Time of the output in s (the nearest output is drawn), `last` or `all`.
     #[arg(
         short,
         long,
@@ -57,8 +57,8 @@ pub struct PlotArguments {
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
 
-    /// Where to draw to: .png, or .svg for curves [default: beside the result, named
-    /// after the field and component, or the columns].
+    /// Path of the picture: .png, or .svg for curves [default: beside the result, named after the field and
+    /// component, or the columns].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -66,7 +66,7 @@ pub struct PlotArguments {
 /// Draw pictures of a field, or curves.
 ///
 /// # Errors
-/// If a file is not a result, or what is to be drawn is not in it.
+/// If a file is not a result, or the field, component or column is missing.
 pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     let is_table = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "csv");
     let curves = !arguments.y.is_empty() || arguments.results.iter().any(is_table);
@@ -87,10 +87,10 @@ pub fn plot(arguments: &PlotArguments, verbosity: Verbosity) -> Result<()> {
     }
 }
 
-/// Check the ending of an output file.
+/// Check the ending of the name of an output file.
 ///
 /// # Errors
-/// If it is none of the known ones.
+/// If the ending is not in `known`.
 pub fn check_ending(path: &Path, known: &[&str], hint: &str) -> Result<()> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     if known.iter().any(|known| ending.eq_ignore_ascii_case(known)) {

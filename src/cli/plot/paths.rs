@@ -1,4 +1,4 @@
-//! The lines that `fissure plot` draws over a picture, from CSV files.
+//! Lines that `fissure plot` draws over a picture, read from CSV files.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ pub type Line = Vec<[f64; 2]>;
 
 /// Read lines from a CSV file with columns `x` and `y` (m), named in the first row.
 ///
-/// Consecutive rows with the same `branch` form a line; without that column, all rows do.
+/// Consecutive rows with the same value of `branch` form a line. Without this column, all rows form one line.
 ///
 /// # Errors
 /// If the file cannot be read, a column is missing, or a row has an invalid number.
@@ -61,7 +61,7 @@ pub fn read(path: &Path) -> Result<Vec<Line>> {
     Ok(lines)
 }
 
-/// `x [m]` → `x`.
+/// Remove the unit from a name: `x [m]` becomes `x`.
 fn bare_name(name: &str) -> &str {
     name.split('[').next().unwrap_or_default().trim()
 }

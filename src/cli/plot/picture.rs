@@ -17,16 +17,16 @@ use crate::cli::{Verbosity, file_error, outln, result_file};
 /// Largest drawn displacement for `--deform auto`, relative to the body's size.
 const AUTOMATIC_DISPLACEMENT: f64 = 0.04;
 
-/// Percentiles between which the automatic range lies where outliers would hide the rest.
+/// Percentiles at the ends of the automatic range of colours if there are outliers.
 const PERCENTILES: [f64; 2] = [0.5, 99.5];
 
-/// If the full range exceeds the percentile range by this factor, the percentile range is shown.
+/// Ratio of the full range to the percentile range above which there are outliers.
 const OUTLIERS: f64 = 4.0;
 
-/// A time this share of an interval before the first or after the last output still selects it.
+/// Largest distance of a requested time from the first or last output, as a fraction of the output interval.
 const TIME_REACH: f64 = 0.5;
 
-/// Fields that are drawn unless one is named, the most wanted first.
+/// Fields that are drawn by default, in order of preference.
 const PREFERRED: [&str; 6] = [
     "damage",
     "von_mises_stress",
@@ -36,10 +36,10 @@ const PREFERRED: [&str; 6] = [
     "displacement",
 ];
 
-/// What pictures look like.
+/// Options of pictures.
 #[derive(Args)]
 pub struct PictureArguments {
-    /// The field [default: damage, or another one of a result without].
+    /// Field to draw [default: damage, or another field if the result has none].
     #[arg(short, long, value_name = "NAME")]
     field: Option<String>,
 
@@ -47,7 +47,7 @@ pub struct PictureArguments {
     #[arg(short, long, value_name = "NAME")]
     component: Option<String>,
 
-    /// Factor of the drawn displacement, or `auto`.
+    /// Factor on the drawn displacement, or `auto`.
     #[arg(
         long,
         value_name = "FACTOR",
@@ -56,17 +56,17 @@ pub struct PictureArguments {
     )]
     deform: String,
 
-    /// Draw only the points nearest to this plane of a solid, such as z=0.005.
+    /// Draw only the points of a solid that are nearest to this plane, such as z=0.005.
     #[arg(long, value_name = "AXIS=POSITION")]
     slice: Option<String>,
 
-    /// Draw lines over a plane picture: a CSV file with columns x and y (m), and branch where there are
-    /// several, such as crack_NAME.csv; may be repeated.
+    /// Draw the lines of a CSV file, such as crack_NAME.csv, over a plane picture. The columns are x and y
+    /// (m), and branch if there are several lines. May be repeated.
     #[arg(long, value_name = "FILE.csv")]
     path: Vec<PathBuf>,
 
-    /// Range of the colours: values such as 0,1, percentiles such as 5%,95%, or `all`
-    /// [default: all, or 0.5%,99.5% where outliers would hide the rest].
+    /// Range of the colours: values such as 0,1, percentiles such as 5%,95%, or `all` [default: all, or
+    /// 0.5%,99.5% if there are outliers].
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     range: Option<String>,
 
@@ -75,10 +75,10 @@ pub struct PictureArguments {
     pub(super) width: u32,
 }
 
-/// Draw one picture, or one per output.
+/// Draw the last output, the output nearest to a time, or all outputs.
 ///
 /// # Errors
-/// If the file is not a result, or what is to be drawn is not in it.
+/// If the file is not a result, or the field or component is missing.
 pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> Result<()> {
     let file = result_file(result);
     let result = ResultReader::open(&file)?;
@@ -110,8 +110,8 @@ pub fn plot(arguments: &PlotArguments, result: &Path, verbosity: Verbosity) -> R
     Ok(())
 }
 
-/// The path of a file beside a result. The name begins with the stem of a further result, such as `result_edge.vtkhdf`;
-/// no field begins with `result_`.
+/// Return the path of a file beside a result. For a further result, such as `result_edge.vtkhdf`, the file
+/// name starts with the name of the result. No field name starts with `result_`, so names are unique.
 pub fn beside(result: &Path, name: &str) -> PathBuf {
     let stem = result.file_stem().unwrap_or_default().to_string_lossy();
     let further = if stem.starts_with("result_") {
@@ -131,7 +131,7 @@ fn number(text: &str, wanted: &str) -> Result<f64> {
     value.ok_or_else(|| Error::input(format!("{wanted}, is `{text}`")))
 }
 
-/// The indices of the outputs to draw.
+/// Return the indices of the outputs to draw.
 fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     let Some(last) = times.len().checked_sub(1) else {
         return Err(Error::input("the result holds no output yet"));
@@ -161,13 +161,13 @@ fn choose_times(text: &str, times: &[f64]) -> Result<Vec<usize>> {
     }
 }
 
-/// `name.png` → `name_0012.png`.
+/// Insert a number into a file name: `name.png` becomes `name_0012.png`.
 fn numbered(path: &Path, index: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}_{index:04}.png"))
 }
 
-/// The range of the colours.
+/// Requested range of the colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Range {
     Automatic,
@@ -176,17 +176,17 @@ enum Range {
     Values((f64, f64)),
 }
 
-/// Values at the ends of the colour bar, and what all values reach.
+/// Values at the ends of the colour bar (`shown`), and smallest and largest value (`all`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     shown: [f64; 2],
     all: [f64; 2],
-    /// The percentiles that are shown; `None` for all values.
+    /// Percentiles at the ends of the colour bar; `None` if the colour bar covers all values.
     percentiles: Option<[f64; 2]>,
 }
 
 impl Limits {
-    /// The limits for values with a range; `None` without values.
+    /// Return the limits of some values for a requested range; `None` without values.
     fn of(mut values: Vec<f64>, range: Range) -> Option<Self> {
         let all = values.iter().fold(None, |ends: Option<[f64; 2]>, value| {
             let [low, high] = ends.unwrap_or([*value; 2]);
@@ -214,7 +214,7 @@ impl Limits {
         })
     }
 
-    /// The limits of both.
+    /// Return limits that enclose those of `self` and `other`.
     pub fn union(self, other: Self) -> Self {
         let union = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         Self {
@@ -224,7 +224,7 @@ impl Limits {
         }
     }
 
-    /// The line that says what is beyond the colours.
+    /// Format a note about values beyond the colour bar; empty if the colour bar covers all values.
     fn note(&self, unit: &str) -> String {
         let Some([low, high]) = self.percentiles else {
             return String::new();
@@ -239,17 +239,17 @@ impl Limits {
     }
 }
 
-/// What all frames of a film have in common.
+/// Settings that all frames of a film share.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
     /// The drawn box.
     pub bounds: Bounds,
-    /// Limits of the values; `None` if there are none.
+    /// Limits of the values; `None` without values.
     pub limits: Option<Limits>,
 }
 
 impl Frame {
-    /// The frame that holds both.
+    /// Return a frame that encloses `self` and `other`.
     pub fn union(self, other: Self) -> Self {
         Self {
             bounds: self.bounds.union(other.bounds),
@@ -261,10 +261,12 @@ impl Frame {
     }
 }
 
-/// Difference of the coordinates of two points of a lattice in one row, by round-off, as a share of the extent.
+/// Largest difference of coordinates that count as equal, as a fraction of the extent. Points in one row of a
+/// lattice differ by round-off.
 const SAME_COORDINATE: f64 = 1e-9;
 
-/// Most combinations of coordinates of the points of lattices, over the number of points to the power of 1.5.
+/// Most combinations of coordinates of a lattice with n points, divided by n^1.5. Scattered points have more
+/// combinations.
 const MOST_COMBINATIONS: f64 = 4.0;
 
 /// Settings of all pictures of a result.
@@ -273,31 +275,31 @@ pub struct Painter<'a> {
     arguments: &'a PictureArguments,
     dimension: usize,
     title: String,
-    /// What is drawn.
+    /// The drawn quantity.
     pub quantity: Quantity,
     has_displacement: bool,
     section: f64,
     range: Range,
     view: View,
     factor: f64,
-    /// Bodies whose points are scattered, by number.
+    /// Whether the points of a body are scattered, by index of the body.
     scattered: Vec<bool>,
-    /// Lines over the picture, by file.
+    /// Lines over the picture, by index of the file.
     paths: Vec<Vec<Line>>,
 }
 
-/// The points of an output as they are drawn.
+/// Drawn data of the points of an output.
 struct Points {
     positions: Vec<[f64; 3]>,
     sizes: Vec<f64>,
-    /// Points of bodies whose points are scattered; empty if there are none.
+    /// Whether the body of a point has scattered points; empty if no body has.
     scattered: Vec<bool>,
     values: Vec<f64>,
     lines: Vec<(usize, Vec<[f64; 3]>)>,
 }
 
 impl<'a> Painter<'a> {
-    /// A painter of a result; an automatic factor of the displacement suits the output `reference`.
+    /// Create a painter of a result. An automatic displacement factor is chosen for the output `reference`.
     ///
     /// # Errors
     /// If an argument is wrong for this result.
@@ -325,7 +327,7 @@ impl<'a> Painter<'a> {
         let fields = result.fields()?;
         let mut field = choose_field(arguments.field.as_deref(), path, &fields)?;
         if arguments.field.is_none() && field.name == "velocity" {
-            // Equilibria have no velocity.
+            // Quasi-static results have a velocity of zero, so draw the displacement instead.
             let displacement = fields.iter().find(|field| field.name == "displacement");
             let is_zero = |values: Vec<f64>| values.iter().all(|value| *value == 0.0);
             if let Some(displacement) = displacement
@@ -362,7 +364,7 @@ impl<'a> Painter<'a> {
         Ok(painter)
     }
 
-    /// Name of what is drawn for the name of a file.
+    /// Return the name of the drawn quantity, for file names.
     pub fn name(&self) -> String {
         let field = &self.quantity.field;
         match &self.arguments.component {
@@ -379,7 +381,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// A factor of 1, 2 or 5 times a power of ten that makes displacements visible.
+    /// Return a factor of 1, 2 or 5 times a power of ten that makes displacements visible.
     fn automatic_factor(&self, index: usize) -> Result<f64> {
         let positions = self.result.positions(index)?;
         let values = self.displacements(index)?;
@@ -444,7 +446,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// For each point whether it belongs to a body with scattered points; empty if there is no such body.
+    /// Return for each point whether its body has scattered points; empty if no body has.
     fn are_scattered(&self, index: usize) -> Result<Vec<bool>> {
         if !self.scattered.contains(&true) {
             return Ok(Vec::new());
@@ -457,7 +459,7 @@ impl<'a> Painter<'a> {
         Ok(bodies.iter().map(is_scattered).collect())
     }
 
-    /// The limits of a scene; damage has no outliers.
+    /// Return the limits of a scene. An automatic range covers all values of damage, which has no outliers.
     fn limits(&self, scene: &Scene) -> Option<Limits> {
         let range = match self.range {
             Range::Automatic if self.quantity.field.contains("damage") => Range::All,
@@ -466,7 +468,8 @@ impl<'a> Painter<'a> {
         Limits::of(scene.drawn_values(), range)
     }
 
-    /// What a picture of an output shows, to be united with that of other outputs; `None` if no point is drawn.
+    /// Return the frame of an output, for the union of the frames of all outputs; `None` if no point is
+    /// drawn.
     ///
     /// # Errors
     /// If the result is damaged.
@@ -482,7 +485,8 @@ impl<'a> Painter<'a> {
         }))
     }
 
-    /// Draw an output at a time, in a given frame or in one of its own.
+    /// Draw an output with the text of its time. `frame` gives box and limits; without `frame`, the output
+    /// sets both.
     ///
     /// # Errors
     /// If the result is damaged.
@@ -502,7 +506,7 @@ impl<'a> Painter<'a> {
             title: title.trim_start(),
             range: match (self.range, limits) {
                 (Range::Values(range), _) => Some(range),
-                // The low end of damage is 0, as the picture has it.
+                // The colour bar of damage starts at 0 in all pictures.
                 (_, Some(limits)) if frame.is_some() || limits.percentiles.is_some() => {
                     let [low, high] = limits.shown;
                     let damage = self.quantity.field.contains("damage");
@@ -517,10 +521,11 @@ impl<'a> Painter<'a> {
         }))
     }
 
-    /// Check that a slice cuts the body.
+    /// Check that there are points near the slice.
     ///
     /// # Errors
-    /// If the output has points, but none near the slice; the message gives the nearest position.
+    /// If the output has points, but none near the slice; the message gives the position of the nearest
+    /// point.
     pub fn check_slice(&self, index: usize) -> Result<()> {
         let View::Slice { axis, position } = self.view else {
             return Ok(());
@@ -553,7 +558,7 @@ impl<'a> Painter<'a> {
         )))
     }
 
-    /// The lines to draw, with the numbers of their files. Each vertex is displaced with its nearest point.
+    /// Return the lines to draw, with the index of the file. Each vertex is displaced with its nearest point.
     fn moved_paths(
         &self,
         positions: &[[f64; 3]],
@@ -574,10 +579,10 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// Which bodies have scattered points at an output, by number.
+/// Return for each body whether its points are scattered at an output.
 ///
-/// The points of lattices share coordinates: n points have about n combinations of different coordinates, scattered ones
-/// n² in the plane. Few points are not scattered.
+/// The n points of a lattice share coordinates, with about n combinations of different coordinates. Scattered
+/// points have n² combinations in the plane. Bodies with few points do not count as scattered.
 fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Result<Vec<bool>> {
     if dimension < 2 || result.times()?.is_empty() {
         return Ok(Vec::new());
@@ -611,7 +616,8 @@ fn scattered_bodies(result: &ResultReader, index: usize, dimension: usize) -> Re
     Ok(of_bodies.into_iter().map(is_scattered).collect())
 }
 
-/// The field to draw: the named one, or else the most wanted one that changes with time.
+/// Return the field to draw: the named field, else the first existing field of [`PREFERRED`], else a field
+/// that changes with time.
 fn choose_field<'a>(
     name: Option<&str>,
     path: &Path,
@@ -728,7 +734,7 @@ mod tests {
         assert_eq!((limits.shown, limits.note("Pa").as_str()), ([0.0, 1e9], ""));
         let limits = Limits::of(values, Range::Percentiles([0.0, 50.0])).unwrap();
         assert_eq!(limits.shown, [0.0, 501.0]);
-        // Where nearly all values are equal, the others are what is looked at.
+        // Few values of a pulse differ from the others; the range must include these few.
         let pulse: Vec<f64> = (0..1000).map(|k| f64::from(u8::from(k == 7))).collect();
         let limits = Limits::of(pulse, Range::Automatic).unwrap();
         assert_eq!(limits.percentiles, None);

@@ -5,22 +5,22 @@ use fissure::error::{Error, Result};
 use fissure::message::suggestion;
 use fissure::output::StoredField;
 
-/// A number per point, with its name and unit.
+/// A number per point, with name and unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quantity {
     /// Name of the field.
     pub field: String,
-    /// Name for the colour bar.
+    /// Name of the quantity on the colour bar.
     pub label: String,
-    /// Its unit; empty if dimensionless.
+    /// Unit of the quantity; empty if dimensionless.
     pub unit: String,
     components: usize,
     kind: Component,
 }
 
 impl Quantity {
-    /// A component or invariant of a field; by default the magnitude, or the von Mises equivalent of a symmetric
-    /// tensor.
+    /// Create the quantity for a component or invariant of a field. The default is the magnitude, or the von
+    /// Mises equivalent of a symmetric tensor.
     ///
     /// # Errors
     /// If the field has no such component.
@@ -58,7 +58,7 @@ impl Quantity {
         })
     }
 
-    /// The numbers of points with these stored values, row-major.
+    /// Compute the quantity of each point from the stored values, [points, components] row-major.
     pub fn of(&self, stored: Vec<f64>) -> Vec<f64> {
         if self.components == 1 {
             return stored;

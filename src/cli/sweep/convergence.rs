@@ -1,13 +1,15 @@
 //! Observed rates of convergence.
 
-/// Largest rate that is looked for.
+/// Largest absolute rate of the search.
 const LARGEST_RATE: f64 = 30.0;
 
-/// Bisections, which leave no more than round-off of [`LARGEST_RATE`].
+/// Number of bisections, which reduce the interval to round-off of [`LARGEST_RATE`].
 const BISECTIONS: usize = 60;
 
-/// The rate p of each row of a series of (h, f), for rows that have one: |f − reference| ∝ h^p from a row and the
-/// one before it or, without a reference, f − f₀ ∝ h^p with any f₀ from a row and the two before it.
+/// Compute the rate of convergence p of each row of a series of pairs (h, f); `None` if a row has no rate.
+///
+/// - With a reference, |f − reference| ∝ h^p gives p from a row and the previous row.
+/// - Without a reference, f − f₀ ∝ h^p with unknown f₀ gives p from a row and the previous two rows.
 pub fn rates(series: &[(f64, Option<f64>)], reference: Option<f64>) -> Vec<Option<f64>> {
     let rate = |row: usize| -> Option<f64> {
         match reference {
@@ -27,7 +29,7 @@ pub fn rates(series: &[(f64, Option<f64>)], reference: Option<f64>) -> Vec<Optio
     (0..series.len()).map(rate).collect()
 }
 
-/// The last N rows up to one, if all have values.
+/// Return the N rows that end at `row`, if all of them have values.
 fn last<const N: usize>(series: &[(f64, Option<f64>)], row: usize) -> Option<[(f64, f64); N]> {
     let rows = series[..=row].last_chunk::<N>()?;
     rows.iter()
@@ -39,7 +41,7 @@ fn positive<const N: usize>(sizes: [f64; N]) -> Option<()> {
     sizes.iter().all(|h| *h > 0.0).then_some(())
 }
 
-/// The root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio, for monotonic h.
+/// Return the root p of (h₁^p − h₂^p)/(h₂^p − h₃^p) = ratio, for monotonic h.
 fn rate_of_differences([h1, h2, h3]: [f64; 3], ratio: f64) -> Option<f64> {
     let (up, down) = ((h1 / h2).ln(), (h3 / h2).ln());
     let monotonic = up * down < 0.0;
@@ -54,7 +56,7 @@ fn rate_of_differences([h1, h2, h3]: [f64; 3], ratio: f64) -> Option<f64> {
             -(p * up).exp_m1() / (p * down).exp_m1()
         }
     };
-    // The quotient grows with p where h falls, and falls where h grows.
+    // The quotient increases with p if h decreases, and decreases with p if h increases.
     let sign = up.signum();
     let (mut low, mut high) = (-LARGEST_RATE, LARGEST_RATE);
     let above = |p: f64| sign * (quotient(p) - ratio) > 0.0;
@@ -108,7 +110,7 @@ mod tests {
                 &[None, None, Some(p), Some(p)],
             );
         }
-        // Over a number that grows with refinement, the rate is negative.
+        // If h is a count that increases with refinement, the rate is negative.
         let counts = rates(&series(&[10.0, 20.0, 40.0], |n| 1.0 + n.powi(-2)), None);
         assert_rates(&counts, &[None, None, Some(-2.0)]);
     }

@@ -1,14 +1,14 @@
-//! The combinations of values.
+//! The combinations of values of a sweep.
 
 use std::collections::HashSet;
 
 use fissure::error::{Error, Result};
 use fissure::message::suggestion;
 
-/// Longest name of a run's folder that is made of its values.
+/// Longest folder name of a run that contains the values.
 const LONGEST_NAME: usize = 120;
 
-/// A name and its values, as texts.
+/// Name of a parameter or key, and its values as texts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     pub name: String,
@@ -61,10 +61,10 @@ fn split(text: &str) -> Vec<String> {
     parts.iter().map(|part| part.trim().to_owned()).collect()
 }
 
-/// Parse a list of rows such as `1-4,7`; rows count from 1 in the list, from 0 in what is returned.
+/// Parse a list of rows such as `1-4,7`. Rows count from 1 in the list, and from 0 in the returned indices.
 ///
 /// # Errors
-/// If a part is not a row or a range of rows.
+/// If a part of the list is not a row or a range of rows.
 pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
     let mut rows = Vec::new();
     for part in list.split(',').map(str::trim) {
@@ -84,16 +84,17 @@ pub fn rows(list: &str, count: usize) -> Result<Vec<usize>> {
     Ok(rows)
 }
 
-/// All combinations.
+/// Combinations of the values of all axes.
 pub struct Design {
     pub axes: Vec<Axis>,
-    /// Index of the value of each axis, by row.
+    /// Indices into the values of the axes, for each row.
     pub rows: Vec<Vec<usize>>,
     zip: bool,
 }
 
 impl Design {
-    /// The combinations of the values; the last axis changes fastest. With `zip`, the k-th values go together.
+    /// Create all combinations of the values; the last axis changes fastest. With `zip`, combine only the
+    /// k-th values of all axes.
     ///
     /// # Errors
     /// If a name is given twice, or zipped axes have different numbers of values.
@@ -136,17 +137,17 @@ impl Design {
         Ok(Self { axes, rows, zip })
     }
 
-    /// The axes with several values.
+    /// Return the axes with several values.
     pub fn varied(&self) -> impl Iterator<Item = usize> {
         (0..self.axes.len()).filter(|axis| self.axes[*axis].values.len() > 1)
     }
 
-    /// The text of a value.
+    /// Return the text of the value of an axis in a row.
     pub fn value(&self, row: &[usize], axis: usize) -> &str {
         &self.axes[axis].values[row[axis]]
     }
 
-    /// Names and values of a row.
+    /// Return the names and values of a row.
     pub fn assignments(&self, row: &[usize]) -> Vec<(String, String)> {
         let assignment = |axis: usize| {
             (
@@ -157,7 +158,7 @@ impl Design {
         (0..self.axes.len()).map(assignment).collect()
     }
 
-    /// A row in words: its varied values, or all if none is varied.
+    /// Format a row for messages: its varied values, or all values if none is varied.
     pub fn label(&self, row: &[usize]) -> String {
         self.label_without(row, None)
     }
@@ -172,7 +173,7 @@ impl Design {
         axes.iter().map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// Names of the runs' folders: their values where these make distinct names, else their numbers.
+    /// Return the names of the runs' folders: the values if these give distinct names, else numbers.
     pub fn folders(&self) -> Vec<String> {
         let safe = |c: char| c.is_ascii_alphanumeric() || "._+-=,".contains(c);
         let name = |row: &Vec<usize>| -> String {
@@ -192,15 +193,16 @@ impl Design {
             .collect()
     }
 
-    /// The value of an axis as a number.
+    /// Return the value of an axis in a row as a number.
     pub fn number(&self, row: &[usize], axis: usize) -> Option<f64> {
         number(self.value(row, axis))
     }
 
-    /// The axis for rates and pictures: the named one, or the first varied one whose values are numbers.
+    /// Return the axis for rates and pictures: the named axis, or the first varied axis whose values are
+    /// numbers.
     ///
     /// # Errors
-    /// If the named one is not there, has one value, or values that are not numbers.
+    /// If the named axis is missing, has one value, or has values that are not numbers.
     pub fn abscissa(&self, name: Option<&str>) -> Result<Option<usize>> {
         let is_number = |axis: &usize| {
             self.axes[*axis]
@@ -225,7 +227,8 @@ impl Design {
         Ok(Some(axis))
     }
 
-    /// Groups of rows that differ in one axis only; with `zip`, one group of all rows. Each has a name, and rows in order.
+    /// Group the rows that differ only in the axis `abscissa`; with `zip`, all rows form one group. Return
+    /// the name and the rows of each group.
     pub fn groups(&self, abscissa: usize) -> Vec<(String, Vec<usize>)> {
         if self.zip {
             return vec![(String::new(), (0..self.rows.len()).collect())];

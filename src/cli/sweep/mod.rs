@@ -21,9 +21,9 @@ use value::{Column, Reference};
 
 /// Run a deck for several values of its parameters and keys.
 ///
-/// Each combination of the values is a run of its own, in a process of its own. Runs that are complete are
-/// not repeated; interrupted ones continue from their checkpoints. Writes a table of chosen values of the
-/// histories, sweep.csv, and a picture of each value over a parameter into the output folder.
+/// Each combination of values is a separate run in a separate process. Complete runs are not repeated, and
+/// interrupted runs continue from their checkpoints. Writes sweep.csv, a table of values picked from the
+/// histories, and a picture of each value over a parameter to the output folder.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -44,48 +44,48 @@ changes a spacing, a horizon or a time step, or is named by --x.
 Exit codes: 0 done, 1 runs failed, 2 the deck or the arguments are wrong, 75 stopped by a signal; the same
 command continues.")]
 pub struct SweepArguments {
-    /// The deck.
+    /// Deck to run.
     deck: PathBuf,
 
-    /// Put the keys of another deck over those of this one; may be repeated.
+    /// Override keys of the deck with those of another deck; may be repeated.
     #[arg(long, value_name = "OVERLAY")]
     with: Vec<PathBuf>,
 
-    /// Values of a parameter or of a key, named with its section; may be repeated.
+    /// Values of a parameter or key; give a key with its section; may be repeated.
     #[arg(long, required = true, value_name = "NAME=VALUE,…", value_parser = design::axis)]
     set: Vec<Axis>,
 
-    /// Take the first values together, then the second ones and so on, instead of all combinations.
+    /// Combine the k-th values of all lists instead of using all combinations.
     #[arg(long)]
     zip: bool,
 
-    /// Folder of the runs and the table [default: out/ and the deck's name with _sweep].
+    /// Folder of the runs and of the table [default: out/ and the deck's name with _sweep].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 
-    /// A column of the history and what is taken of it: last (if not given), first, max or min; may be
+    /// Value to pick from a column of each history. PICK is last (default), first, max or min. May be
     /// repeated.
     #[arg(long, value_name = "[PICK:]COLUMN", value_parser = value::column)]
     value: Vec<Column>,
 
-    /// What a value should be; named as in --value if there are several values.
+    /// Expected number for a value; with several values, give the value as in --value.
     #[arg(long, value_name = "[VALUE=]NUMBER", value_parser = value::reference)]
     reference: Vec<Reference>,
 
-    /// The parameter of rates and of the pictures' horizontal axis [default: the first one with several
+    /// Parameter for rates and for the horizontal axis of pictures [default: the first one with several
     /// values, all numbers].
     #[arg(long, value_name = "NAME")]
     x: Option<String>,
 
-    /// Runs at a time.
+    /// Number of simultaneous runs.
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     jobs: u16,
 
-    /// Threads of each rank [default: the cores of the rank].
+    /// Threads of each rank [default: number of cores of the rank].
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 
-    /// Words that start the ranks of each run, such as 'mpirun -n 4'.
+    /// Command that starts the ranks of each run, such as 'mpirun -n 4'.
     #[arg(long, value_name = "WORDS")]
     launcher: Option<String>,
 
@@ -93,13 +93,13 @@ pub struct SweepArguments {
     #[arg(long, value_name = "LIST")]
     rows: Option<String>,
 
-    /// Replace complete runs and those of another deck.
+    /// Replace complete runs, and runs of another deck.
     #[arg(long)]
     overwrite: bool,
 }
 
 impl SweepArguments {
-    /// The output folder.
+    /// Return the output folder.
     fn folder(&self) -> PathBuf {
         let default = || {
             let stem = self.deck.file_stem().unwrap_or_default();
@@ -111,10 +111,12 @@ impl SweepArguments {
     }
 }
 
-/// The runs of all combinations; their decks are valid, and their histories have the columns of all values.
+/// Return the runs of all combinations. The decks are validated, and the histories have the columns of all
+/// values.
 ///
 /// # Errors
-/// If the deck is invalid with the values of a combination, which the message names, or a value is of no column.
+/// If the deck is invalid with the values of a combination, which the message names, or a value has an
+/// unknown column.
 fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> Result<Vec<Run>> {
     let run = |(row, name): (&Vec<usize>, String)| {
         let (label, set) = (design.label(row), design.assignments(row));
@@ -140,7 +142,7 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
     design.rows.iter().zip(design.folders()).map(run).collect()
 }
 
-/// Run the combinations that are missing, and write the table and pictures of all.
+/// Run the missing combinations, and write the table and pictures of all combinations.
 ///
 /// # Errors
 /// If the deck or an argument is wrong, a run fails, or a file cannot be written.

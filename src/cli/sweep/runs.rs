@@ -1,4 +1,4 @@
-//! The runs, each in a process of its own.
+//! The runs of a sweep, each in a separate process.
 
 use std::fs::File;
 use std::os::unix::process::CommandExt;
@@ -14,22 +14,22 @@ use signal_hook::iterator::Signals;
 use super::SweepArguments;
 use crate::cli::file_error;
 
-/// What a run prints.
+/// File with the output of a run.
 pub const LOG: &str = "log.txt";
 
-/// The deck of a run with all its values, to recognise the run.
+/// File with the deck of a run and all defaults, which identifies the run.
 const DECK: &str = "deck_in_full.toml";
 
-/// The result of a run.
+/// Result of a run.
 const RESULT: &str = "result.vtkhdf";
 
-/// Present in the folder of a complete run.
+/// Marker file in the folder of a complete run.
 const COMPLETE: &str = "complete";
 
 /// Checkpoints of a run.
 const CHECKPOINTS: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 
-/// Time between looks at the processes.
+/// Interval between checks of the processes.
 const INTERVAL: Duration = Duration::from_millis(20);
 
 /// Exit code of a stopped run.
@@ -37,17 +37,18 @@ const STOPPED: i32 = 75;
 
 /// A combination of values and its folder.
 pub struct Run {
-    /// Names and values that tell it apart.
+    /// Names and values of the combination, for messages.
     pub label: String,
     pub folder: PathBuf,
     pub set: Vec<(String, String)>,
-    /// The deck with all its values.
+    /// The deck with all defaults.
     pub deck: String,
-    /// Horizons and spacings (m) and time steps (s, or fractions of the stable one).
+    /// Horizons and spacings (m) and time steps (s, or fractions of the stable step).
     pub resolution: Vec<f64>,
 }
 
-/// The horizons, spacings and time steps of a run, which differ between runs of a convergence study.
+/// Return the horizons, spacings and time steps of a run. Runs of a convergence study differ in these
+/// numbers.
 pub fn resolution(problem: &Problem) -> Vec<f64> {
     let mut found = vec![problem.horizon];
     for body in &problem.bodies {
@@ -63,18 +64,19 @@ pub fn resolution(problem: &Problem) -> Vec<f64> {
     found
 }
 
-/// How a run ended.
+/// State of a process after its end.
 pub enum State {
     Complete,
-    /// With an exit code or a signal, in words.
+    /// Failure; the text gives the exit code or signal.
     Failed(String),
 }
 
 impl Run {
-    /// Check that the folder is new or of this very run or, with `overwrite`, of any run of a sweep.
+    /// Check that the folder is new or holds this run. With `overwrite`, the folder may hold any run of a
+    /// sweep.
     ///
     /// # Errors
-    /// If something else is there.
+    /// If the folder holds anything else.
     pub fn check(&self, overwrite: bool) -> Result<()> {
         let path = self.folder.join(DECK);
         match std::fs::read_to_string(&path) {
@@ -92,32 +94,32 @@ impl Run {
         }
     }
 
-    /// Whether this very run has been completed.
+    /// Test whether the folder holds this run and the run is complete.
     pub fn is_complete(&self) -> bool {
         let same =
             std::fs::read_to_string(self.folder.join(DECK)).is_ok_and(|text| text == self.deck);
         same && self.folder.join(COMPLETE).exists()
     }
 
-    /// The last line that the run printed.
+    /// Return the last error message of the run, or the last printed line.
     pub fn last_words(&self) -> String {
         let log = std::fs::read(self.folder.join(LOG)).unwrap_or_default();
         let log = String::from_utf8_lossy(&log);
-        // An error may have several lines, of which the first one says what is wrong.
+        // An error message may have several lines; the first line describes the error.
         let error = log.lines().rfind(|line| line.starts_with("error: "));
         let line = error.or_else(|| log.lines().rfind(|line| !line.trim().is_empty()));
         line.unwrap_or("it printed nothing").to_owned()
     }
 }
 
-/// How runs are started.
+/// Program that executes the runs.
 pub struct Program<'a> {
     arguments: &'a SweepArguments,
     fissure: PathBuf,
     launcher: Vec<String>,
 }
 
-/// A run that goes on.
+/// A running process.
 struct Process {
     number: usize,
     child: Child,
@@ -125,10 +127,10 @@ struct Process {
 }
 
 impl<'a> Program<'a> {
-    /// The program itself, with the launcher of the arguments.
+    /// Create the program from this executable and the launcher of the arguments.
     ///
     /// # Errors
-    /// If the launcher is empty, or the system does not say where the program is.
+    /// If the launcher is empty, or the path of this executable is unknown.
     pub fn new(arguments: &'a SweepArguments) -> Result<Self> {
         let words = arguments.launcher.as_deref().map(str::split_whitespace);
         let launcher: Vec<String> = words.into_iter().flatten().map(str::to_owned).collect();
@@ -145,13 +147,13 @@ impl<'a> Program<'a> {
         })
     }
 
-    /// Run those of `due`, some at a time, and call `ended` with number, state and time (s) of each that has ended.
-    /// Return whether a signal stopped them.
+    /// Execute the runs with the indices `due`, several at a time. Call `ended` with index, state and time
+    /// (s) of each ended run. Return true if a signal stopped the runs.
     ///
-    /// After a first SIGINT or SIGTERM, all runs are asked to stop, which leaves checkpoints; a second one kills them.
+    /// A first SIGINT or SIGTERM makes all runs write checkpoints and stop; a second one kills the runs.
     ///
     /// # Errors
-    /// If a run cannot be started, or of `ended`; the runs that go on are stopped then.
+    /// If a run cannot be started or `ended` fails. The other runs are then stopped.
     pub fn run_all(
         &self,
         runs: &[Run],
@@ -163,7 +165,7 @@ impl<'a> Program<'a> {
         let mut waiting = due.iter().copied();
         let mut processes: Vec<Process> = Vec::new();
         let (mut stopped, mut outcome) = (false, Ok(()));
-        // The runs were asked to stop.
+        // The runs have received a signal to stop.
         let mut asked = false;
         loop {
             while !stopped && outcome.is_ok() && processes.len() < usize::from(self.arguments.jobs)
@@ -212,7 +214,8 @@ impl<'a> Program<'a> {
                 let is_stop = !status.success()
                     && (stopped || outcome.is_err() || status.code() == Some(STOPPED));
                 if is_stop {
-                    // Also without a signal to this process: the limit of a batch job, for example.
+                    // A run also stops without a signal to this process, for example at the limit of a batch
+                    // job.
                     stopped |= outcome.is_ok();
                 } else if outcome.is_ok() {
                     outcome = ended(process.number, state, seconds);
@@ -227,7 +230,7 @@ impl<'a> Program<'a> {
         outcome.map(|()| stopped)
     }
 
-    /// Start a run, from its checkpoint if it has one.
+    /// Start a run, from its checkpoint if one exists.
     fn start(&self, run: &Run) -> Result<Child> {
         let folder = &run.folder;
         std::fs::create_dir_all(folder).map_err(|error| file_error(folder, "create", &error))?;
@@ -273,7 +276,8 @@ impl<'a> Program<'a> {
             .stdin(Stdio::null())
             .stdout(log)
             .stderr(errors);
-        // In a process group of its own, so that Ctrl-C reaches it once, through this process.
+        // In a separate process group, a run gets no signal from Ctrl-C; this process sends one signal
+        // instead.
         command.process_group(0);
         command.spawn().map_err(|error| {
             let program = command.get_program().to_string_lossy().into_owned();
@@ -282,7 +286,7 @@ impl<'a> Program<'a> {
     }
 }
 
-/// How a process ended.
+/// Describe the end of a process.
 fn words(status: ExitStatus) -> String {
     match status.code() {
         Some(code) => format!("failed with exit code {code}"),
@@ -293,8 +297,8 @@ fn words(status: ExitStatus) -> String {
 /// Send a signal to processes that have not been waited for.
 fn kill(processes: &[Process], signal: i32) {
     for process in processes {
-        // SAFETY: only sends a signal. The id is that of the child: it is not given to another process before
-        // the child is waited for.
+        // SAFETY: the call only sends a signal. The id belongs to the child: the system does not reuse an id
+        // before the child has been waited for.
         unsafe {
             libc::kill(process.child.id() as i32, signal);
         }

@@ -1,4 +1,4 @@
-//! The table of a sweep, and its pictures.
+//! The table of a sweep and its pictures.
 
 use std::path::Path;
 
@@ -13,20 +13,20 @@ use crate::cli::{file_error, outln};
 /// Width of the pictures in pixels.
 const WIDTH: u32 = 900;
 
-/// Values by run, with what follows from them.
+/// Values of all runs, with the data for errors and rates.
 pub struct Table<'a> {
     design: &'a Design,
     columns: &'a [Column],
     references: &'a [Option<f64>],
     abscissa: Option<usize>,
-    /// There are rates without a reference too.
+    /// Compute rates even without a reference: the runs differ in resolution, or `--x` is given.
     has_rates: bool,
-    /// Values by run and column; `None` for runs that are not complete.
+    /// Values by run and column; `None` for incomplete runs.
     values: Vec<Option<Vec<Option<f64>>>>,
     units: Vec<String>,
 }
 
-/// A column of the printed and of the written table.
+/// A column of the table, as printed and as written to sweep.csv.
 struct Cells {
     /// Printed and written heading.
     heading: [String; 2],
@@ -36,7 +36,7 @@ struct Cells {
 }
 
 impl<'a> Table<'a> {
-    /// A table without values.
+    /// Create a table without values.
     pub fn new(
         design: &'a Design,
         columns: &'a [Column],
@@ -58,7 +58,7 @@ impl<'a> Table<'a> {
     /// Read the values of a complete run.
     ///
     /// # Errors
-    /// If its history cannot be read or lacks a column.
+    /// If the history of the run cannot be read or lacks a column.
     pub fn read(&mut self, number: usize, folder: &Path) -> Result<()> {
         let found = value::read(folder, self.columns)?;
         let (values, units): (Vec<_>, Vec<_>) = found.into_iter().unzip();
@@ -67,7 +67,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Number of complete runs.
+    /// Return the number of complete runs.
     pub fn complete(&self) -> usize {
         self.values.iter().flatten().count()
     }
@@ -82,7 +82,7 @@ impl<'a> Table<'a> {
         if prints {
             outln!("{}", printed(&cells));
         }
-        // Tasks of a job array may write the same table.
+        // Several tasks of a job array may write this table, so replace it by an atomic rename.
         let path = folder.join("sweep.csv");
         let part = folder.join(format!("sweep.csv.{}", std::process::id()));
         std::fs::write(&part, csv(&cells))
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         self.values[row].as_ref()?[column]
     }
 
-    /// The columns: folder, values of the axes, state, and values with errors and rates.
+    /// Return the columns: folder, values of the axes, state, and values with errors and rates.
     fn cells(&self) -> Vec<Cells> {
         let rows = 0..self.design.rows.len();
         let alike = |text: String| [text.clone(), text];
@@ -163,7 +163,7 @@ impl<'a> Table<'a> {
         cells
     }
 
-    /// The observed rate of convergence of each row.
+    /// Compute the rate of convergence of each row.
     fn rates(&self, column: usize) -> Vec<Option<f64>> {
         let mut found = vec![None; self.design.rows.len()];
         let Some(abscissa) = self.abscissa else {
@@ -187,8 +187,8 @@ impl<'a> Table<'a> {
         rows.iter().map(pair).collect()
     }
 
-    /// Draw a value over the abscissa, one curve for each combination of the other names. Return whether there is
-    /// anything to draw.
+    /// Draw a value over the abscissa, one curve for each combination of the other parameters. Return false
+    /// if there is nothing to draw.
     fn draw(&self, column: usize, path: &Path) -> Result<bool> {
         let Some(abscissa) = self.abscissa else {
             return Ok(false);
@@ -206,7 +206,7 @@ impl<'a> Table<'a> {
                 range = [range[0].min(*h), range[1].max(*h)];
             }
             runs += points.len();
-            // The curve, then each run alone: isolated points are drawn as markers.
+            // Draw each run also as an isolated point, for which the chart draws a marker.
             let gap = [f64::NAN; 2];
             let markers: Vec<[f64; 2]> = points.iter().flat_map(|point| [gap, *point]).collect();
             let points = [points, markers].concat();
@@ -244,7 +244,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The table with aligned columns.
+/// Format the table with aligned columns.
 fn printed(cells: &[Cells]) -> String {
     let headings = cells.iter().map(|column| match column.unit.as_str() {
         "" => column.heading[0].clone(),
@@ -274,7 +274,7 @@ fn printed(cells: &[Cells]) -> String {
     lines.join("\n")
 }
 
-/// The table as CSV, with headings as in history.csv.
+/// Format the table as CSV, with headings as in history.csv.
 fn csv(cells: &[Cells]) -> String {
     let quoted = |text: &str| {
         if text.contains([',', '"', '\n']) {

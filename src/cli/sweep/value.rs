@@ -1,4 +1,4 @@
-//! Values of a history, and what they should be.
+//! Values picked from histories, and their references.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use fissure::message::suggestion;
 
 use crate::cli::plot::curves::read_csv;
 
-/// What is taken of a column.
+/// Rule that picks a value from a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pick {
     Last,
@@ -23,7 +23,7 @@ const PICKS: [(&str, Pick); 4] = [
     ("min", Pick::Min),
 ];
 
-/// A column of the history and what is taken of it.
+/// A column of the history, and the rule that picks a value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     pub pick: Pick,
@@ -45,7 +45,7 @@ pub fn column(text: &str) -> std::result::Result<Column, String> {
     }
 }
 
-/// What a value should be, and its name where there are several.
+/// Expected number for a value. The value is named if there are several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
     name: Option<Column>,
@@ -64,10 +64,11 @@ pub fn reference(text: &str) -> std::result::Result<Reference, String> {
     }
 }
 
-/// The reference of each value.
+/// Return the reference of each value.
 ///
 /// # Errors
-/// If a reference is of no value, of one that has another, or of an unnamed one of several.
+/// If a reference has an unknown value, a value has two references, or a reference has no name although there
+/// are several values.
 pub fn references(values: &[Column], references: &[Reference]) -> Result<Vec<Option<f64>>> {
     let mut found = vec![None; values.len()];
     for Reference { name, number } in references {
@@ -96,12 +97,12 @@ pub fn references(values: &[Column], references: &[Reference]) -> Result<Vec<Opt
 }
 
 impl Column {
-    /// As on the command line.
+    /// Return the value as on the command line, such as `max:damage`.
     pub fn title(&self) -> String {
         format!("{}:{}", self.pick_name(), self.name)
     }
 
-    /// A name for files and columns.
+    /// Return a name for files and columns, such as `max_damage`.
     pub fn key(&self) -> String {
         format!("{}_{}", self.pick_name(), self.name)
     }
@@ -111,7 +112,7 @@ impl Column {
         found.map_or("", |(name, _)| name)
     }
 
-    /// Pick one of some numbers; the largest and the smallest ignore values that are not finite.
+    /// Pick a number; `Max` and `Min` ignore numbers that are not finite.
     fn of(&self, numbers: &[f64]) -> Option<f64> {
         let finite = numbers.iter().copied().filter(|number| number.is_finite());
         let picked = match self.pick {
@@ -124,10 +125,10 @@ impl Column {
     }
 }
 
-/// Check that a history has the columns of all values, given the names and units of its columns.
+/// Check that a history has the columns of all values. `columns` are the names and units of the history.
 ///
 /// # Errors
-/// If one has no such column.
+/// If the column of a value is missing.
 pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
     let names = || columns.iter().map(|(name, _)| name.as_str());
     match values
@@ -144,10 +145,10 @@ pub fn check(values: &[Column], columns: &[(String, &str)]) -> Result<()> {
     }
 }
 
-/// Values and their units from the history in a folder.
+/// Read values and their units from the history in a folder.
 ///
 /// # Errors
-/// If it cannot be read or has no such column.
+/// If the history cannot be read or lacks a column.
 pub fn read(folder: &Path, columns: &[Column]) -> Result<Vec<(Option<f64>, String)>> {
     if columns.is_empty() {
         return Ok(Vec::new());
