@@ -13,14 +13,14 @@ const HELD_METADATA_BYTES: usize = 32 << 20;
 pub enum Creation {
     /// Fail.
     Exclusive,
-    /// Replace it.
+    /// Replace the file.
     Truncate,
 }
 
 /// Open an existing file for reading.
 pub(super) fn open(path: &Path, raw: Option<RawCommunicator>) -> hdf5::Result<hdf5::File> {
-    // No collective metadata reads: ranks whose caches differ after reading different rows deadlock in
-    // them (HDF5 1.10.8). A file under creation has all of its metadata in memory.
+    // No collective metadata reads: HDF5 1.10.8 deadlocks in such a read if the ranks have read different rows
+    // before, because their caches differ. A new file has all of its metadata in memory and is safe.
     options(raw, false)?.open(path)
 }
 
@@ -32,7 +32,7 @@ pub(super) fn open_to_append(
     options(raw, false)?.open_rw(path)
 }
 
-/// Create a file, collectively if there is a raw communicator.
+/// Create a file; with a raw communicator, collectively.
 pub(super) fn create(
     path: &Path,
     raw: Option<RawCommunicator>,
@@ -52,7 +52,8 @@ fn options(
     let mut builder = hdf5::File::with_options();
     let access = builder.fapl();
     access.fclose_degree(FileCloseDegree::Strong);
-    // Metadata is written at flushes only, so a killed process leaves the file as of its last flush.
+    // Metadata is written at flushes only, so a killed process leaves the file in the state of the last
+    // flush.
     let mut cache = hdf5::plist::FileAccess::try_new()?.mdc_config();
     cache.evictions_enabled = false;
     cache.incr_mode = CacheIncreaseMode::Off;

@@ -6,7 +6,7 @@ use hdf5_metno::types::{FixedAscii, TypeDescriptor, VarLenUnicode};
 /// Maximum length of [`Attribute::Ascii`], bytes.
 const ASCII_BYTES: usize = 64;
 
-/// The value of an attribute.
+/// Value of an attribute.
 #[derive(Debug, Clone, Copy)]
 pub enum Attribute<'a> {
     /// One integer.

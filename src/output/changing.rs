@@ -21,7 +21,7 @@ pub struct ChangingPoints {
     fixed: Vec<Fixed>,
 }
 
-/// A field that changes only with the points.
+/// A static field, which changes only when the points change.
 struct Fixed {
     field: FieldDescription,
     kind: FieldData<'static>,
@@ -63,7 +63,7 @@ impl ChangingPoints {
         })
     }
 
-    /// Append the points of a step; `rows` and `steps` are the numbers of points and steps before it.
+    /// Append the points of a step. The file already holds `rows` points in `steps` steps.
     pub fn write(
         &mut self,
         file: &mut CollectiveFile<'_>,
@@ -88,8 +88,8 @@ impl ChangingPoints {
         let own = piece.first as i64..(piece.first as usize + count) as i64;
         let own: Vec<i64> = own.collect();
         file.write_rows(&self.connectivity, first, &own)?;
-        // Each step has one offset more than cells: a rank writes the ends of its cells, rank 0 also the
-        // start.
+        // A step with n cells has n + 1 offsets: each rank writes the ends of its cells, and rank 0 also
+        // writes the start.
         file.resize(&mut self.offsets, end + steps + 1)?;
         let begin = piece.first + u64::from(!root);
         let ends: Vec<i64> = (begin..piece.first + count as u64 + 1)
@@ -103,7 +103,7 @@ impl ChangingPoints {
         Ok(())
     }
 
-    /// Copy the first `rows` points and `steps` steps of another file.
+    /// Copy the first `rows` points, which belong to `steps` steps, from another file.
     pub fn copy(
         &mut self,
         old: &mut CollectiveFile<'_>,
@@ -131,7 +131,8 @@ impl ChangingPoints {
     }
 }
 
-/// Copy the first rows of the dataset of the same path in another file; each rank copies a share.
+/// Copy the first rows of the dataset with the same path in another file. Each rank copies a share of the
+/// rows.
 pub fn copy<T: H5Type + bytemuck::Pod>(
     old: &mut CollectiveFile<'_>,
     file: &mut CollectiveFile<'_>,

@@ -23,7 +23,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 /// Name of the temporary file.
 const PART: &str = "checkpoint.part";
 
-/// Version of the layout.
+/// Version of the file layout.
 const VERSION: i64 = 8;
 
 /// Test whether a path is in use; a link to a missing or unreadable file counts.
@@ -31,10 +31,10 @@ pub fn is_taken(path: &Path) -> bool {
     !matches!(path.symlink_metadata(), Err(error) if error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// The contents of a checkpoint without the state of the points.
+/// Contents of a checkpoint, except the state of the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
-    /// Number of the step.
+    /// Number of the time step.
     pub number: u64,
     /// Time step, s.
     pub step: f64,
@@ -44,34 +44,35 @@ pub struct Header {
     pub points: u64,
     /// Hash of the points.
     pub fingerprint: u64,
-    /// Outputs in the main result.
+    /// Number of outputs in the main result.
     pub outputs: u64,
     /// The further results.
     pub further: Vec<FurtherResult>,
-    /// Rows in the history.
+    /// Number of rows in the history.
     pub rows: u64,
-    /// Reference values of the history: energy at the start, J, and number of intact bonds before it.
+    /// Reference values of the history: energy at the start (J), and number of intact bonds before the start.
     pub start: (f64, u64),
     /// The deck with all defaults.
     pub deck: String,
 }
 
-/// What a checkpoint knows of a further result.
+/// State of a further result in a checkpoint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FurtherResult {
-    /// Name of its output.
+    /// Name of the further result.
     pub name: String,
-    /// Outputs in the file.
+    /// Number of outputs in the file of the result.
     pub outputs: u64,
-    /// The state has a column of the bonds that have broken since its last output, after all other columns.
+    /// The state has a column with the bonds broken since the last output of this result. The columns of all
+    /// further results follow the other columns.
     pub counts_newly_broken: bool,
 }
 
-/// Attribute with the names of the further results, one per line; absent without them. Two numbers of each follow the other
-/// `numbers`.
+/// Attribute with the names of the further results, one per line; absent without further results. The
+/// attribute `numbers` ends with two numbers for each further result.
 const FURTHER: &str = "further_outputs";
 
-/// The datasets of the state of the grids; absent if empty.
+/// Datasets with the state of the refined grids; absent if empty.
 const GRIDS: [&str; 2] = ["/refined", "/parted"];
 
 /// The two checkpoints of a folder.
@@ -82,7 +83,7 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// The checkpoints of a new run; it replaces existing files.
+    /// Create the checkpoints of a new run, which replaces existing files.
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -90,7 +91,7 @@ impl Checkpoints {
         }
     }
 
-    /// The paths of the two files in a folder.
+    /// Return the paths of the two files in a folder.
     pub fn paths(folder: &Path) -> impl Iterator<Item = PathBuf> {
         let folder = folder.to_owned();
         NAMES.into_iter().map(move |name| folder.join(name))
@@ -149,13 +150,14 @@ impl Checkpoints {
     /// Collective.
     ///
     /// # Errors
-    /// If there is none, or one is unreadable: it may be the newest, which the next checkpoint would replace.
+    /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint,
+    /// which the next checkpoint would replace.
     pub fn open(
         comm: &dyn Communicator,
         folder: &Path,
         warn: &mut dyn FnMut(String),
     ) -> Result<(Self, PathBuf)> {
-        // Only rank 0 reads the folder: on other ranks, the file system may be out of date.
+        // Only rank 0 reads the folder, because the file system may be out of date on other ranks.
         let slots = match comm.rank() {
             0 => newest_first(folder),
             _ => Ok(Vec::new()),
@@ -180,7 +182,7 @@ impl Checkpoints {
     }
 }
 
-/// The indices of existing checkpoints in the order to try them.
+/// Return the indices of existing checkpoints, in the order in which to try the files.
 fn newest_first(folder: &Path) -> Result<Vec<u8>> {
     let mut found: Vec<(Option<u64>, u8)> = Vec::new();
     for (slot, name) in (0..).zip(NAMES) {
@@ -189,7 +191,8 @@ fn newest_first(folder: &Path) -> Result<Vec<u8>> {
             found.push((seal::number(&path)?, slot));
         }
     }
-    // An unsealed file may have been the newest, so try it first to warn of it.
+    // A file without a seal may have been the newest checkpoint. Try such a file first, so that a warning is
+    // printed.
     found.sort_by_key(|(number, _)| (number.is_some(), std::cmp::Reverse(*number)));
     Ok(found.into_iter().map(|(_, slot)| slot).collect())
 }
@@ -302,7 +305,7 @@ pub fn read_saved(comm: &dyn Communicator, path: &Path, order: &IdOrder) -> Resu
     })
 }
 
-/// Path of the dataset of a column of the state.
+/// Return the path of the dataset of a column of the state.
 fn column(k: usize) -> String {
     format!("/column_{k}")
 }
@@ -363,7 +366,7 @@ fn write_file<const D: usize>(
         }
     }
     let points = Rows::Fixed(header.points);
-    // Column by column, to limit the buffer memory.
+    // Write column by column to limit the buffer memory.
     for (k, values) in simulation.saved_columns(order).enumerate() {
         let dataset = file.create_dataset::<f64>(&column(k), points, None)?;
         file.write_rows(&dataset, order.first(), &values)?;

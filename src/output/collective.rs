@@ -44,10 +44,9 @@ pub struct CollectiveFile<'a> {
     comm: &'a dyn Communicator,
     no_collective_cause: u32,
     usable: bool,
-    /// An upper bound of the file's size in bytes, as the library knows its own only until the
-    /// first write.
+    /// Upper bound on the file's size, bytes. HDF5 reports the file's size only until the first write.
     size: u64,
-    /// `size` at the last fsync.
+    /// Value of `size` at the last fsync.
     synced: u64,
     /// Reserved disk space, bytes; rank 0 holds the reservation.
     reserved: u64,
@@ -89,7 +88,7 @@ impl<'a> CollectiveFile<'a> {
     /// HDF5 1.10 deadlocks otherwise.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and if it is not writable.
+    /// As [`open`](Self::open), and if the file is not writable.
     pub fn open_to_append(path: &Path, comm: &'a dyn Communicator) -> Result<Self> {
         let raw = comm.raw();
         Self::begin(path, comm, true, || access::open_to_append(path, raw))
@@ -128,12 +127,12 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// The ranks that write the file.
+    /// Return the communicator of the ranks that write the file.
     pub fn communicator(&self) -> &'a dyn Communicator {
         self.comm
     }
 
-    /// The path of the file.
+    /// Return the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -141,7 +140,7 @@ impl<'a> CollectiveFile<'a> {
     /// Rename the open file; an existing file of that name is replaced.
     ///
     /// # Errors
-    /// If it cannot be renamed.
+    /// If the file cannot be renamed.
     pub fn rename(&mut self, path: &Path) -> Result<()> {
         let renamed = match self.comm.rank() {
             0 => std::fs::rename(&self.path, path)
@@ -153,8 +152,8 @@ impl<'a> CollectiveFile<'a> {
         Ok(())
     }
 
-    /// Causes of non-collective writes, as HDF5's `H5D_MPIO_…` bits over all ranks and writes; 0 if all were
-    /// collective or the file is serial.
+    /// Return the causes of non-collective writes, as HDF5's `H5D_MPIO_…` bits over all ranks and writes. 0
+    /// means that all writes were collective or the file is serial.
     pub fn no_collective_cause(&self) -> u32 {
         self.no_collective_cause
     }
@@ -273,7 +272,7 @@ impl<'a> CollectiveFile<'a> {
     /// Read a text attribute of a group (`/` for the root).
     ///
     /// # Errors
-    /// If it is missing or not a text.
+    /// If the attribute is missing or not a text.
     pub fn text_attribute(&mut self, group: &str, name: &str) -> Result<String> {
         self.collectively(
             &format!("cannot read the attribute {name} of {group}"),
@@ -287,7 +286,7 @@ impl<'a> CollectiveFile<'a> {
     /// Read an attribute of integers of a group (`/` for the root).
     ///
     /// # Errors
-    /// If it is missing or has another type.
+    /// If the attribute is missing or has another type.
     pub fn integers_attribute(&mut self, group: &str, name: &str) -> Result<Vec<i64>> {
         self.collectively(
             &format!("cannot read the attribute {name} of {group}"),
@@ -295,7 +294,7 @@ impl<'a> CollectiveFile<'a> {
         )
     }
 
-    /// Write this rank's rows from `first_row` on, in one collective transfer; `values` is row-major and may
+    /// Write this rank's rows from `first_row` on, in one collective transfer. `values` is row-major and may
     /// be empty.
     ///
     /// # Errors
@@ -342,7 +341,7 @@ impl<'a> CollectiveFile<'a> {
     /// # Errors
     /// If the disk is full or cannot be written.
     pub fn sync(&mut self) -> Result<()> {
-        // With MPI, HDF5's flush calls MPI_File_sync.
+        // With MPI, HDF5's flush calls MPI_File_sync, which includes the fsync.
         self.flush_all()?;
         if self.comm.raw().is_none() {
             let file = std::fs::File::open(&self.path);
@@ -357,7 +356,7 @@ impl<'a> CollectiveFile<'a> {
     fn flush_all(&mut self) -> Result<()> {
         self.reserve()?;
         self.collectively("cannot write out the file", |file| file.inner.flush())?;
-        // HDF5 truncates the file to its length here, which frees reserved space.
+        // HDF5's flush truncates the file to its length, which frees reserved space.
         self.reserved = 0;
         if let Some(reservation) = &mut self.reservation {
             reservation.truncated();
@@ -379,7 +378,7 @@ impl<'a> CollectiveFile<'a> {
         })
     }
 
-    /// Reserve the space of all created and extended objects, before the ranks write to it.
+    /// Reserve disk space for all created and extended objects. Call before the ranks write.
     fn reserve(&mut self) -> Result<()> {
         if self.comm.raw().is_none() || !self.usable || self.size <= self.reserved {
             return Ok(());
@@ -395,7 +394,7 @@ impl<'a> CollectiveFile<'a> {
         agreed
     }
 
-    /// Run one operation on every rank and agree on the result.
+    /// Run one operation on every rank, and agree on success or the error.
     fn collectively<T>(
         &mut self,
         doing: &str,

@@ -1,47 +1,47 @@
 //! Comparison of two results: the largest difference of each field and each column of the history.
 //!
-//! Outputs and rows are matched by time, points by id. Values are read in blocks of points, so memory depends
-//! neither on the number of points nor on that of outputs; only the history is read as a whole.
+//! Outputs and history rows are matched by time, points by id. Values are read in blocks of points, so the
+//! memory does not depend on the numbers of points and outputs. Only the history is read as a whole.
 
 use super::read::{ResultReader, StoredColumn};
 use crate::error::{Error, Result};
 use std::cmp::Ordering;
 
-/// Points read at once.
+/// Number of points that are read at once.
 const BLOCK: usize = 1 << 16;
 
-/// Largest difference of matched times, relative to the interval of the outputs or rows.
+/// Largest difference of matched times, as a fraction of the interval of outputs or rows.
 const TIME_TOLERANCE: f64 = 1e-6;
 
-/// The same relative to the last time: the round-off of a sum of many steps.
+/// Largest difference of matched times, as a fraction of the last time: round-off of a sum over many steps.
 const ROUND_OFF: f64 = 1e-13;
 
 /// Name of the reference positions among the fields.
 const POSITION: &str = "position";
 
-/// The field by which points are matched.
+/// Name of the field by which points are matched.
 const ID: &str = "id";
 
-/// The column by which rows are matched.
+/// Name of the column by which rows are matched.
 const TIME: &str = "time";
 
-/// Where two results differ most in a quantity.
+/// Location of the largest difference of a quantity between two results.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Time in the first result, s.
     pub time: f64,
-    /// The component of a field, 0 for others.
+    /// Index of the component of a field; 0 for other quantities.
     pub component: usize,
-    /// The point; of a column of the history there is none.
+    /// Point of a field; `None` for a column of the history.
     pub point: Option<PointPlace>,
 }
 
 /// A point of the first result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointPlace {
-    /// Its id.
+    /// Id of the point.
     pub id: u64,
-    /// Its reference position, m.
+    /// Reference position of the point, m.
     pub position: [f64; 3],
 }
 
@@ -50,11 +50,11 @@ pub struct PointPlace {
 pub struct Difference {
     /// Name of the field or column.
     pub name: String,
-    /// Its unit; empty if dimensionless.
+    /// Unit of the quantity; empty if dimensionless.
     pub unit: String,
-    /// Names of its components; none for a scalar.
+    /// Names of the components; empty for a scalar.
     pub components: &'static [&'static str],
-    /// Largest difference; infinite where one of two numbers is not finite.
+    /// Largest absolute difference; infinite if one of two numbers is not finite.
     pub largest: f64,
     /// Largest finite absolute value in the first result.
     pub scale: f64,
@@ -62,7 +62,7 @@ pub struct Difference {
     pub values: u64,
     /// Number of values that are not equal to the bit. NaN equals NaN.
     pub unequal: u64,
-    /// Place of the largest difference; `None` if all values are equal.
+    /// Location of the largest difference; `None` if all values are equal.
     pub place: Option<Place>,
 }
 
@@ -80,8 +80,8 @@ impl Difference {
         }
     }
 
-    /// The largest difference is at most `tolerance` times the largest value of the first result. With a
-    /// tolerance of 0, all values are equal to the bit.
+    /// Test whether the largest difference is at most `tolerance` times the largest value of the first
+    /// result. With a tolerance of 0, all values must be equal to the bit.
     pub fn is_within(&self, tolerance: f64) -> bool {
         self.unequal == 0
             || tolerance > 0.0
@@ -108,7 +108,7 @@ impl Difference {
     }
 }
 
-/// What two results have in common, and what not.
+/// Differences of the common parts of two results, and names of the other parts.
 #[derive(Debug, Clone, Default)]
 pub struct Comparison {
     /// Number of pairs of outputs.
@@ -123,9 +123,9 @@ pub struct Comparison {
     pub fields: Vec<Difference>,
     /// Fields that only the first or only the second result has, or has in another unit or shape.
     pub single_fields: [Vec<String>; 2],
-    /// Number of pairs of rows of the history.
+    /// Number of pairs of history rows.
     pub rows: usize,
-    /// Number of rows that only the first or only the second result has.
+    /// Number of history rows that only the first or only the second result has.
     pub single_rows: [usize; 2],
     /// The common columns of the history.
     pub columns: Vec<Difference>,
@@ -134,7 +134,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Both results have the same outputs, points, fields, rows and columns.
+    /// Test whether both results have the same outputs, points, fields, rows and columns.
     pub fn is_complete(&self) -> bool {
         let names = self.single_fields.iter().chain(&self.single_columns);
         self.single_outputs.iter().all(Vec::is_empty)
@@ -144,8 +144,8 @@ impl Comparison {
     }
 }
 
-/// Compare two results. `progress` is called after each pair of outputs with its number, the number of pairs and
-/// its time.
+/// Compare two results. After each pair of outputs, `progress` is called with the number of the pair, the
+/// number of all pairs and the time (s).
 ///
 /// # Errors
 /// If a file is damaged or its points are not in the order of their ids.
@@ -167,7 +167,7 @@ pub fn compare(
             indices: [a, b],
             time: times[0][a],
         };
-        // Static values are compared once.
+        // Compare static fields only at the first pair of outputs.
         let compared: Vec<usize> = (0..fields.len())
             .filter(|k| number == 0 || fields[*k] || !unchanging)
             .collect();
@@ -178,7 +178,7 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// List the common fields in `comparison`; return for each whether it changes with time.
+/// Add the common fields to `comparison`. Return for each field whether it changes with time.
 fn common_fields(
     first: &ResultReader,
     second: &ResultReader,
@@ -250,7 +250,8 @@ impl Outputs<'_> {
         Ok(())
     }
 
-    /// Compare a field at the pairs of a block, whose first points are `start`.
+    /// Compare a field at the point pairs of a block. `start` is the index of the block's first point in each
+    /// output.
     fn compare_block(
         &self,
         ids: &[u64],
@@ -296,15 +297,16 @@ impl Outputs<'_> {
     }
 }
 
-/// The points of a block of both results: pairs with the same id, as indices into the block, and the number of
-/// points that were looked at.
+/// Points of a block of both results: pairs with the same id, as indices into the block, and numbers of
+/// points that the block uses up.
 struct Block {
     pairs: Vec<[usize; 2]>,
     used: [usize; 2],
 }
 
 impl Block {
-    /// Match ascending ids. The first block to end ends both, unless it is the last one of its result.
+    /// Match two ascending lists of ids. Stop at the end of a list, unless the list is the last one of its
+    /// result.
     fn of(ids: &[Vec<u64>; 2], last: [bool; 2]) -> Self {
         let (mut pairs, mut used) = (Vec::new(), [0; 2]);
         loop {
@@ -331,7 +333,7 @@ struct Matches {
 }
 
 impl Matches {
-    /// Match each time of the first list with the nearest unmatched one of the second, within
+    /// Match each time of the first list with the nearest unmatched time of the second list, within
     /// [`TIME_TOLERANCE`].
     fn of(first: &[f64], second: &[f64]) -> Self {
         let end = first.iter().fold(0.0_f64, |end, time| end.max(time.abs()));
@@ -362,7 +364,7 @@ impl Matches {
         Self { pairs }
     }
 
-    /// The times that are in no pair.
+    /// Return the times of both lists that are in no pair.
     fn single(&self, times: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
         [0, 1].map(|side| {
             let mut matched = self.pairs.iter().map(|pair| pair[side]).peekable();
@@ -421,7 +423,7 @@ mod tests {
         let block = Block::of(&ids(&[1, 3, 4, 9], &[1, 2, 4, 5]), [true, true]);
         assert_eq!(block.pairs, [[0, 0], [2, 2]]);
         assert_eq!(block.used, [4, 4]);
-        // The second result has further blocks: 9 may be in one of them.
+        // The second result has further blocks, and 9 may be in one of them.
         let block = Block::of(&ids(&[1, 9], &[1, 2, 4]), [true, false]);
         assert_eq!((block.pairs.len(), block.used), (1, [1, 3]));
         let block = Block::of(&ids(&[], &[7, 8]), [true, true]);
@@ -436,7 +438,7 @@ mod tests {
         assert_eq!(matches.single(&times), [vec![1.0, 2.0], vec![1.1]]);
         assert_eq!(Matches::of(&[], &times[1]).pairs.len(), 0);
         assert_eq!(Matches::of(&times[0], &[]).pairs.len(), 0);
-        // The nearest time is taken, not the first one in reach.
+        // The nearest time is matched, not the first time within the tolerance.
         let close = [1.0, 1.0 + 5e-7, 2.0];
         assert_eq!(Matches::of(&[0.0, 1.0 + 6e-7], &close).pairs, [[1, 1]]);
         assert_eq!(Matches::of(&[0.0, 1.0], &[0.0, 1.0 + 2e-6]).pairs, [[0, 0]]);

@@ -15,9 +15,9 @@ const CHUNK_ENTRY_BYTES: u64 = 128;
 /// The number of rows of a dataset.
 #[derive(Debug, Clone, Copy)]
 pub enum Rows {
-    /// A fixed number.
+    /// A fixed number of rows.
     Fixed(u64),
-    /// 0 at first; [`CollectiveFile::extend`] appends.
+    /// No rows at first; [`CollectiveFile::extend`] appends rows.
     Extensible {
         /// Usual number of rows per append; sets the chunk size.
         per_append: u64,
@@ -33,17 +33,17 @@ pub struct Dataset {
     pub(super) columns: Option<usize>,
     pub(super) rows: u64,
     row_bytes: u64,
-    /// 0 if not extensible.
+    /// Rows per chunk; 0 if not extensible.
     rows_per_chunk: u64,
 }
 
 impl Dataset {
-    /// Current number of rows.
+    /// Return the current number of rows.
     pub fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// Its path in the file.
+    /// Return the path of the dataset in the file.
     pub fn path(&self) -> &str {
         &self.path
     }
@@ -54,7 +54,7 @@ impl Dataset {
         rows.div_ceil(chunk) < self.rows.div_ceil(chunk)
     }
 
-    /// Number of columns.
+    /// Return the number of columns.
     pub fn columns(&self) -> usize {
         self.columns.unwrap_or(1)
     }
@@ -75,7 +75,7 @@ impl Dataset {
             Rows::Fixed(rows) => (rows, 0),
             Rows::Extensible { per_append } => (0, chunk_rows(per_append, row_bytes)),
         };
-        // Early, so the file size is known before the first write.
+        // Allocate early, so that the file size is known before the first write.
         let mut builder = file
             .new_dataset_builder()
             .alloc_time(Some(AllocTime::Early));
@@ -118,7 +118,7 @@ impl Dataset {
         })
     }
 
-    /// Size of `rows` rows on disk, bytes.
+    /// Return the size of `rows` rows on disk, bytes.
     pub(super) fn bytes(&self, rows: u64) -> u64 {
         match self.rows_per_chunk {
             0 => rows * self.row_bytes,
@@ -127,7 +127,7 @@ impl Dataset {
     }
 }
 
-/// Rows per chunk: one append, or an even fraction of it, of 4 kB to 4 MB.
+/// Return the rows per chunk: one append, or an even fraction of an append, of 4 kB to 4 MB.
 fn chunk_rows(per_append: u64, row_bytes: u64) -> u64 {
     let (min, max) = ((4096 / row_bytes).max(1), (CHUNK_BYTES / row_bytes).max(1));
     let parts = per_append.div_ceil(max).max(1);

@@ -7,15 +7,15 @@ use super::read::Number;
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
-/// The group of the fields.
+/// Path of the group of the fields.
 pub(super) const POINT_DATA: &str = "/VTKHDF/PointData";
 
 /// Name, unit and shape of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FieldDescription {
-    /// Its name.
+    /// Name of the field.
     pub name: &'static str,
-    /// Its unit, such as `m/s`; empty if dimensionless.
+    /// Unit, such as `m/s`; empty if dimensionless.
     pub unit: &'static str,
     /// Components per point:
     ///
@@ -43,7 +43,7 @@ pub enum FieldData<'a> {
 }
 
 impl FieldData<'_> {
-    /// The number type.
+    /// Return the number type.
     pub(super) fn number(&self) -> Number {
         match self {
             FieldData::F64(_) => Number::F64,
@@ -54,7 +54,7 @@ impl FieldData<'_> {
         }
     }
 
-    /// Empty data of the same number type.
+    /// Return empty data of the same number type.
     pub(super) fn empty(&self) -> FieldData<'static> {
         match self {
             FieldData::F64(_) => FieldData::F64(&[]),
@@ -132,7 +132,7 @@ pub(super) fn write_field(
     }
 }
 
-/// Pad plane vectors with a third component, as viewers require vectors of three.
+/// Pad plane vectors with a third component, because viewers require vectors of three components.
 fn padded<T: Copy + Default>(values: &[T], plane: bool) -> Cow<'_, [T]> {
     if !plane {
         return Cow::Borrowed(values);

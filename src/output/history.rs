@@ -12,14 +12,14 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Path of the table; it has one row per sample.
+/// Path of the table, which has one row per sample.
 pub(super) const HISTORY: &str = "/history";
 
 /// Attribute with the names of the columns.
 pub(super) const COLUMNS: &str = "columns";
 /// Attribute with the units of the columns.
 pub(super) const UNITS: &str = "units";
-/// Separator in these attributes.
+/// Separator of names and units in these attributes.
 pub(super) const SEPARATOR: &str = ",";
 
 /// Description of a history.
@@ -29,7 +29,7 @@ pub struct HistoryContents<'a> {
     pub columns: &'a [(String, &'static str)],
     /// Path of the CSV file.
     pub csv: &'a Path,
-    /// Expected number of rows; there may be more.
+    /// Expected number of rows; more rows are allowed.
     pub rows: u64,
 }
 
@@ -37,12 +37,12 @@ pub struct HistoryContents<'a> {
 pub struct History {
     table: Dataset,
     csv: PathBuf,
-    /// The CSV file; on rank 0 only.
+    /// The open CSV file, on rank 0 only.
     writer: Option<File>,
 }
 
 impl History {
-    /// Create the table `/history` and the CSV file, which replaces an existing one. Collective.
+    /// Create the table `/history` and the CSV file, which replaces an existing file. Collective.
     ///
     /// The header of the CSV file is like `time [s],step,kinetic_energy [J]`.
     ///
@@ -62,9 +62,9 @@ impl History {
         Self::with(file, table, csv, || create_csv(csv, &header(columns)))
     }
 
-    /// Continue the history of a file, whose rows are `past`. Collective.
+    /// Continue the history of a file whose table holds the rows `past`. Collective.
     ///
-    /// The CSV file is rewritten to a temporary file, which then replaces it by a rename.
+    /// The rows are written to a temporary file, which then replaces the CSV file by a rename.
     ///
     /// # Errors
     /// If the table is missing or a file cannot be written.
@@ -84,7 +84,7 @@ impl History {
         Self::with(file, table, csv, rewritten)
     }
 
-    /// Create the CSV file on rank 0 with `begin`.
+    /// Open the CSV file with `begin` on rank 0, and return the history.
     fn with(
         file: &CollectiveFile<'_>,
         table: Dataset,
@@ -117,12 +117,12 @@ impl History {
             .collect())
     }
 
-    /// Number of rows written.
+    /// Return the number of rows written.
     pub fn rows(&self) -> u64 {
         self.table.rows()
     }
 
-    /// Append rows to both files; all ranks pass the same rows. Collective.
+    /// Append rows to the table and the CSV file; all ranks pass the same rows. Collective.
     ///
     /// # Errors
     /// If the length of a row differs from the number of columns, or the disk is full.
@@ -190,7 +190,7 @@ fn lines(rows: &[Vec<f64>]) -> String {
     text
 }
 
-/// Format the shortest text that parses to the same number; integers without a decimal point.
+/// Format a number as the shortest text that parses to the same number; integers have no decimal point.
 fn shortest(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() < 1e15 {
         format!("{value}")

@@ -30,7 +30,7 @@ pub use transfer::initialise;
 pub use vtkhdf::{Contents, Piece, ResultFile};
 pub use xdmf::SideCar;
 
-/// Version of the HDF5 library.
+/// Return the version of the HDF5 library.
 pub fn library() -> String {
     let (major, minor, micro) = hdf5_metno::library_version();
     format!("{major}.{minor}.{micro}")

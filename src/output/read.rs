@@ -30,20 +30,20 @@ pub enum Number {
 /// A field of a result file, as stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredField {
-    /// Its name.
+    /// Name of the field.
     pub name: String,
-    /// Its unit; empty if dimensionless.
+    /// Unit of the field; empty if dimensionless.
     pub unit: String,
     /// Components per point: 1, 3, 6 or 9.
     pub components: usize,
-    /// Its number type.
+    /// Number type of the stored values.
     pub number: Number,
-    /// It changes with time.
+    /// The field changes with time.
     pub dynamic: bool,
 }
 
 impl StoredField {
-    /// Names of the components in their order; none for a scalar.
+    /// Return the names of the components in storage order; empty for a scalar.
     pub fn component_names(&self) -> &'static [&'static str] {
         component::names(self.components)
     }
@@ -52,9 +52,9 @@ impl StoredField {
 /// A column of the history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredColumn {
-    /// Its name.
+    /// Name of the column.
     pub name: String,
-    /// Its unit; empty if dimensionless.
+    /// Unit of the column; empty if dimensionless.
     pub unit: String,
     /// One number per row.
     pub values: Vec<f64>,
@@ -116,7 +116,8 @@ impl ResultReader {
                 return problem(text);
             }
         };
-        // After a loss of power, any of the three lengths may be out of date; the smallest is valid.
+        // After a loss of power, the lengths of these tables can differ. Steps up to the smallest length are
+        // valid.
         let mut complete = steps;
         for name in ["Values", "Step"] {
             let rows = match file.dataset(&format!("{STEPS}/{name}")) {
@@ -147,18 +148,18 @@ impl ResultReader {
         })
     }
 
-    /// Number of points at one of the [times](Self::times).
+    /// Return the number of points at one of the [times](Self::times).
     pub fn points(&self, time_index: usize) -> usize {
         self.counts[time_index.min(self.counts.len() - 1)]
     }
 
-    /// Each step has its own points.
+    /// Test whether each step has its own points.
     pub fn is_changing(&self) -> bool {
         let id = self.file.dataset(&format!("{POINT_DATA}/id"));
         id.is_ok_and(|dataset| dataset.is_resizable())
     }
 
-    /// Times of the complete steps, s.
+    /// Return the times of the complete steps, s.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -166,7 +167,7 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Values"))
     }
 
-    /// The numbers of the complete steps.
+    /// Return the numbers of the complete steps.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -174,14 +175,15 @@ impl ResultReader {
         self.table(&format!("{STEPS}/Step"))
     }
 
-    /// The rows of some points at a step, in data whose steps start at `offsets`.
+    /// Return the rows of some points at a step. `offsets` is the path of the table with the first row of
+    /// each step.
     fn rows(&self, offsets: &str, time_index: usize, points: Range<usize>) -> Result<Range<usize>> {
         let offsets: Vec<u64> = self.table(offsets)?;
         let first = offsets.get(time_index).map_or(0, |offset| *offset as usize);
         Ok(first + points.start..first + points.end)
     }
 
-    /// Reference positions at one of the [times](Self::times), m.
+    /// Return the reference positions at one of the [times](Self::times), m.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -189,7 +191,8 @@ impl ResultReader {
         self.positions_of(time_index, 0..self.points(time_index))
     }
 
-    /// As [`positions`](Self::positions), of consecutive points.
+    /// Return the reference positions of consecutive points, as [`positions`](Self::positions) does for all
+    /// points.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -204,7 +207,8 @@ impl ResultReader {
         Ok(values.as_chunks::<3>().0.to_vec())
     }
 
-    /// Global ids of the points at one of the [times](Self::times), in the order of all point data.
+    /// Return the global ids of the points at one of the [times](Self::times), in the order of all point
+    /// data.
     ///
     /// # Errors
     /// If the file is damaged or has no ids.
@@ -212,7 +216,7 @@ impl ResultReader {
         self.ids_of(time_index, 0..self.points(time_index))
     }
 
-    /// As [`ids`](Self::ids), of consecutive points.
+    /// Return the ids of consecutive points, as [`ids`](Self::ids) does for all points.
     ///
     /// # Errors
     /// If the file is damaged or has no ids.
@@ -226,7 +230,7 @@ impl ResultReader {
         read.map_err(|error| self.damaged(&path, &error))
     }
 
-    /// The fields, by name.
+    /// Return the fields in the order of their names.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -242,8 +246,8 @@ impl ResultReader {
             .collect()
     }
 
-    /// Values of a field at one of the [times](Self::times), [points, components] row-major; integers are
-    /// converted.
+    /// Return the values of a field at one of the [times](Self::times), [points, components] row-major.
+    /// Integers are converted to floats.
     ///
     /// # Errors
     /// If the field or time is missing, or the file is damaged.
@@ -251,7 +255,7 @@ impl ResultReader {
         self.field_of(name, time_index, 0..self.points(time_index))
     }
 
-    /// As [`field`](Self::field), of consecutive points.
+    /// Return the values of consecutive points, as [`field`](Self::field) does for all points.
     ///
     /// # Errors
     /// If the field or time is missing, or the file is damaged.
@@ -290,7 +294,7 @@ impl ResultReader {
         read.map_err(|error| self.damaged(&path, &error))
     }
 
-    /// The columns of the history in their order; empty without a history.
+    /// Return the columns of the history in the order of the file; empty without a history.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -319,7 +323,7 @@ impl ResultReader {
         read().map_err(|error| self.damaged(HISTORY, &error))
     }
 
-    /// The attributes of the file (deck, version, command line, …), by name.
+    /// Return the attributes of the file (deck, version, command line, …), in the order of their names.
     ///
     /// # Errors
     /// If the file is damaged.
@@ -398,7 +402,7 @@ impl ResultReader {
     }
 }
 
-/// The error for a file that the system cannot read.
+/// Return the error for a file that the system cannot read.
 fn cannot_read(path: &Path, cause: &std::io::Error) -> Error {
     let path = path.display();
     Error::run(match cause.kind() {

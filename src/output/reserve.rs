@@ -79,7 +79,7 @@ fn allocate(file: &File, from: u64, length: u64) -> io::Result<()> {
     }
 }
 
-/// Other systems have no preallocation that keeps the file's length.
+/// Return an error: other systems have no preallocation that keeps the file's length.
 #[cfg(not(target_os = "linux"))]
 fn allocate(_: &File, _: u64, _: u64) -> io::Result<()> {
     Err(io::Error::from_raw_os_error(libc::EOPNOTSUPP))

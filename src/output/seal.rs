@@ -10,10 +10,10 @@ use std::path::Path;
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
 
-/// Marks a seal; also guards against other trailing bytes.
+/// First word of a seal, which distinguishes it from other trailing bytes.
 const MAGIC: u64 = u64::from_le_bytes(*b"FISSSEAL");
 
-/// Magic, length of the sealed bytes, their checksum, and the caller's number.
+/// Size of a seal, bytes: magic, number of sealed bytes, checksum, and the caller's number.
 const SEAL_BYTES: u64 = 32;
 
 /// Size of the read buffer, bytes.
@@ -39,7 +39,7 @@ pub fn seal(comm: &dyn Communicator, path: &Path, number: u64) -> Result<()> {
     agree(comm, appended)
 }
 
-/// Read the number of a file's seal without a check of the file; `None` without a seal.
+/// Read the number of a file's seal without a check of the sealed bytes; `None` without a seal.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -67,7 +67,7 @@ pub fn is_intact(comm: &dyn Communicator, path: &Path) -> Result<bool> {
 struct Seal {
     /// Number of sealed bytes.
     length: u64,
-    /// Their checksum, mixed with the number.
+    /// Checksum of the sealed bytes, mixed with the number.
     sum: u64,
     number: u64,
 }
@@ -91,7 +91,7 @@ fn read_seal(path: &Path) -> std::io::Result<Option<Seal>> {
     Ok((magic == MAGIC && length == sealed).then_some(seal))
 }
 
-/// Read words on rank 0 and broadcast them: on other ranks, the file system may be out of date.
+/// Read words on rank 0 and broadcast the words, because the file system may be out of date on other ranks.
 /// Collective.
 fn from_root<const N: usize>(
     comm: &dyn Communicator,
@@ -122,7 +122,8 @@ fn checksum(comm: &dyn Communicator, path: &Path, length: u64) -> Result<u64> {
     Ok(crate::comm::total(comm, own))
 }
 
-/// Sum the words `first` to `end` − 1; the last word of the file is padded with zeros.
+/// Sum the words `first` to `end` − 1, each mixed with its index. The last word of the file is padded with
+/// zeros.
 fn sum_words(path: &Path, first: u64, end: u64, length: u64) -> std::io::Result<u64> {
     let mut file = File::open(path)?;
     file.seek(SeekFrom::Start(8 * first))?;

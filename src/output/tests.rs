@@ -1,4 +1,4 @@
-//! Results read back as written.
+//! Tests that results read back as written.
 
 use super::access::Creation;
 use super::attribute::Attribute;
@@ -96,7 +96,7 @@ fn what_is_written_reads_back() -> Result<()> {
     let csv = std::fs::read_to_string(path.with_extension("csv")).unwrap();
     assert_eq!(csv, "time [s],a\n0,4.5\n1,4.5\n");
     drop(reader);
-    // A possible state after a loss of power.
+    // After a loss of power, NSteps can exceed the number of stored steps.
     let mut file = CollectiveFile::open_to_append(&path, &comm)?;
     file.set_attribute(STEPS, "NSteps", Attribute::Integer(3))?;
     file.close()?;
@@ -121,8 +121,8 @@ fn what_is_no_result_is_named_so() {
     std::fs::remove_file(&path).unwrap();
 }
 
-/// Stop a result of deck `one` after two steps, retain one, resume it with `deck` and write to four steps
-/// in total, where two were expected. Return true if it was continued in place.
+/// Write two steps of a result of deck `one`, which expects two steps. Resume the result after one step with
+/// `deck`, and write up to four steps. Return true if the file was continued in place.
 fn is_continued_in_place(name: &str, deck: &str) -> Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
 

@@ -14,7 +14,7 @@ unsafe extern "C" {
     fn H5Pget_mpio_no_collective_cause(list: hid_t, local: *mut u32, global: *mut u32) -> i32;
 }
 
-/// HDF5 was initialised before MPI.
+/// True if HDF5 was initialised before MPI.
 static BEFORE_MPI: AtomicBool = AtomicBool::new(false);
 
 /// Initialise HDF5. Every program that opens collective files must call this before MPI starts.
@@ -26,12 +26,12 @@ pub fn initialise() {
     BEFORE_MPI.fetch_or(!comm::mpi::is_running(), Ordering::Relaxed);
 }
 
-/// [`initialise`] was called before MPI started.
+/// Test whether [`initialise`] was called before MPI started.
 pub(super) fn initialised_before_mpi() -> bool {
     BEFORE_MPI.load(Ordering::Relaxed)
 }
 
-/// Transfer properties: independent or collective.
+/// Transfer properties: independent or collective transfers.
 #[derive(Debug)]
 pub(super) struct Transfer {
     list: ManuallyDrop<hdf5::PropertyList>,
@@ -55,7 +55,7 @@ impl Transfer {
         })
     }
 
-    /// Write rows from `first_row` on; `values` are whole rows within the dataset and may be empty. Return
+    /// Write rows from `first_row` on. `values` are whole rows within the dataset and may be empty. Return
     /// the causes of a non-collective transfer.
     pub(super) fn write<T: hdf5::H5Type>(
         &self,
@@ -108,7 +108,7 @@ impl Transfer {
         })
     }
 
-    /// Causes of a non-collective last transfer, over all ranks; 0 if it was collective.
+    /// Return why the last transfer was not collective, over all ranks; 0 if it was collective.
     fn causes(&self) -> hdf5::Result<u32> {
         let (mut local, mut global) = (0, 0);
         if self.collective {
@@ -122,7 +122,7 @@ impl Transfer {
     }
 }
 
-/// Consecutive rows of a dataset, and the matching buffer.
+/// Selection of consecutive rows of a dataset, and of the matching buffer.
 struct Selection {
     memory: hdf5::Dataspace,
     file: hdf5::Dataspace,

@@ -47,8 +47,8 @@ pub struct SideCar {
 }
 
 impl SideCar {
-    /// The side-car `name.xdmf` of a result `name.vtkhdf`; `past` are times (s) and numbers of points of
-    /// existing steps.
+    /// Create the side-car `name.xdmf` of a result `name.vtkhdf`. `past` holds time (s) and number of points
+    /// of each existing step.
     pub fn new(result: &Path, contents: &Contents, past: &[(f64, usize)]) -> Self {
         let stored = |field: &FieldDescription, number, dynamic| StoredField {
             name: field.name.to_owned(),
@@ -86,7 +86,7 @@ impl SideCar {
     /// Add a step at a time (s) with a number of points, and write the side-car if `MIN_INTERVAL` allows.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the side-car cannot be written.
     pub fn add(&mut self, time: f64, points: u64) -> Result<()> {
         self.times.push(time);
         self.points.push(points as usize);
@@ -100,7 +100,7 @@ impl SideCar {
     /// Write the final side-car.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the side-car cannot be written.
     pub fn finish(mut self) -> Result<()> {
         self.write()
     }

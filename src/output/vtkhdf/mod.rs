@@ -9,10 +9,10 @@
 //! /history               table, a row per sample; attributes: columns, units, comma-separated
 //! ```
 //!
-//! With adaptive refinement, each step is a VTK part of its own: the points and static fields of the
-//! steps are concatenated.
+//! With adaptive refinement, each step is a separate VTK part. The points and static fields of all steps are
+//! then concatenated.
 //!
-//! On any number of ranks, a step is one part with points in the order of their ids. Data of a step are
+//! On any number of ranks, a step is one part with points in the order of their ids. The data of a step is
 //! flushed before its row in the tables, so the file of a killed run has all complete steps.
 
 mod resume;
@@ -64,7 +64,7 @@ pub struct Piece {
 /// A result file open for writing. All methods are collective; if one fails on any rank, it fails on
 /// all, and the file is abandoned.
 ///
-/// Space for all expected steps is allocated in advance. Then a new step hardly changes metadata, and a
+/// Space for all expected steps is allocated in advance. A new step then hardly changes metadata, and a
 /// killed run leaves a valid file.
 pub struct ResultFile<'a> {
     file: CollectiveFile<'a>,
@@ -76,7 +76,7 @@ pub struct ResultFile<'a> {
     past: Vec<(f64, usize)>,
     /// Total number of points of all steps.
     rows: u64,
-    /// The datasets of the points, if each step has its own.
+    /// The datasets of the points; `None` if all steps have the same points.
     changing: Option<ChangingPoints>,
     /// Number of steps with allocated space.
     capacity: u64,
@@ -105,7 +105,7 @@ struct Rule {
 /// Description of a result file.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'a> {
-    /// The rows of this rank.
+    /// Range of rows of this rank.
     pub piece: Piece,
     /// Each step has its own points, set by [`ResultFile::set_points`].
     pub changing: bool,
@@ -119,7 +119,7 @@ pub struct Contents<'a> {
     pub metadata: &'a [(&'a str, String)],
     /// Store moving fields as 4-byte floats.
     pub single: bool,
-    /// Expected number of steps; there may be more.
+    /// Expected number of steps; more steps are allowed.
     pub steps: u64,
 }
 
@@ -220,7 +220,8 @@ impl<'a> ResultFile<'a> {
         Ok(result)
     }
 
-    /// Set the points of the next step and their static fields, which are those of [`create`](Self::create).
+    /// Set the points and static fields of the next step. The static fields must be those of
+    /// [`create`](Self::create).
     ///
     /// # Errors
     /// If a field has the wrong length or the disk is full.
@@ -304,22 +305,22 @@ impl<'a> ResultFile<'a> {
         self.file.flush()
     }
 
-    /// Time (s) and number of points of the steps of a resumed file.
+    /// Return time (s) and number of points of the steps of a resumed file.
     pub fn past(&self) -> &[(f64, usize)] {
         &self.past
     }
 
-    /// Number of points of all ranks in the last step.
+    /// Return the number of points of all ranks in the last step.
     pub fn points(&self) -> u64 {
         self.piece.total
     }
 
-    /// The ranks that write the file.
+    /// Return the communicator of the ranks that write the file.
     pub fn communicator(&self) -> &'a dyn Communicator {
         self.file.communicator()
     }
 
-    /// Number of steps written.
+    /// Return the number of steps written.
     pub fn steps(&self) -> u64 {
         self.steps
     }
@@ -347,13 +348,13 @@ impl<'a> ResultFile<'a> {
         Ok(())
     }
 
-    /// Allocate space for a total number of steps, and fill the tables.
+    /// Allocate space for a total number of steps, and fill the tables whose values are known in advance.
     fn allocate_steps(&mut self, steps: u64) -> Result<()> {
         if steps <= self.capacity || self.changing.is_some() {
             return Ok(());
         }
         let file = &mut self.file;
-        // Never shrink a dataset with several ranks, see `close`.
+        // Several ranks must never shrink a dataset, see `close`.
         for (_, dataset) in &mut self.fields {
             let rows = dataset.rows().max(steps * self.piece.total);
             file.resize(dataset, rows)?;
@@ -379,13 +380,13 @@ impl<'a> ResultFile<'a> {
         self.file.flush()
     }
 
-    /// Number of history rows written.
+    /// Return the number of history rows written.
     pub fn history_rows(&self) -> u64 {
         self.history.as_ref().map_or(0, History::rows)
     }
 
-    /// Append rows to the history; all ranks pass the same rows. They are in the CSV file when this
-    /// returns, and flushed to the result file with the next step.
+    /// Append rows to the history; all ranks pass the same rows. On return, the rows are in the CSV file. The
+    /// next step also flushes the rows to the result file.
     ///
     /// # Errors
     /// If there is no history, a row has the wrong length, or the disk is full.
@@ -396,12 +397,13 @@ impl<'a> ResultFile<'a> {
         }
     }
 
-    /// Causes of non-collective writes, as HDF5's bits over all ranks and writes; 0 if all were collective.
+    /// Return the causes of non-collective writes, as HDF5's bits over all ranks and writes; 0 if all were
+    /// collective.
     pub fn no_collective_cause(&self) -> u32 {
         self.file.no_collective_cause()
     }
 
-    /// Close the file. Unused space is freed, unless the run `will_resume`.
+    /// Close the file. Free unused space, unless the run `will_resume`.
     ///
     /// # Errors
     /// If the disk is full or an earlier operation failed.
@@ -415,8 +417,8 @@ impl<'a> ResultFile<'a> {
         let unused = unused.map(|(dataset, rows)| (dataset.path().to_owned(), rows));
         let unused: Vec<_> = unused.collect();
         self.file.close()?;
-        // On one rank: HDF5 1.10 deadlocks when several ranks shrink datasets of an existing file. A
-        // failure, such as a reader's lock, is harmless: the unused rows are never read.
+        // Use one rank: HDF5 1.10 deadlocks when several ranks shrink datasets of an existing file. A
+        // failure, such as a reader's lock, is harmless, because the unused rows are never read.
         if !will_resume && !unused.is_empty() && comm.rank() == 0 {
             let alone = threads::alone();
             let _ = CollectiveFile::open_to_append(&path, &alone).and_then(|mut file| {
@@ -450,7 +452,7 @@ fn growing<T: H5Type>(file: &mut CollectiveFile<'_>, name: &str, steps: u64) -> 
     )
 }
 
-/// The tables of a result: path, columns and rule of the values.
+/// Return the tables of a result: path, columns and rule of the values.
 fn tables_of(contents: &Contents) -> Vec<(String, Option<usize>, Rule)> {
     let rule = |start, stride, counted| Rule {
         start,
@@ -496,7 +498,7 @@ fn write_geometry(
     let dataset = file.create_dataset::<i64>("/VTKHDF/Connectivity", total, None)?;
     let own: Vec<i64> = (first..first + count).collect();
     file.write_rows(&dataset, piece.first, &own)?;
-    // There is one offset more than cells: a rank writes the ends of its cells, rank 0 also the start.
+    // n cells have n + 1 offsets: each rank writes the ends of its cells, and rank 0 also writes the start.
     let dataset =
         file.create_dataset::<i64>("/VTKHDF/Offsets", Rows::Fixed(piece.total + 1), None)?;
     let begin = if root { first } else { first + 1 };

@@ -12,7 +12,8 @@ use super::{Contents, ResultFile, STEPS, Table, append_one, tables_of, truncate}
 use crate::comm::{Communicator, agree, threads, total};
 use crate::error::{Error, Result};
 
-/// Attributes that must match; the others describe the last start of the run.
+/// Attributes that must match for a continuation in place; the other attributes describe the last start of
+/// the run.
 const IDENTITY: [&str; 3] = ["deck", "deck_in_full", "version"];
 
 /// Number of steps and history rows that a resumed result retains.
@@ -27,12 +28,12 @@ struct Retained {
 type KeptHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
-    /// Resume a result after its first steps and history rows; later ones are dropped. Return the retained
-    /// rows.
+    /// Resume a result after its first steps and history rows, and drop later ones. Return the retained
+    /// history rows.
     ///
     /// A file of the same deck and version with space for all expected steps is continued in place. No
-    /// retained row moves, so a kill loses none. Otherwise, or if the file cannot be written to, the retained
-    /// part is copied to a new file, which then replaces the old one.
+    /// retained row moves, so a kill loses no row. Otherwise, or if the file is not writable, the retained
+    /// part is copied to a new file, which then replaces the old file.
     ///
     /// # Errors
     /// If the old file cannot be read, has fewer steps, or other points or fields; if the disk is full.
@@ -109,7 +110,8 @@ impl<'a> ResultFile<'a> {
         Ok((result, rows))
     }
 
-    /// Copy the retained part to a new file, which replaces the old one by a rename; a kill leaves one of them.
+    /// Copy the retained part to a new file, which replaces the old one by a rename. A kill leaves the old or
+    /// the new file.
     fn copied(
         path: &Path,
         comm: &'a dyn Communicator,
@@ -158,7 +160,7 @@ impl<'a> ResultFile<'a> {
         finished
     }
 
-    /// Create a new file with the first steps of an old one, given their times and numbers.
+    /// Create a new file with the first steps of an old file. Times (s) and numbers of these steps are given.
     fn copy(
         old: &mut CollectiveFile<'a>,
         part: &Path,
@@ -190,7 +192,7 @@ impl<'a> ResultFile<'a> {
         result.record_steps(&times, &numbers, &vec![piece.total as i64; times.len()])
     }
 
-    /// Write the tables of the copied steps; `points` is the number of points of each.
+    /// Write the tables of the copied steps. `points` is the number of points of each step.
     fn record_steps(mut self, times: &[f64], numbers: &[u64], points: &[i64]) -> Result<Self> {
         for ((time, number), points) in times.iter().zip(numbers).zip(points) {
             append_one(&mut self.file, &mut self.numbers, *number)?;
@@ -203,7 +205,7 @@ impl<'a> ResultFile<'a> {
         Ok(self)
     }
 
-    /// Copy the first steps of an old file with points per step; return their numbers of points.
+    /// Copy the first steps of an old file with points per step. Return the number of points of each step.
     fn copy_changing(&mut self, old: &mut CollectiveFile<'a>, retained: u64) -> Result<Vec<i64>> {
         let Some(changing) = &mut self.changing else {
             return Ok(Vec::new());
@@ -226,8 +228,8 @@ impl<'a> ResultFile<'a> {
     }
 }
 
-/// Truncate a file to its retained part if it can be continued in place; return false otherwise. For one
-/// rank.
+/// Truncate a file to its retained part if the file can be continued in place; return false otherwise. For
+/// one rank.
 ///
 /// # Errors
 /// If a write fails.
@@ -238,7 +240,7 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
         file.close()?;
         Ok(fits)
     });
-    // The file may be read-only or locked by a reader; then it is copied. The copy finds any damage.
+    // A file that is read-only or locked by a reader is copied instead. The copy reports any damage.
     let opened = match checked {
         Ok(true) => CollectiveFile::open_to_append(path, &alone).ok(),
         _ => None,
@@ -246,7 +248,7 @@ fn prepare(path: &Path, contents: &Contents, retained: Retained) -> Result<bool>
     let Some(mut file) = opened else {
         return Ok(false);
     };
-    // NSteps first: a killed process must not leave it larger than the tables.
+    // Write NSteps first: a killed process must not leave NSteps larger than the tables.
     let steps = Attribute::Integer(retained.steps as i64);
     file.set_attribute(STEPS, "NSteps", steps)?;
     file.flush()?;
@@ -300,7 +302,7 @@ fn has_room(
     Ok(true)
 }
 
-/// The datasets whose lengths count steps or rows, with their target lengths.
+/// Return the datasets whose lengths count steps or rows, with the lengths after truncation.
 fn counted_rows(retained: Retained) -> Vec<(String, u64)> {
     let mut counted = vec![
         (format!("{STEPS}/Values"), retained.steps),
