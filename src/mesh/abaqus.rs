@@ -12,28 +12,28 @@ use super::kind::{Form, Kind};
 use super::{Elements, Group, Members, Mesh, Runs, fault, load, position};
 use crate::error::{Error, Result, excerpt};
 
-/// Files that include one another at most so deep.
+/// Largest depth of files that include one another.
 const DEEPEST: usize = 16;
 
-/// Most included files, for files that include one another several times.
+/// Largest number of included files: files can include one another several times.
 const MOST_INCLUDED: usize = 1000;
 
-/// Most nodes and most elements of all instances.
+/// Largest number of nodes, and of elements, of all instances.
 const LARGEST: usize = u32::MAX as usize;
 
-/// Keywords that make or move nodes or elements by rules.
+/// Keywords that generate or move nodes or elements.
 const GENERATORS: [&str; 8] = [
     "NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY", "SYSTEM", "SUBMODEL",
 ];
 
-/// The type of an element by its name, such as `C3D8R`.
+/// Return the type of an element from its name, such as `C3D8R`.
 fn kind(name: &str) -> Option<Kind> {
     const SOLIDS: [&str; 6] = ["C3D", "AC3D", "DC3D", "DCC3D", "Q3D", "SC"];
     const FACES: [&str; 12] = [
         "CPEG", "CPS", "CPE", "DC2D", "AC2D", "SFM3D", "M3D", "R3D", "STRI", "DS", "S", "F3D",
     ];
     const LINES: [&str; 5] = ["T2D", "T3D", "R2D", "DC1D", "AC1D"];
-    // The family, followed by the number of nodes and letters.
+    // A name is a family, the number of nodes, and a suffix of letters and digits.
     let nodes = |families: &[&str]| {
         families.iter().find_map(|family| {
             let rest = name.strip_prefix(family)?;
@@ -80,7 +80,7 @@ fn kind(name: &str) -> Option<Kind> {
 /// Read a mesh and the files that it includes.
 ///
 /// # Errors
-/// If the lines do not follow the format.
+/// If the lines of the files do not follow the format.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
     let mut reader = Reader::default();
     reader.mesh.ignores_case = true;
@@ -94,36 +94,36 @@ struct Part {
     name: String,
     nodes: Vec<[f64; 3]>,
     elements: Elements,
-    /// Indices of nodes and elements by their numbers.
+    /// Indices of nodes and elements, by the numbers in the file.
     node_indices: FxHashMap<u64, u32>,
     element_indices: FxHashMap<u64, u32>,
     sets: Vec<Set>,
 }
 
-/// What a set consists of.
+/// Kind of the members of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Of {
     Nodes,
     Elements,
 }
 
-/// The lines below one keyword that defines or extends a set.
+/// Data lines of one keyword that defines or extends a set.
 #[derive(Clone)]
 struct Set {
     of: Of,
     name: String,
     instance: Option<String>,
     numbers: Vec<u64>,
-    /// First, last and step.
+    /// Ranges of numbers: first, last and step.
     ranges: Vec<[u64; 3]>,
-    /// Names of other sets.
+    /// Names of other sets, which this set includes.
     names: Vec<String>,
-    /// The set of all nodes of these element sets.
+    /// The members are all nodes of the element sets in `names`.
     is_nodes_of_elements: bool,
     place: Place,
 }
 
-/// A line of a file.
+/// Position in a file, for messages.
 #[derive(Clone, Default)]
 struct Place {
     file: Arc<PathBuf>,
@@ -136,7 +136,7 @@ impl Place {
     }
 }
 
-/// An instance that has been placed in the mesh.
+/// An instance that has been appended to the mesh.
 struct Placed {
     name: String,
     node_indices: FxHashMap<u64, u32>,
@@ -145,14 +145,14 @@ struct Placed {
     first_element: u64,
 }
 
-/// What the data lines below a keyword are.
+/// Meaning of the data lines below a keyword.
 #[derive(Clone, Copy, Default)]
 enum Data {
     #[default]
     Skipped,
-    /// With the index of a set that they belong to.
+    /// Nodes, and the index of the set to which they are added.
     Nodes(Option<usize>),
-    /// As nodes.
+    /// Elements, and the index of the set to which they are added.
     Elements(Kind, Option<usize>),
     Set {
         is_generated: bool,
@@ -161,11 +161,11 @@ enum Data {
     Position,
 }
 
-/// Where the definitions of an instance stand.
+/// Position of an instance in the assembly: a translation, then a rotation.
 struct Instance {
     translation: Vector3<f64>,
     rotation: Rotation3<f64>,
-    /// A point on the axis of rotation.
+    /// Numbers of an element whose nodes continue on the next line.
     pivot: Vector3<f64>,
     lines: usize,
 }
@@ -173,7 +173,7 @@ struct Instance {
 #[derive(Default)]
 struct Reader {
     mesh: Mesh,
-    /// The model itself.
+    /// Nodes, elements and sets outside of parts and instances.
     model: Part,
     parts: FxHashMap<String, Part>,
     /// The part or instance that is being read.
@@ -187,7 +187,7 @@ struct Reader {
     place: Place,
 }
 
-/// Remove repeated numbers when there are more than a limit, and raise the limit.
+/// Remove repeated numbers if there are more than `limit`, and raise the limit.
 fn compact(numbers: &mut Vec<u64>, limit: &mut usize) {
     if numbers.len() > *limit {
         numbers.sort_unstable();
@@ -206,7 +206,7 @@ impl Keyword {
     fn new(line: &str) -> Self {
         let mut entries = line.split(',').map(str::trim);
         let name = entries.next().unwrap_or_default();
-        // `*End Part` may have several blanks.
+        // A name such as `*End  Part` may contain several blanks.
         let name: Vec<&str> = name.split_whitespace().collect();
         let parameter = |entry: &str| {
             let (key, value) = entry.split_once('=').unwrap_or((entry, ""));
@@ -249,7 +249,7 @@ impl Reader {
                 continue;
             };
             let mut keyword = keyword.to_owned();
-            // A keyword line that ends with a comma continues.
+            // A keyword line that ends with a comma continues on the next line.
             while keyword.ends_with(',') {
                 let Some((next, _)) = lines.next() else { break };
                 keyword.push_str(String::from_utf8_lossy(next).trim());
@@ -275,7 +275,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Read another file as if its lines stood here.
+    /// Read an included file in place of its *INCLUDE line.
     fn include(&mut self, from: &Path, input: &str, depth: usize) -> Result<()> {
         self.included += 1;
         if depth == DEEPEST || self.included > MOST_INCLUDED {
@@ -290,7 +290,7 @@ impl Reader {
         self.read(&path, &bytes, depth + 1)
     }
 
-    /// The part, instance or model that lines belong to.
+    /// Return the part or instance that is being read, or else the model.
     fn part(&mut self) -> &mut Part {
         self.current.as_mut().unwrap_or(&mut self.model)
     }
@@ -419,7 +419,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Begin the lines of a set; return their index.
+    /// Begin the data lines of a set. Return the index of these lines in `sets`.
     fn begin_set(&mut self, of: Of, name: &str, keyword: &Keyword) -> usize {
         let set = Set {
             of,
@@ -441,7 +441,7 @@ impl Reader {
         set.expect("the keyword has begun a set")
     }
 
-    /// An error if the last element lacks nodes.
+    /// Check that the last element has all its nodes.
     fn element_is_complete(&self) -> Result<()> {
         match (&self.pending[..], &self.data) {
             ([number, nodes @ ..], Data::Elements(kind, _)) => {
@@ -499,7 +499,7 @@ impl Reader {
                     self.add_to_set(entry);
                 }
             }
-            // The second entry names the face, or is an area.
+            // Only the first entry is used. The second entry names the face, or is an area.
             Data::Surface => {
                 if let Some(entry) = entries().next() {
                     self.add_to_set(entry);
@@ -524,7 +524,7 @@ impl Reader {
     }
 
     fn real(&self, entry: &str) -> Result<f64> {
-        // Fortran writes `1.D0` as well.
+        // Fortran also writes numbers such as `1.D0`.
         let number = entry.replace(['d', 'D'], "e").parse();
         number.map_err(|_| self.fault(format!("must be a number, is {}", excerpt(entry))))
     }
@@ -609,7 +609,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Append an instance, moved, to the mesh.
+    /// Move an instance to its position, and append it to the mesh.
     fn place_instance(&mut self, part: Part, instance: &Instance) -> Result<()> {
         let mut part = part;
         for node in &mut part.nodes {
@@ -624,7 +624,7 @@ impl Reader {
         self.append(part)
     }
 
-    /// Append a part, or the model itself, with its sets to the mesh.
+    /// Append a part, or the model, with its sets to the mesh.
     fn append(&mut self, part: Part) -> Result<()> {
         let (first_node, first_element) = (self.mesh.nodes.len(), self.mesh.elements.len());
         if first_node + part.nodes.len() > LARGEST || first_element + part.elements.len() > LARGEST
@@ -688,7 +688,7 @@ impl Reader {
         });
     }
 
-    /// Indices in the mesh of the members of a set, whose earlier sets are known.
+    /// Return the indices in the mesh of the members of a set. `known` holds the earlier sets of the part.
     fn members(
         &self,
         set: &Set,
@@ -743,7 +743,7 @@ impl Reader {
             Of::Elements => home.element_indices.keys(),
         };
         for [first, last, step] in &set.ranges {
-            // Numbers without a node or element are left out, as Abaqus does.
+            // Numbers without a node or element are skipped, as in Abaqus.
             if (last - first) / step < count as u64 {
                 let range = (*first..=*last).step_by(usize::try_from(*step).unwrap_or(usize::MAX));
                 members.extend(range.filter_map(|number| index(home, number)));
@@ -763,7 +763,7 @@ impl Reader {
         for name in &set.names {
             let found = self.find_set(of, name, set.instance.as_deref(), known);
             let qualified = || {
-                // A number of an instance, as in `part-1-1.7`.
+                // The name may be a number in an instance, such as `part-1-1.7`.
                 let (name, number) = name.rsplit_once('.')?;
                 let placed = instance(name).ok()?;
                 index(placed, number.parse().ok()?)
@@ -786,7 +786,7 @@ impl Reader {
         Ok(Runs::new(members))
     }
 
-    /// The members of a set that another one names.
+    /// Find the members of a set that another set names.
     fn find_set(
         &self,
         of: Of,
@@ -827,7 +827,8 @@ impl Reader {
         Ok(self.mesh)
     }
 
-    /// Let the name of a set of a part stand for that set in all instances, unless the assembly has such a set.
+    /// Add the union of the sets of one name in all instances under this bare name, unless the assembly has
+    /// such a set.
     fn add_bare_names(&mut self) {
         let prefixes: FxHashSet<String> = self
             .placed

@@ -8,7 +8,8 @@ use super::netcdf::Netcdf;
 use super::{Group, Members, Mesh, Runs, SIDE_SET, fault, position};
 use crate::error::{Result, excerpt};
 
-/// Orders of Exodus that differ from those used here: what the nodes after the corners lie between.
+/// Node orders of Exodus that differ from those of [`super::kind`]: for each node after the corners, the
+/// corners between which the node lies.
 mod orders {
     use super::Between;
 
@@ -60,7 +61,7 @@ mod orders {
     ];
 }
 
-/// The type of the elements of a block by its name, such as `HEX8` or `TETRA`, and number of nodes.
+/// Return the element type of a block from its name, such as `HEX8` or `TETRA`, and the number of nodes.
 fn kind(name: &str, nodes: usize) -> Option<Kind> {
     let letters = name
         .trim_end_matches(|c: char| c.is_ascii_digit())
@@ -77,12 +78,13 @@ fn kind(name: &str, nodes: usize) -> Option<Kind> {
         "PYRAMID" | "PYRA" | "PYR" => Form::Pyramid,
         _ => return None,
     };
-    // The centre of a 14th node is that of the base; wedges of 18 nodes differ between writers.
+    // The 14th node of a pyramid is the centre of the base. Wedges of 18 nodes have different orders in
+    // different writers.
     let is_known = nodes != 18 && super::kind::KINDS.contains(&Kind::new(form, nodes));
     is_known.then_some(Kind::new(form, nodes))
 }
 
-/// The order of the nodes of a type.
+/// Return the position of each node of a type in the order of Exodus.
 fn order(kind: Kind) -> Vec<usize> {
     kind.permutation(match (kind.form, kind.nodes) {
         (Form::Hexahedron, 20) => orders::HEXAHEDRON_20,
@@ -115,7 +117,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
     };
     for (block, id, name) in entities(file, "eb", "connect", "block")? {
         let variable = format!("connect{block}");
-        // A block without elements has no variable.
+        // A block without elements has no connectivity variable.
         if !file.has(&variable) {
             continue;
         }
@@ -186,7 +188,7 @@ fn read(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
     Ok(())
 }
 
-/// Test whether a number from 1 is one of so many.
+/// Test whether a number lies between 1 and `count`.
 fn is_index(number: i64, count: usize) -> bool {
     number >= 1 && number as u64 <= count as u64
 }
@@ -219,8 +221,8 @@ fn read_nodes(file: &Netcdf, mesh: &mut Mesh) -> Fault<()> {
     Ok(())
 }
 
-/// Number from 1, id and name of the blocks or sets with a prefix such as `eb`; a name that is not given is
-/// `DEFAULT_ID`.
+/// Return the number (from 1), id and name of each block or set with a prefix such as `eb`. A missing name
+/// becomes `DEFAULT_ID`, such as `block_3`.
 fn entities(
     file: &Netcdf,
     prefix: &str,

@@ -1,7 +1,7 @@
 //! Meshes of Gmsh: MSH 2.2 and 4.1, text or binary.
 //!
-//! Text and binary files of version 4.1 hold the same numbers in the same order, so one reader takes both. In
-//! version 2.2 only the elements differ.
+//! Text and binary files of version 4.1 hold the same numbers in the same order, so one reader serves both.
+//! In version 2.2, only the elements differ between text and binary files.
 
 use std::collections::hash_map::Entry;
 use std::path::Path;
@@ -12,7 +12,8 @@ use super::kind::{Between, Form, Kind};
 use super::{Group, Members, Mesh, Runs, fault, position};
 use crate::error::{Error, Result, excerpt};
 
-/// Orders of Gmsh that differ from those used here: what the nodes after the corners lie between.
+/// Node orders of Gmsh that differ from those of [`super::kind`]: for each node after the corners, the
+/// corners between which the node lies.
 mod orders {
     use super::Between;
 
@@ -65,7 +66,7 @@ mod orders {
     ];
 }
 
-/// The type of an element by its number in the file, with its order where that differs.
+/// Return the type of an element by its number in the file, and the order of the nodes after the corners.
 fn kind(number: i64) -> Option<(Kind, &'static [Between])> {
     let (form, nodes) = match number {
         15 => (Form::Point, 1),
@@ -128,10 +129,10 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
     file.finish()
 }
 
-/// What has been read of a file.
+/// Reader of a file, with the data that have been read.
 struct File<'a> {
     cursor: Cursor<'a>,
-    /// 2 or 4; 0 before the format is known.
+    /// Major version of the format, 2 or 4; 0 before the version is known.
     version: u32,
     mesh: Mesh,
     /// Indices of nodes by their tags.
@@ -206,7 +207,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Names are text in binary files, too.
+    /// Read the names of physical groups, which are text in binary files, too.
     fn read_names(&mut self) -> Result<()> {
         let count = self.cursor.text_number()?;
         for _ in 0..count {
@@ -234,13 +235,13 @@ impl File<'_> {
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
                 let tag = self.cursor.int()?;
-                // The point itself, or the corners of a box.
+                // The position of a point, or two corners of a bounding box.
                 for _ in 0..if dimension == 0 { 3 } else { 6 } {
                     self.cursor.real()?;
                 }
                 let mut physical = Vec::new();
                 for _ in 0..self.cursor.size()? {
-                    // The sign is the orientation.
+                    // The sign is the orientation, which is not needed.
                     physical.push(self.cursor.int()?.abs());
                 }
                 if dimension > 0 {
@@ -316,7 +317,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// The type of an element, and for each node its position in the order of the file.
+    /// Return the type of an element, and for each node its position in the order of the file.
     fn kind(&self, number: i64) -> Result<(Kind, Vec<usize>)> {
         let Some((kind, order)) = kind(number) else {
             let message = format!(
@@ -327,7 +328,7 @@ impl File<'_> {
         Ok((kind, kind.permutation(order)))
     }
 
-    /// The index of a node of an element.
+    /// Return the index of a node of an element.
     fn node(&self, element: u64, tag: u64) -> Result<u32> {
         self.indices.get(&tag).copied().ok_or_else(|| {
             let message = format!("element {element}: there is no node {tag} before it");
@@ -335,7 +336,7 @@ impl File<'_> {
         })
     }
 
-    /// Append the element with these nodes, in the order of the file.
+    /// Append an element. `nodes` are in the order of the file.
     fn add_element(&mut self, (kind, order): &(Kind, Vec<usize>), number: u64, nodes: &[u32]) {
         let line = match self.cursor.encoding {
             Encoding::Text => self.cursor.line,
@@ -403,7 +404,8 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Version 2 repeats an element under another number for each of its physical groups.
+    /// Test whether an element repeats the last element. Version 2 repeats an element under another number
+    /// for each of its physical groups.
     fn repeats_last_element(&self, (kind, order): &(Kind, Vec<usize>), nodes: &[u32]) -> bool {
         let elements = &self.mesh.elements;
         let Some(last) = elements.len().checked_sub(1) else {
@@ -459,14 +461,14 @@ impl File<'_> {
     }
 }
 
-/// How the numbers of a file are written.
+/// Encoding of the numbers of a file.
 #[derive(Clone, Copy)]
 enum Encoding {
     Text,
     Binary { is_big: bool },
 }
 
-/// A place in the bytes of a file.
+/// Position in the bytes of a file.
 struct Cursor<'a> {
     path: &'a Path,
     bytes: &'a [u8],
@@ -476,7 +478,7 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// An error here.
+    /// Return an error at the current position.
     fn fault(&self, message: impl std::fmt::Display) -> Error {
         let line = match self.encoding {
             Encoding::Text => self.line,
@@ -496,7 +498,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The next word.
+    /// Read the next word.
     fn token(&mut self) -> Result<&'a str> {
         self.skip_space();
         let rest = &self.bytes[self.at..];
@@ -509,7 +511,7 @@ impl<'a> Cursor<'a> {
         std::str::from_utf8(token).map_err(|_| self.fault("is not UTF-8 text"))
     }
 
-    /// The rest of the line, without its end.
+    /// Read the rest of the line, without the line break.
     fn rest_of_line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let end = rest.iter().position(|byte| *byte == b'\n');
@@ -519,7 +521,7 @@ impl<'a> Cursor<'a> {
         line
     }
 
-    /// The name of the next section; `None` at the end of the file.
+    /// Read the name of the next section; `None` at the end of the file.
     fn section(&mut self) -> Result<Option<&'a str>> {
         self.skip_space();
         if self.at == self.bytes.len() {
@@ -550,11 +552,11 @@ impl<'a> Cursor<'a> {
         Err(self.fault(message))
     }
 
-    /// Go behind the end of a section that is not used.
+    /// Skip a section that is not used.
     fn skip_section(&mut self, section: &str) -> Result<()> {
         let end = format!("$End{section}");
         let rest = &self.bytes[self.at..];
-        // By its first byte, for windows of the whole file are slow to compare.
+        // Search for the first byte, because comparisons at every byte of the file are slow.
         let mut places = rest.iter().enumerate().filter(|(_, byte)| **byte == b'$');
         let found = places.find(|(at, _)| rest[*at..].starts_with(end.as_bytes()));
         let Some((at, _)) = found else {
@@ -565,7 +567,7 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// The next bytes.
+    /// Read the next N bytes.
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
         let bytes = self.bytes[self.at..].first_chunk();
         let bytes = *bytes.ok_or_else(|| self.fault("the file ends too early"))?;
@@ -573,14 +575,14 @@ impl<'a> Cursor<'a> {
         Ok(bytes)
     }
 
-    /// A whole number that is text in binary files as well.
+    /// Read an integer that is text even in binary files.
     fn text_number(&mut self) -> Result<i64> {
         let word = self.token()?;
         word.parse()
             .map_err(|_| self.fault(format!("must be a whole number, is {}", excerpt(word))))
     }
 
-    /// A number of entries of version 2, which is text, and the end of its line.
+    /// Read a number of entries of version 2, which is text, and the end of its line.
     fn count_line(&mut self) -> Result<i64> {
         let count = self.text_number()?;
         if matches!(self.encoding, Encoding::Binary { .. }) {
@@ -589,7 +591,7 @@ impl<'a> Cursor<'a> {
         Ok(count)
     }
 
-    /// An `int`.
+    /// Read an `int`.
     fn int(&mut self) -> Result<i64> {
         match self.encoding {
             Encoding::Text => self.text_number(),
@@ -605,7 +607,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A `size_t`. Every entry that is counted takes bytes, so a count that is too large ends with the file.
+    /// Read a `size_t`. Every counted entry takes bytes, so a count that is too large fails at the end of the
+    /// file.
     fn size(&mut self) -> Result<u64> {
         match self.encoding {
             Encoding::Text => {
@@ -624,7 +627,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A `double`.
+    /// Read a `double`.
     fn real(&mut self) -> Result<f64> {
         match self.encoding {
             Encoding::Text => {

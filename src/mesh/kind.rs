@@ -1,10 +1,11 @@
 //! Types of elements: corners, dimension and the order of their nodes.
 //!
-//! All types have the order of VTK here. A node of a second-order element is described by the corners that it
-//! lies between: two for an edge, three or four for a face, all for the element's centre. So the order of
-//! another format is a list that can be compared with that format's manual.
+//! All types have the node order of VTK here. A node of a second-order element is described by the corners
+//! between which it lies: two for an edge, three or four for a face, all for the element's centre.
+//! The order of another format is a list of such descriptions, which can be compared with the manual of that
+//! format.
 
-/// The form of an element, without regard to its order.
+/// The shape of an element, without its polynomial order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Form {
     /// A node.
@@ -36,7 +37,7 @@ pub struct Kind {
 
 use Form::{Hexahedron, Line, Point, Pyramid, Quadrilateral, Tetrahedron, Triangle, Wedge};
 
-/// All types.
+/// All supported types.
 pub const KINDS: [Kind; 19] = [
     Kind::new(Point, 1),
     Kind::new(Line, 2),
@@ -63,18 +64,18 @@ pub const KINDS: [Kind; 19] = [
 pub type Between = &'static [usize];
 
 impl Kind {
-    /// The type of a form with a number of nodes, which [`KINDS`] has.
+    /// Create a type, which must be in [`KINDS`].
     pub const fn new(form: Form, nodes: usize) -> Self {
         Self { form, nodes }
     }
 
-    /// The position in [`KINDS`].
+    /// Return the position in [`KINDS`].
     pub fn index(self) -> usize {
         let found = KINDS.iter().position(|kind| *kind == self);
         found.expect("elements have a type of the list")
     }
 
-    /// Number of dimensions of the element itself.
+    /// Return the number of dimensions of the element: 0 for a point, 3 for a solid.
     pub fn dimension(self) -> usize {
         match self.form {
             Point => 0,
@@ -84,7 +85,7 @@ impl Kind {
         }
     }
 
-    /// Number of corners; they are the first nodes.
+    /// Return the number of corners, which are the first nodes.
     pub fn corners(self) -> usize {
         match self.form {
             Point => 1,
@@ -97,7 +98,7 @@ impl Kind {
         }
     }
 
-    /// The corners between which each of the other nodes lies.
+    /// Return for each node after the corners the corners between which it lies.
     pub fn between(self) -> &'static [Between] {
         let all: &[Between] = match self.form {
             Point => &[],
@@ -155,8 +156,8 @@ impl Kind {
         &all[..self.nodes - self.corners()]
     }
 
-    /// For each node in the order used here, its position in an order that lists the nodes after the corners
-    /// as `other`.
+    /// Return for each node in VTK's order its position in another order. `other` describes the nodes after
+    /// the corners in the other order.
     pub fn permutation(self, other: &[Between]) -> Vec<usize> {
         let same = |a: &[usize], b: &[usize]| a.len() == b.len() && a.iter().all(|k| b.contains(k));
         let position = |node: &Between| {
@@ -167,7 +168,7 @@ impl Kind {
         (0..self.corners()).chain(others).collect()
     }
 
-    /// A name for messages.
+    /// Return a name for messages.
     pub fn name(self) -> &'static str {
         match self.form {
             Point => "point",

@@ -1,4 +1,4 @@
-//! From an element to a point: exact volume and centroid.
+//! Exact volume and centroid of an element, which becomes a point.
 //!
 //! An element is the image of its reference element under its shape functions. Volume ∫ det J and first moments
 //! ∫ x det J are integrals of polynomials, for which the Gauss rules here are exact.
@@ -23,7 +23,7 @@ impl Dual {
         }
     }
 
-    /// The reference coordinate of an axis.
+    /// Return the reference coordinate along an axis.
     fn coordinate(value: f64, axis: usize) -> Self {
         let mut gradient = [0.0; 3];
         gradient[axis] = 1.0;
@@ -84,7 +84,7 @@ struct GaussPoint {
 /// The Gauss rules of all types, in the order of [`KINDS`].
 static RULES: LazyLock<Vec<Vec<GaussPoint>>> = LazyLock::new(|| KINDS.map(rule).into());
 
-/// Points of the Gauss rule on [−1, 1] and their weights, by number of points.
+/// Return points and weights of the Gauss rule on [−1, 1].
 fn gauss(points: usize) -> Vec<(f64, f64)> {
     let symmetric = |pairs: &[(f64, f64)]| {
         let mirrored = pairs.iter().rev().map(|(x, weight)| (-x, *weight));
@@ -107,10 +107,11 @@ fn gauss(points: usize) -> Vec<(f64, f64)> {
     }
 }
 
-/// The Gauss rule of a type, exact for its volume and its first moments.
+/// Return the Gauss rule of a type, exact for volume and first moments.
 fn rule(kind: Kind) -> Vec<GaussPoint> {
     let second_order = kind.nodes > kind.corners();
-    // n points are exact up to the degree 2n − 1 in each coordinate. Collapsed coordinates add up to 2.
+    // n points are exact up to the degree 2n − 1 in each coordinate. Collapsed coordinates add up to 2 to the
+    // degree.
     let points = match (kind.form, second_order) {
         (Form::Point, _) => return Vec::new(),
         (Form::Triangle | Form::Tetrahedron, false) => 1,
@@ -118,7 +119,7 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
         (Form::Line | Form::Quadrilateral, true) => 3,
         (_, true) => 4,
     };
-    // On [0, 1], for coordinates that are collapsed.
+    // Point and weight on [0, 1], for collapsed coordinates.
     let unit = |(x, weight): (f64, f64)| (0.5 * (1.0 + x), 0.5 * weight);
     let one_axis = gauss(points);
     let mut rule = Vec::new();
@@ -166,8 +167,8 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
             }
         }
     }
-    // det J of a quadrilateral is linear. If its nodes are crossed, it is negative along an edge, which the Gauss
-    // points can miss.
+    // det J of a quadrilateral is linear. If the nodes are crossed, det J is negative along an edge, which
+    // the Gauss points can miss. Add the middles of the edges with weight 0.
     if kind == Kind::new(Form::Quadrilateral, 4) {
         for at in [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]] {
             add([at[0], at[1], 0.0], 0.0);
@@ -179,11 +180,13 @@ fn rule(kind: Kind) -> Vec<GaussPoint> {
 /// Signs of the corners of the square [−1, 1]².
 const SQUARE: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// The shape functions of all nodes at a place of the reference element.
+/// Compute the shape functions of all nodes at a position in the reference element.
 ///
-/// Lines, quadrilaterals and hexahedra are [−1, 1]^D; triangles and tetrahedra are r, s, t ≥ 0, r + s + t ≤ 1;
-/// wedges a triangle × [−1, 1]. A pyramid is given in collapsed coordinates u, v in [−1, 1] and w in [0, 1]: at the
-/// height w it is the square |ξ|, |η| ≤ 1 − w with ξ = u (1 − w), η = v (1 − w).
+/// - Lines, quadrilaterals and hexahedra: [−1, 1]^D.
+/// - Triangles and tetrahedra: r, s, t ≥ 0, r + s + t ≤ 1.
+/// - Wedges: a triangle × [−1, 1].
+/// - Pyramids: collapsed coordinates u, v in [−1, 1] and w in [0, 1]. At the height w, a pyramid is the
+///   square |ξ|, |η| ≤ 1 − w with ξ = u (1 − w), η = v (1 − w).
 fn shape_functions(kind: Kind, at: [f64; 3]) -> Vec<Dual> {
     let [x, y, z] = std::array::from_fn(|k| Dual::coordinate(at[k], k));
     let one = Dual::constant(1.0);
@@ -214,7 +217,7 @@ fn shape_functions(kind: Kind, at: [f64; 3]) -> Vec<Dual> {
                 let product = along.map(|(x, node)| match (linear, serendipity, node == 0.0) {
                     (true, ..) | (_, true, false) => half(node, *x),
                     (_, _, true) => one - *x * *x,
-                    // Lagrange's polynomial of an end.
+                    // Lagrange polynomial of an end node.
                     _ => 0.5 * (*x * (*x + Dual::constant(node))),
                 });
                 let product = product.fold(one, |a, b| a * b);
@@ -316,7 +319,8 @@ fn shape_functions(kind: Kind, at: [f64; 3]) -> Vec<Dual> {
     }
 }
 
-/// The linear or quadratic shape functions of a triangle or tetrahedron, from its barycentric coordinates.
+/// Compute the linear or quadratic shape functions of a triangle or tetrahedron from its barycentric
+/// coordinates.
 fn quadratic(weights: &[Dual], kind: Kind) -> Vec<Dual> {
     if kind.nodes == kind.corners() {
         return weights.to_vec();
@@ -333,7 +337,7 @@ fn quadratic(weights: &[Dual], kind: Kind) -> Vec<Dual> {
 /// Length (m), area (m²) or volume (m³) of an element, and its centroid, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measure {
-    /// Signed in as many dimensions as the element has; else not negative.
+    /// Signed size of the element. The sign is negative for an inverted element.
     pub size: f64,
     /// Centroid, m.
     pub centroid: [f64; 3],
@@ -341,11 +345,11 @@ pub struct Measure {
     determinants: [f64; 2],
 }
 
-/// Largest det J of the other sign, relative to the largest one, that counts as round-off.
+/// Largest det J of the opposite sign that counts as round-off, as a fraction of the largest |det J|.
 const ROUND_OFF: f64 = 1e-9;
 
 impl Measure {
-    /// Whether det J has both signs: nodes are crossed, or a part of the element is inverted.
+    /// Test whether det J has both signs. If so, nodes are crossed or a part of the element is inverted.
     pub fn is_folded(&self) -> bool {
         let [low, high] = self.determinants;
         let limit = ROUND_OFF * low.abs().max(high.abs());
@@ -353,9 +357,9 @@ impl Measure {
     }
 }
 
-/// Measure an element of a line along x, of the plane of x and y, or of space; `nodes` in m.
+/// Compute the measure of a line along x, of a face in the x-y plane, or of a solid. `nodes` in m.
 pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
-    // Relative to the first node, so that a mesh far from the origin loses no digits.
+    // Positions are relative to the first node, so that a mesh far from the origin loses no digits.
     let origin = nodes[0];
     let (mut size, mut moments) = (0.0, [0.0; 3]);
     let mut determinants = [f64::INFINITY, f64::NEG_INFINITY];
@@ -400,7 +404,7 @@ pub fn measure(kind: Kind, nodes: &[[f64; 3]]) -> Measure {
 mod tests {
     use super::*;
 
-    /// Nodes of the reference element, in its own coordinates.
+    /// Return the nodes of the reference element, in reference coordinates.
     fn reference_nodes(kind: Kind) -> Vec<[f64; 3]> {
         let corners: Vec<[f64; 3]> = match kind.form {
             Form::Point => vec![[0.0; 3]],
@@ -432,7 +436,8 @@ mod tests {
         [corners, others].concat()
     }
 
-    /// The collapsed coordinates of a place in a pyramid, or the place itself.
+    /// Return the collapsed coordinates of a position in a pyramid, or the position itself for other
+    /// elements.
     fn coordinates(kind: Kind, [x, y, z]: [f64; 3]) -> [f64; 3] {
         if kind.form == Form::Pyramid && z < 1.0 {
             return [x / (1.0 - z), y / (1.0 - z), z];
@@ -482,7 +487,8 @@ mod tests {
         }
     }
 
-    /// An affine map with the determinant `det`; in as many dimensions as the element has.
+    /// Apply an affine map to nodes. Return the nodes and the determinant of the map in `dimension`
+    /// dimensions.
     fn mapped(nodes: &[[f64; 3]], dimension: usize) -> (Vec<[f64; 3]>, f64) {
         let rows = [[1.5, 0.3, -0.2], [-0.4, 0.8, 0.5], [0.1, -0.6, 1.2]];
         let det = match dimension {
@@ -516,7 +522,7 @@ mod tests {
             let expected = det * size_of_reference(kind.form);
             assert!((measure.size / expected - 1.0).abs() < 1e-14, "{kind:?}");
             let corners = &nodes[..kind.corners()];
-            // The mean of the corners, but for a pyramid.
+            // The centroid is the mean of the corners, except for a pyramid.
             let mean = |k: usize| corners.iter().map(|x| x[k]).sum::<f64>() / corners.len() as f64;
             for k in 0..3 {
                 let expected = if kind.form == Form::Pyramid {
@@ -530,7 +536,7 @@ mod tests {
         }
     }
 
-    /// The map x → x + 0.2 y² bends elements, keeps their volume and moves the centroid by 0.2 times the mean
+    /// The map x → x + 0.2 y² bends an element and keeps its volume. The centroid moves by 0.2 times the mean
     /// of y².
     #[test]
     fn bent_elements_have_the_volume_and_centroid_of_closed_forms() {
@@ -582,12 +588,12 @@ mod tests {
         // The edges cross close to a corner.
         let slightly = [[0.0; 3], [1.0, 0.0, 0.0], [0.1, 1.0, 0.0], [0.2, 0.9, 0.0]];
         assert!(measure(quadrilateral, &slightly).is_folded());
-        // Two equal nodes make a triangle.
+        // With two equal nodes, a quadrilateral is a triangle.
         let triangle = [square[0], square[1], square[2], square[2]];
         assert!(!measure(quadrilateral, &triangle).is_folded());
         let tetrahedron = Kind::new(Form::Tetrahedron, 10);
         let mut nodes = reference_nodes(tetrahedron);
-        // The middle of the edge from the origin to (1, 0, 0) far beyond its end.
+        // Move the middle node of the edge from the origin to (1, 0, 0) far beyond the end of the edge.
         nodes[4][0] = 1.5;
         let folded = measure(tetrahedron, &nodes);
         assert!(folded.is_folded() && folded.size > 0.0, "{folded:?}");

@@ -1,4 +1,4 @@
-//! Meshes of finite elements in the formats of other programs, and points from their elements.
+//! Meshes of finite elements in the formats of other programs, for points from their elements.
 //!
 //! A reader checks every count in its file against the number of remaining bytes. A damaged file therefore needs no
 //! more memory than a valid one of its size.
@@ -25,7 +25,7 @@ use crate::error::{Error, Result, excerpt};
 use crate::message::nearest;
 use kind::KINDS;
 
-/// Kind of a group of faces of elements, which is stored as these elements.
+/// Kind of a group of faces of elements. The group holds the elements, not the faces.
 pub const SIDE_SET: &str = "side set";
 
 /// Largest number of group names that a message lists.
@@ -44,7 +44,7 @@ pub enum Format {
     Exodus,
 }
 
-/// Endings of file names, and their formats.
+/// Endings of file names, with their formats.
 const ENDINGS: [(&str, Format); 7] = [
     ("msh", Format::Gmsh),
     ("inp", Format::Abaqus),
@@ -56,14 +56,14 @@ const ENDINGS: [(&str, Format); 7] = [
 ];
 
 impl Format {
-    /// The format of a file, by the ending of its name.
+    /// Return the format of a file from the ending of its name.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?;
         let same = |(known, _): &&(&str, Format)| known.eq_ignore_ascii_case(ending);
         ENDINGS.iter().find(same).map(|(_, format)| *format)
     }
 
-    /// The known endings, for a message.
+    /// Return the known endings, for a message.
     pub fn endings() -> String {
         ENDINGS.map(|(ending, _)| format!("`.{ending}`")).join(", ")
     }
@@ -78,7 +78,7 @@ pub struct Mesh {
     pub elements: Elements,
     /// Named or numbered groups of elements and of nodes.
     pub groups: Vec<Group>,
-    /// Names of groups may differ in case.
+    /// Names of groups are matched without regard to case.
     pub ignores_case: bool,
 }
 
@@ -89,14 +89,14 @@ pub struct Elements {
     starts: Vec<usize>,
     nodes: Vec<u32>,
     numbers: Vec<u64>,
-    /// Lines of the file; 0 in binary files.
+    /// Lines of the elements in the file; 0 in binary files.
     lines: Vec<u32>,
-    /// The file of the elements from an index on.
+    /// Files of the elements, each with the index of its first element.
     files: Vec<(usize, PathBuf)>,
 }
 
 impl Elements {
-    /// Append an element; `nodes` are indices in the order of [`kind`].
+    /// Append an element. `nodes` are indices in the order of [`kind`].
     fn push(
         &mut self,
         kind: Kind,
@@ -110,14 +110,14 @@ impl Elements {
         self.lines.push(u32::try_from(line).unwrap_or(0));
     }
 
-    /// Name the file of the elements that follow.
+    /// Set the file of the elements that are appended next.
     fn continue_in(&mut self, file: &Path) {
         if self.files.last().is_none_or(|(_, last)| last != file) {
             self.files.push((self.len(), file.to_owned()));
         }
     }
 
-    /// Append all elements of another list, whose nodes begin at this index of the combined mesh.
+    /// Append all elements of another list, whose nodes begin at the index `first_node` of the combined mesh.
     fn append(&mut self, other: &Self, first_node: u32) {
         let (elements, nodes) = (self.len(), self.nodes.len());
         self.kinds.extend_from_slice(&other.kinds);
@@ -132,33 +132,33 @@ impl Elements {
             .extend(files.map(|(first, file)| (first + elements, file.clone())));
     }
 
-    /// Number of elements.
+    /// Return the number of elements.
     pub fn len(&self) -> usize {
         self.kinds.len()
     }
 
-    /// There are no elements.
+    /// Test whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.kinds.is_empty()
     }
 
-    /// The type of an element.
+    /// Return the type of an element.
     pub fn kind(&self, element: usize) -> Kind {
         KINDS[usize::from(self.kinds[element])]
     }
 
-    /// The indices of an element's nodes.
+    /// Return the indices of an element's nodes.
     pub fn nodes(&self, element: usize) -> &[u32] {
         let start = self.starts[element];
         &self.nodes[start..start + self.kind(element).nodes]
     }
 
-    /// The number that the file gives to an element.
+    /// Return the number of an element in the file.
     pub fn number(&self, element: usize) -> u64 {
         self.numbers[element]
     }
 
-    /// The error of an element: file, line if the file has lines, number and type.
+    /// Return an error about an element, with file, line (in text files), number and type.
     pub fn fault(&self, element: usize, message: impl fmt::Display) -> Error {
         let after = self.files.partition_point(|(first, _)| *first <= element);
         let file = self.files[after - 1].1.display();
@@ -176,13 +176,13 @@ impl Elements {
 /// A group of elements or nodes.
 #[derive(Debug)]
 pub struct Group {
-    /// Its name, if it has one.
+    /// Name of the group, if the file gives a name.
     pub name: Option<String>,
-    /// Its number, if it has one.
+    /// Number of the group, if the file gives a number.
     pub number: Option<i64>,
     /// The format's term for this kind of group, such as `side set`.
     pub kind: &'static str,
-    /// Its members.
+    /// Members of the group.
     pub members: Members,
 }
 
@@ -198,9 +198,9 @@ pub enum Members {
 /// A name or number by which a deck refers to a group.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum GroupKey {
-    /// Its name.
+    /// The name of a group.
     Name(String),
-    /// Its number.
+    /// The number of a group.
     Number(i64),
 }
 
@@ -214,7 +214,7 @@ impl fmt::Display for GroupKey {
 }
 
 impl Mesh {
-    /// Largest dimension of a group's elements; 0 for nodes.
+    /// Return the largest dimension of a group's elements; 0 for nodes.
     pub fn dimension(&self, group: &Group) -> usize {
         match &group.members {
             Members::Nodes(_) => 0,
@@ -227,12 +227,12 @@ impl Mesh {
         }
     }
 
-    /// The group of a key that `is_wanted` accepts, if there is one.
+    /// Find the group of a key among the groups that `is_wanted` accepts.
     ///
     /// A key is a name, a number, or both with the kind in front, such as `side set 1`.
     ///
     /// # Errors
-    /// If it refers to groups of different kinds; the message lists them.
+    /// If the key refers to groups of different kinds; the message lists these groups.
     pub fn find(
         &self,
         key: &GroupKey,
@@ -298,7 +298,7 @@ impl Mesh {
         ))
     }
 
-    /// Names, or else numbers, of the groups that `wanted` selects by their dimension.
+    /// Return the names, or else the numbers, of the groups with a dimension that `wanted` accepts.
     pub fn names(&self, wanted: impl Fn(usize) -> bool) -> Vec<String> {
         let groups = self
             .groups
@@ -312,7 +312,7 @@ impl Mesh {
     }
 }
 
-/// The end of a message on an unknown name: the nearest of the known ones, and some of them.
+/// Return the end of a message about an unknown name: the nearest known name, and some of the known names.
 pub fn suggestion(key: &GroupKey, known: &[String]) -> String {
     if known.is_empty() {
         return "; the mesh has no such groups".to_owned();
@@ -333,11 +333,11 @@ pub fn suggestion(key: &GroupKey, known: &[String]) -> String {
     format!("{near} (known: {}{more})", listed.join(", "))
 }
 
-/// The bytes of a file, which must not be a pipe: opening one would block until its other end is opened. Of an HDF5
-/// file, which its library reads, only the first bytes.
+/// Read the bytes of a regular file. A pipe is rejected, because opening a pipe blocks until its other end is
+/// opened. Of an HDF5 file, only the first bytes are read, because the HDF5 library reads the file.
 ///
 /// # Errors
-/// If it cannot be read.
+/// If the file cannot be read.
 pub fn load(path: &Path) -> std::io::Result<Vec<u8>> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::other("it is not a regular file"));
@@ -355,7 +355,7 @@ pub fn load(path: &Path) -> std::io::Result<Vec<u8>> {
 /// Read a mesh from the bytes of a file.
 ///
 /// # Errors
-/// If they do not follow the format; the message gives file, line and what is expected.
+/// If the bytes do not follow the format; the message gives file, line and the expected content.
 pub fn parse(format: Format, path: &Path, bytes: &[u8]) -> Result<Mesh> {
     let mesh = match format {
         Format::Gmsh => gmsh::parse(path, bytes),
@@ -369,7 +369,7 @@ pub fn parse(format: Format, path: &Path, bytes: &[u8]) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// An error at a line of a file; without a line if that is 0.
+/// Return an error at a line of a file; without a line if `line` is 0.
 fn fault(path: &Path, line: u64, message: impl fmt::Display) -> Error {
     let path = path.display();
     Error::input(match line {
@@ -378,7 +378,7 @@ fn fault(path: &Path, line: u64, message: impl fmt::Display) -> Error {
     })
 }
 
-/// The position of a node, unless it is too far to take squares and volumes.
+/// Return the position of a node, or an error if squares and volumes could overflow.
 fn position(place: [f64; 3]) -> std::result::Result<[f64; 3], String> {
     let near = |x: &f64| x.abs() <= FARTHEST;
     if place.iter().all(near) {
@@ -393,8 +393,8 @@ fn position(place: [f64; 3]) -> std::result::Result<[f64; 3], String> {
 /// Largest absolute coordinate; squared distances stay far from overflow.
 const FARTHEST: f64 = 1e30;
 
-/// An error without the file that it is in.
+/// Result with an error message that does not name the file.
 type Fault<T> = std::result::Result<T, String>;
 
-/// Upper limit of the ratio of compression, of zlib: a file cannot hold more than its size times this.
+/// Upper limit of zlib's compression ratio: the content of a file is at most the file's size times this.
 const LARGEST_RATIO: usize = 1100;

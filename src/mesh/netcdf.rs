@@ -9,21 +9,21 @@ use super::{Fault, LARGEST_RATIO};
 /// First bytes of an HDF5 file.
 pub const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Variables of a file.
+/// The variables of a file.
 pub enum Netcdf<'a> {
     /// CDF-1, CDF-2 and CDF-5.
     Classic(Classic<'a>),
     /// netCDF-4.
     Hdf5 {
-        /// The file.
+        /// The open file.
         file: hdf5_metno::File,
-        /// Its size, bytes.
+        /// Size of the file, bytes.
         size: u64,
     },
 }
 
 impl<'a> Netcdf<'a> {
-    /// Open a file; `bytes` are its content, or at least the first ones of an HDF5 file.
+    /// Open a file. `bytes` are the content of the file; for HDF5, the first bytes suffice.
     pub fn open(path: &Path, bytes: &'a [u8]) -> Fault<Self> {
         if bytes.starts_with(b"CDF") {
             return Classic::new(bytes).map(Self::Classic);
@@ -40,7 +40,7 @@ impl<'a> Netcdf<'a> {
         })
     }
 
-    /// The file has a variable of this name.
+    /// Test whether the file has a variable of this name.
     pub fn has(&self, name: &str) -> bool {
         match self {
             Self::Classic(classic) => classic.variables.contains_key(name),
@@ -48,7 +48,7 @@ impl<'a> Netcdf<'a> {
         }
     }
 
-    /// The lengths of a variable's dimensions.
+    /// Return the lengths of a variable's dimensions.
     pub fn shape(&self, name: &str) -> Fault<Vec<usize>> {
         match self {
             Self::Classic(classic) => Ok(classic.variable(name)?.shape.clone()),
@@ -61,7 +61,7 @@ impl<'a> Netcdf<'a> {
         }
     }
 
-    /// The dataset of a variable, not larger than the file can hold.
+    /// Return the dataset of a variable, unless it is larger than the file can hold.
     fn dataset(file: &hdf5_metno::File, name: &str, size: u64) -> Fault<hdf5_metno::Dataset> {
         let words = |error: hdf5_metno::Error| format!("variable {name}: {error}");
         let dataset = file.dataset(name).map_err(words)?;
@@ -70,14 +70,15 @@ impl<'a> Netcdf<'a> {
             .shape()
             .iter()
             .try_fold(each, |all, length| all.checked_mul(*length as u64));
-        // A chunk that is not written takes no bytes; no mesh has only such.
+        // Chunks that are not written take no bytes, and could make a valid dataset fail here. No mesh has
+        // only such chunks.
         if count.is_none_or(|count| count > (LARGEST_RATIO as u64).saturating_mul(size)) {
             return Err(format!("variable {name}: is larger than the file can hold"));
         }
         Ok(dataset)
     }
 
-    /// A variable of real numbers.
+    /// Read a variable of real numbers.
     pub fn reals(&self, name: &str) -> Fault<Vec<f64>> {
         match self {
             Self::Classic(classic) => classic.reals(name),
@@ -90,7 +91,7 @@ impl<'a> Netcdf<'a> {
         }
     }
 
-    /// A variable of whole numbers.
+    /// Read a variable of whole numbers.
     pub fn integers(&self, name: &str) -> Fault<Vec<i64>> {
         match self {
             Self::Classic(classic) => {
@@ -106,7 +107,7 @@ impl<'a> Netcdf<'a> {
         }
     }
 
-    /// The rows of a variable of characters.
+    /// Read the rows of a variable of characters.
     pub fn texts(&self, name: &str) -> Fault<Vec<String>> {
         let length = self.shape(name)?.last().copied().unwrap_or(0).max(1);
         let bytes = match self {
@@ -125,7 +126,7 @@ impl<'a> Netcdf<'a> {
         Ok(bytes.chunks(length).map(text).collect())
     }
 
-    /// An attribute of text of a variable.
+    /// Read a text attribute of a variable.
     pub fn attribute(&self, variable: &str, name: &str) -> Fault<String> {
         match self {
             Self::Classic(classic) => {
@@ -141,7 +142,7 @@ impl<'a> Netcdf<'a> {
                     .dataset(variable)
                     .and_then(|dataset| dataset.attr(name));
                 let attribute = attribute.map_err(words)?;
-                // Text of fixed length, as netCDF writes it, or of any length.
+                // Text has a fixed length, as netCDF writes it, or any length.
                 let fixed = attribute.read_scalar::<hdf5_metno::types::FixedAscii<64>>();
                 fixed
                     .map(|text| text.as_str().to_owned())
@@ -155,7 +156,7 @@ impl<'a> Netcdf<'a> {
     }
 }
 
-/// Text up to a zero byte.
+/// Return the text before the first zero byte.
 fn text(bytes: &[u8]) -> String {
     let end = bytes
         .iter()
@@ -164,7 +165,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
 
-/// The header of a classic file.
+/// A classic file with its header.
 pub struct Classic<'a> {
     bytes: &'a [u8],
     variables: FxHashMap<String, Variable>,
@@ -175,11 +176,11 @@ struct Variable {
     kind: u32,
     begin: usize,
     attributes: FxHashMap<String, String>,
-    /// A record variable: its entries are interleaved with those of others.
+    /// The variable is a record variable: its entries are interleaved with those of others.
     is_record: bool,
 }
 
-/// Bytes of a number of a type.
+/// Return the size of a number of a type, bytes.
 fn size_of_kind(kind: u32) -> Fault<usize> {
     match kind {
         1 | 2 | 7 => Ok(1),
@@ -190,7 +191,7 @@ fn size_of_kind(kind: u32) -> Fault<usize> {
     }
 }
 
-/// A place in the header.
+/// Position in the header.
 struct Cursor<'a> {
     rest: &'a [u8],
     version: u8,
@@ -212,7 +213,7 @@ impl<'a> Cursor<'a> {
         usize::try_from(u64::from_be_bytes(bytes)).map_err(|error| error.to_string())
     }
 
-    /// A number of entries, or a length.
+    /// Read a number of entries, or a length.
     fn count(&mut self) -> Fault<usize> {
         if self.version == 5 {
             self.long()
@@ -221,7 +222,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A place in the file.
+    /// Read a position in the file.
     fn offset(&mut self) -> Fault<usize> {
         if self.version == 1 {
             Ok(self.word()? as usize)
@@ -241,13 +242,14 @@ impl<'a> Cursor<'a> {
         Ok(String::from_utf8_lossy(self.padded(length)?).into_owned())
     }
 
-    /// Number of entries of a list. Too large a number fails at the end of the file, because each entry takes bytes.
+    /// Read the number of entries of a list. A number that is too large fails at the end of the file, because
+    /// each entry takes bytes.
     fn list(&mut self) -> Fault<usize> {
         self.word()?;
         self.count()
     }
 
-    /// The attributes that are text.
+    /// Read a list of attributes. Return the text attributes.
     fn attributes(&mut self) -> Fault<FxHashMap<String, String>> {
         let mut attributes = FxHashMap::default();
         for _ in 0..self.list()? {
@@ -317,7 +319,7 @@ impl<'a> Classic<'a> {
             .ok_or_else(|| format!("has no variable {name}"))
     }
 
-    /// The bytes of a variable.
+    /// Return the bytes of a variable.
     fn bytes(&self, name: &str) -> Fault<&'a [u8]> {
         let variable = self.variable(name)?;
         let words = |message: &str| format!("variable {name}: {message}");

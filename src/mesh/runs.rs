@@ -1,14 +1,14 @@
-//! Sets of whole numbers as ranges: ids and indices of meshes are mostly consecutive.
+//! Sets of whole numbers as ranges, because ids and indices of meshes are mostly consecutive.
 
-/// A set of whole numbers, as sorted ranges that do not touch.
+/// A set of whole numbers, as sorted ranges with gaps between them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Runs {
-    /// First number and end of each range.
+    /// First number and end (exclusive) of each range.
     ranges: Vec<[u64; 2]>,
 }
 
 impl Runs {
-    /// The set of some numbers, in any order.
+    /// Create the set of some numbers, in any order.
     pub fn new(mut numbers: Vec<u64>) -> Self {
         numbers.sort_unstable();
         let mut runs = Self::default();
@@ -18,7 +18,7 @@ impl Runs {
         runs
     }
 
-    /// Add a number that is not below any of the set.
+    /// Add a number that is not below any number of the set.
     pub fn push(&mut self, number: u64) {
         match self.ranges.last_mut() {
             Some([_, end]) if *end > number => debug_assert_eq!(*end, number + 1),
@@ -33,17 +33,17 @@ impl Runs {
         after > 0 && number < self.ranges[after - 1][1]
     }
 
-    /// The numbers, in order.
+    /// Return the numbers in ascending order.
     pub fn iter(&self) -> impl Iterator<Item = u64> + '_ {
         self.ranges.iter().flat_map(|[first, end]| *first..*end)
     }
 
-    /// The ranges: first number and end.
+    /// Return the ranges: first number and end (exclusive).
     pub fn ranges(&self) -> &[[u64; 2]] {
         &self.ranges
     }
 
-    /// The set of the numbers of several sets, each raised by its offset.
+    /// Return the union of several sets, after the offset of each set is added to its numbers.
     pub fn union<'a>(sets: impl Iterator<Item = (&'a [[u64; 2]], u64)>) -> Self {
         let raised = sets.flat_map(|(ranges, offset)| {
             ranges

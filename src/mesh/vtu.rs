@@ -12,10 +12,11 @@ use super::kind::{Form, Kind};
 use super::{Fault, Group, LARGEST_RATIO, Members, Mesh, Runs, fault, measure, position};
 use crate::error::{Result, excerpt};
 
-/// Arrays with more different values than this describe no groups.
+/// Largest number of different values of an array that describes groups.
 const MOST_GROUPS: usize = 1000;
 
-/// The type of a cell by its number, with the order of its nodes where that differs.
+/// Return the type of a cell by its number in the file, and the node order if it differs from that of
+/// [`super::kind`].
 fn kind(number: i64) -> Option<(Kind, Option<&'static [usize]>)> {
     let (form, nodes) = match number {
         1 => (Form::Point, 1),
@@ -38,7 +39,7 @@ fn kind(number: i64) -> Option<(Kind, Option<&'static [usize]>)> {
         27 => (Form::Pyramid, 13),
         _ => return None,
     };
-    // A pixel and a voxel count along x, then y and z.
+    // The nodes of a pixel or voxel are numbered along x, then y and z.
     let order: Option<&[usize]> = match number {
         8 => Some(&[0, 1, 3, 2]),
         11 => Some(&[0, 1, 3, 2, 4, 5, 7, 6]),
@@ -56,7 +57,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
 }
 
 fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
-    // Appended data need not be XML.
+    // Appended data may not be XML, so separate them from the XML text.
     let mark = b"<AppendedData";
     let start = bytes.windows(mark.len()).position(|window| window == mark);
     let (text, appended) = match start {
@@ -126,16 +127,16 @@ fn read(path: &Path, bytes: &[u8]) -> Fault<Mesh> {
     Ok(mesh)
 }
 
-/// Members of groups by kind (nodes or elements), name of their array and value.
+/// Members of groups, by kind (true for nodes), name of the array, and value.
 type Groups = IndexMap<(bool, String, i64), Runs>;
 
-/// How the arrays of a file are written.
+/// Encoding of the arrays of a file.
 struct File<'a> {
     is_big: bool,
-    /// Bytes of a number of a header.
+    /// Size of a number in a header, bytes.
     header: usize,
     is_compressed: bool,
-    /// Appended data, and whether they are raw.
+    /// Appended data, and whether the data are raw.
     appended: Option<(&'a [u8], bool)>,
 }
 
@@ -228,7 +229,8 @@ impl File<'_> {
                 Some(order) => order.iter().map(|k| index(*k)).collect(),
                 None => (0..nodes.len()).map(index).collect(),
             };
-            // VTK's manual and its programs differ in which triangle of a wedge comes first.
+            // The manual of VTK and its programs disagree on which triangle of a wedge comes first. Swap the
+            // triangles if the volume is negative.
             if kind == Kind::new(Form::Wedge, 6) {
                 let places: Vec<[f64; 3]> = indices
                     .iter()
@@ -255,7 +257,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Add the groups of cells or points with the same value of an array of whole numbers.
+    /// Add a group of cells or points for each value of an array of whole numbers.
     fn add_groups(
         &self,
         array: Node,
@@ -284,7 +286,8 @@ impl File<'_> {
         for value in &values {
             different.insert(*value);
             if different.len() > MOST_GROUPS {
-                // One empty group more than the limit: all groups of the array are removed in the end.
+                // Add one empty group more than the limit. Arrays with more groups than the limit lose all
+                // groups in `read`.
                 for value in different {
                     groups
                         .entry((of_nodes, name.to_owned(), value))
@@ -300,7 +303,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// The numbers of an array.
+    /// Read the numbers of an array.
     fn numbers(&self, array: Node) -> Fault<Numbers> {
         let name = array.attribute("Name").unwrap_or("Points");
         let words = |message: String| format!("array {}: {message}", excerpt(name));
@@ -334,7 +337,7 @@ impl File<'_> {
         binary_numbers(kind, &bytes, self.is_big).map_err(words)
     }
 
-    /// The bytes of a binary array, without its header.
+    /// Return the bytes of a binary array, without its header.
     fn bytes(&self, mut source: Source) -> Fault<Vec<u8>> {
         if !self.is_compressed {
             let length = self.header_number(&mut source)?;
@@ -345,7 +348,7 @@ impl File<'_> {
             self.header_number(&mut source)?,
             self.header_number(&mut source)?,
         );
-        // Each block has a number, so a wrong count ends with the file.
+        // The header has the size of each block, so a wrong number of blocks fails at the end of the data.
         let mut sizes = Vec::new();
         for _ in 0..blocks {
             sizes.push(self.header_number(&mut source)?);
@@ -383,16 +386,16 @@ impl File<'_> {
     }
 }
 
-/// Bytes as they are or in base 64.
+/// Raw or base-64 encoded bytes.
 struct Source<'a> {
     bytes: &'a [u8],
     is_raw: bool,
-    /// Bytes of the last group of base 64 that are not taken yet, the next one last.
+    /// Decoded bytes of the last base-64 group that are not taken yet, in reverse order.
     decoded: Vec<u8>,
 }
 
 impl Source<'_> {
-    /// The next bytes.
+    /// Take the next bytes.
     fn take(&mut self, count: usize) -> Fault<Vec<u8>> {
         let left = if self.is_raw {
             self.bytes.len()
@@ -419,7 +422,7 @@ impl Source<'_> {
         Ok(taken)
     }
 
-    /// Decode the next four characters, of which the last may be `=`.
+    /// Decode the next four base-64 characters. The last characters may be `=`.
     fn decode_group(&mut self) -> Fault<()> {
         let (mut word, mut digits, mut padding) = (0_u32, 0, 0);
         while digits < 4 {
@@ -449,7 +452,7 @@ impl Source<'_> {
     }
 }
 
-/// Numbers of a type from text.
+/// Parse numbers of a type from text.
 fn text_numbers(kind: &str, text: &str) -> Fault<Numbers> {
     let wrong = |word: &str| {
         format!(
@@ -466,7 +469,7 @@ fn text_numbers(kind: &str, text: &str) -> Fault<Numbers> {
     numbers.collect::<Fault<_>>().map(Numbers::Whole)
 }
 
-/// Numbers of a type from bytes.
+/// Convert bytes to numbers of a type.
 fn binary_numbers(kind: &str, bytes: &[u8], is_big: bool) -> Fault<Numbers> {
     macro_rules! numbers {
         ($number:ty, $wide:ty) => {{

@@ -32,29 +32,29 @@ pub struct Ruler<'a> {
     pub name: &'a str,
 }
 
-/// The position at `distance` along `direction`.
+/// Return the position at `distance` along `direction`.
 fn moved(position: [f64; 2], direction: [f64; 2], distance: f64) -> [f64; 2] {
     [0, 1].map(|axis| position[axis] + distance * direction[axis])
 }
 
-/// Half the extent of a text in a direction, measured from its middle.
+/// Return half the extent of a text in a direction, measured from the middle of the text.
 fn half_extent([width, height]: [f64; 2], direction: [f64; 2]) -> f64 {
     (direction[0].abs() * width + direction[1].abs() * height) / 2.0
 }
 
 impl Pen<'_> {
-    /// Thickness of lines.
+    /// Return the thickness of lines in pixels.
     pub fn thickness(&self) -> f64 {
         (self.text / 15.0).max(1.0)
     }
 
-    /// Writes a line of text centred on a position.
+    /// Write a line of text centred on a position.
     pub fn write(&mut self, text: &str, centre: [f64; 2], running: Running) {
         self.lettering
             .draw(self.image, text, self.text, centre, running, INK);
     }
 
-    /// Draws a ruler.
+    /// Draw a ruler.
     pub fn ruler(&mut self, ruler: &Ruler) {
         let height = CAPITAL_HEIGHT * self.text;
         let (tick, gap) = (0.35 * self.text, 0.4 * self.text);
@@ -87,7 +87,7 @@ impl Pen<'_> {
         self.write(&caption, moved(middle, ruler.outward, distance), running);
     }
 
-    /// Draws the colour bar with its ruler.
+    /// Draw the colour bar with its ruler.
     pub fn colour_bar(&mut self, bar: &Bar, colouring: Colouring, name: &str, unit: &str) {
         let ([left, right], [top, bottom]) = (bar.columns, bar.rows);
         let (low, high) = colouring.range;
@@ -126,7 +126,7 @@ impl Pen<'_> {
         });
     }
 
-    /// Draws the four sides of a rectangle.
+    /// Draw the four sides of a rectangle.
     pub fn outline(&mut self, [left, right]: [f64; 2], [top, bottom]: [f64; 2]) {
         let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
         for (from, to) in corners.iter().zip(corners.iter().cycle().skip(1)) {
@@ -134,7 +134,7 @@ impl Pen<'_> {
         }
     }
 
-    /// Draws the directions of the three axes in the isometric view.
+    /// Draw the directions of the three axes in the isometric view.
     pub fn triad(&mut self, root: [f64; 2]) {
         let length = 2.4 * self.text;
         for axis in [Axis::X, Axis::Y, Axis::Z] {

@@ -1,4 +1,4 @@
-//! The pixel raster that everything is drawn on, and its PNG file.
+//! The pixel raster of a picture, and its PNG file.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -7,10 +7,10 @@ use std::path::Path;
 /// A colour as red, green and blue bytes (sRGB).
 pub type Colour = [u8; 3];
 
-/// Ink of frames, ticks and letters.
+/// Colour of frames, ticks and letters.
 pub const INK: Colour = [38, 38, 42];
 
-/// Ink of auxiliary lines that must not compete with the data.
+/// Colour of auxiliary lines, which must not distract from the data.
 pub const PALE_INK: Colour = [176, 176, 182];
 
 /// A finished picture: rows from top to bottom, three bytes per pixel.
@@ -25,7 +25,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// A white picture of the given size.
+    /// Create a white picture of the given size, in pixels.
     pub fn new(width: u32, height: u32) -> Self {
         Self {
             width,
@@ -34,7 +34,7 @@ impl Image {
         }
     }
 
-    /// Writes the picture as an eight-bit RGB PNG file.
+    /// Write the picture as an eight-bit RGB PNG file.
     pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
         let mut encoder =
             png::Encoder::new(BufWriter::new(File::create(path)?), self.width, self.height);
@@ -45,7 +45,7 @@ impl Image {
         Ok(writer.finish()?)
     }
 
-    /// The colour of the pixel in `column` and `row`.
+    /// Return the colour of the pixel in `column` and `row`.
     ///
     /// # Panics
     ///
@@ -56,8 +56,7 @@ impl Image {
         [self.rgb[start], self.rgb[start + 1], self.rgb[start + 2]]
     }
 
-    /// Fills the pixels of columns `left..right` and rows `top..bottom`,
-    /// leaving out what lies outside the picture.
+    /// Fill the pixels of columns `left..right` and rows `top..bottom` that lie inside the picture.
     pub fn fill_rectangle(&mut self, [left, right]: [i64; 2], rows: [i64; 2], colour: Colour) {
         let left = left.clamp(0, i64::from(self.width)) as usize;
         let right = right.clamp(0, i64::from(self.width)) as usize;
@@ -75,10 +74,10 @@ impl Image {
         }
     }
 
-    /// Fills the pixels whose centres lie inside a convex polygon.
+    /// Fill the pixels whose centres lie inside a convex polygon.
     ///
-    /// Centres on a left or upper edge belong to the polygon, centres on a
-    /// right or lower edge do not, so polygons that share an edge share no pixel.
+    /// Centres on a left or upper edge belong to the polygon, centres on a right or lower edge do not.
+    /// Polygons that share an edge therefore share no pixel.
     pub fn fill_polygon(&mut self, corners: &[[f64; 2]], colour: Colour) {
         let (top, bottom) = extremes(corners.iter().map(|corner| corner[1]));
         let first = first_centre(top).max(0);
@@ -100,8 +99,7 @@ impl Image {
         }
     }
 
-    /// Draws a straight line; one along a row or a column covers whole pixels
-    /// to stay crisp, any other is smoothed.
+    /// Draw a straight line. A line along a row or a column covers whole pixels; any other line is smoothed.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64, colour: Colour) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = along[0].hypot(along[1]);
@@ -130,7 +128,7 @@ impl Image {
         }
     }
 
-    /// Mixes `colour` into one pixel, `coverage` being its share from 0 to 1.
+    /// Blend `colour` into one pixel. `coverage` is the weight of the colour, from 0 to 1.
     pub fn blend(&mut self, column: i64, row: i64, coverage: f64, colour: Colour) {
         let inside = (0..i64::from(self.width)).contains(&column)
             && (0..i64::from(self.height)).contains(&row);
@@ -145,12 +143,12 @@ impl Image {
     }
 }
 
-/// The first row or column whose pixel centre is not before `edge`.
+/// Return the first row or column whose pixel centre is not before `edge`.
 fn first_centre(edge: f64) -> i64 {
     (edge - 0.5).ceil() as i64
 }
 
-/// Smallest and largest of some numbers; an inverted pair if there are none.
+/// Return the smallest and largest of some numbers; an inverted pair without numbers.
 fn extremes(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
     numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), number| {
         (low.min(number), high.max(number))

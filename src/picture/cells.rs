@@ -1,8 +1,9 @@
 //! Cells of scattered points: each pixel has the colour of the nearest point.
 //!
-//! These are the Voronoi cells of the points. A cell ends at a distance that follows from the volume of its point, so that
-//! borders, holes and open cracks of a body stay visible. Between points on all sides it extends farther, so that there are no
-//! gaps. In a slice the cells are sections of those in space.
+//! These cells are the Voronoi cells of the points. A cell ends at a distance that follows from the volume of
+//! its point, so borders, holes and open cracks of a body stay visible.
+//! Between points on all sides, a cell extends farther to close gaps. In a slice, the cells are sections of
+//! the cells in space.
 
 use super::canvas::{Colour, Image};
 use super::layout::Layout;
@@ -10,11 +11,11 @@ use super::points::Colouring;
 use super::projection::Projection;
 use super::scene::Mark;
 
-/// Distance from its point at which a cell ends, in edges of a cube or square with its volume: those of a lattice end 0.5 to
-/// 0.71 edges away.
+/// Largest distance of a cell from its point, in edges of a cube or square with the volume of the point. Cells
+/// of a lattice end 0.5 to 0.71 edges away from their points.
 const REACH: f64 = 0.6;
 
-/// The same for a pixel that has points within this distance on all sides.
+/// Largest distance from a point, in edges, of a pixel that has points within this distance on all sides.
 const REACH_INSIDE: f64 = 1.9;
 
 /// Paint the cells of points in a flat view. `depth` is the distance of a point from the drawn plane, m.
@@ -46,13 +47,13 @@ pub fn paint(
     }
 }
 
-/// A point; lengths are in pixels.
+/// A point in the picture; lengths are in pixels.
 struct Point {
     /// Column and row of its projection.
     centre: [f64; 2],
-    /// Distance from the drawn plane.
+    /// Distance of the point from the drawn plane.
     depth: f64,
-    /// Edge of a cube or square with its volume.
+    /// Edge of a cube or square with the volume of the point.
     size: f64,
     colour: Colour,
 }
@@ -62,11 +63,11 @@ struct Point {
 struct Pixel {
     /// Square of the distance from the nearest point so far.
     square: f32,
-    /// Colour of that point.
+    /// Colour of the nearest point so far.
     colour: Colour,
-    /// It is in the cell of a point.
+    /// The pixel is in the cell of a point.
     is_near: bool,
-    /// Eighths of a turn, a bit each, in which there are points.
+    /// Directions in which there are points: one bit per eighth of a turn.
     directions: u8,
 }
 
@@ -80,7 +81,7 @@ struct Pixels {
 }
 
 impl Pixels {
-    /// Pixels without points.
+    /// Create pixels without points.
     fn new(first: [i64; 2], size: [i64; 2]) -> Self {
         let pixel = Pixel {
             square: f32::INFINITY,
@@ -97,7 +98,7 @@ impl Pixels {
 
     /// Add a point to the pixels around it.
     fn add(&mut self, point: &Point) {
-        // A pixel at least, that of the point itself.
+        // At least one pixel: the pixel of the point itself.
         let least = std::f64::consts::FRAC_1_SQRT_2.max(point.depth.abs());
         let [reach, inside] = [REACH, REACH_INSIDE].map(|reach| (reach * point.size).max(least));
         let range = |k: usize| {
@@ -127,7 +128,7 @@ impl Pixels {
         }
     }
 
-    /// Column, row and colour of the pixels in cells.
+    /// Return column, row and colour of the pixels in cells.
     fn painted(&self) -> impl Iterator<Item = ([i64; 2], Colour)> {
         let all = self.pixels.iter().zip(0..);
         let painted = all.filter(|(pixel, _)| pixel.is_near || is_surrounded(pixel.directions));
@@ -138,7 +139,7 @@ impl Pixels {
     }
 }
 
-/// The eighth of a turn that a direction is in.
+/// Return the number of the eighth of a turn that contains a direction.
 fn eighth(along: f64, down: f64) -> u32 {
     match (along >= 0.0, down >= 0.0, along.abs() >= down.abs()) {
         (true, true, true) => 0,
@@ -152,7 +153,8 @@ fn eighth(along: f64, down: f64) -> u32 {
     }
 }
 
-/// Whether no three eighths of a turn side by side are without points: then no half of the surroundings is.
+/// Test whether there are points on all sides: no three adjacent eighths of a turn are empty. Every half of a
+/// turn contains three whole eighths.
 fn is_surrounded(directions: u8) -> bool {
     let empty = !directions;
     empty & empty.rotate_left(1) & empty.rotate_left(2) == 0
@@ -162,7 +164,7 @@ fn is_surrounded(directions: u8) -> bool {
 mod tests {
     use super::*;
 
-    /// The number of the point that each pixel of a frame shows.
+    /// Return for each pixel of a frame the number of the point whose colour it has.
     fn shown(points: &[([f64; 2], f64, f64)]) -> Vec<Option<usize>> {
         let mut pixels = Pixels::new([10, 20], [40, 30]);
         for (number, (centre, size, depth)) in (0..).zip(points) {
@@ -215,7 +217,7 @@ mod tests {
 
     #[test]
     fn gaps_between_points_are_filled_and_borders_are_not() {
-        // A ring of points about (30, 35) with cells of 10 pixels, 9 pixels from the middle.
+        // Points on a ring with centre (30, 35) and radius 9 pixels, with cells of 10 pixels.
         let ring = |directions: std::ops::Range<u32>| {
             let point = |k: u32| {
                 let (sine, cosine) = (f64::from(k) * std::f64::consts::FRAC_PI_4 + 0.1).sin_cos();
@@ -226,7 +228,7 @@ mod tests {
         let middle = 15 * 40 + 20;
         assert!(ring(0..8)[middle].is_some());
         assert!(ring(0..5)[middle].is_none());
-        // Fewer points than the body has around a gap, but on all sides.
+        // Few directions, but on all sides of a pixel.
         for directions in [0b0101_0101, 0b1010_1010, 0b1001_0010, u8::MAX] {
             assert!(is_surrounded(directions), "{directions:b}");
         }

@@ -30,7 +30,8 @@ const COLOURS: [Colour; 7] = [
     [60, 60, 64],
 ];
 
-/// Lengths of dash and gap in thicknesses for each further round of the colours; the first one is solid.
+/// Lengths of dash and gap, in line thicknesses, for each further round of the colours. The first round is
+/// solid.
 const DASHES: [Option<[f64; 2]>; 3] = [None, Some([5.0, 2.5]), Some([1.5, 1.8])];
 
 /// Colour of the lines at the ticks.
@@ -42,13 +43,13 @@ const MARGIN: f64 = 0.04;
 /// Height of the picture, as a fraction of its width.
 const HEIGHT: f64 = 0.62;
 
-/// Edge of the marker of an isolated point, in thicknesses.
+/// Edge of the marker of an isolated point, in line thicknesses.
 const MARKER: f64 = 5.0;
 
-/// Places on a line at which the legend looks for it.
+/// Number of samples on each line between two points, to find curves in the corner of the legend.
 const LINE_SAMPLES: usize = 32;
 
-/// Distance in pixels within which points of a curve are drawn as one.
+/// Distance in pixels below which consecutive points of a curve are drawn as one point.
 const RESOLUTION: f64 = 0.3;
 
 /// Name and unit of an axis.
@@ -65,7 +66,8 @@ pub struct Label<'a> {
 pub struct Series {
     /// Name for the legend.
     pub name: String,
-    /// The points; one that is not finite breaks the curve, and an isolated one is drawn as a marker.
+    /// Points of the curve. A point that is not finite breaks the curve, and an isolated point is drawn as a
+    /// marker.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -78,7 +80,7 @@ pub struct Chart<'a> {
     pub x: Label<'a>,
     /// The vertical axis.
     pub y: Label<'a>,
-    /// The curves. With more than one, there is a legend.
+    /// The curves. More than one curve adds a legend.
     pub series: &'a [Series],
     /// Width of the picture in pixels, from 200 to 16384.
     pub width: u32,
@@ -92,7 +94,7 @@ enum Anchor {
     End,
 }
 
-/// An element of the drawing; lengths in pixels, downwards from the top.
+/// An element of the drawing; lengths in pixels, measured downwards from the top.
 enum Shape {
     Polyline {
         points: Vec<[f64; 2]>,
@@ -114,7 +116,7 @@ enum Shape {
 }
 
 impl Chart<'_> {
-    /// Whether there is a point to draw.
+    /// Test whether there is a point to draw.
     pub fn has_points(&self) -> bool {
         let mut all = self.series.iter().flat_map(|series| &series.points);
         all.any(|point| point.iter().all(|number| number.is_finite()))
@@ -169,7 +171,7 @@ impl Chart<'_> {
         image
     }
 
-    /// Write the chart as an SVG file.
+    /// Return the chart as the text of an SVG file.
     pub fn svg(&self) -> String {
         let (width, height) = self.size();
         let mut svg = format!(
@@ -223,7 +225,7 @@ impl Chart<'_> {
                         Running::Upwards => format!(" transform=\"rotate(-90 {x:.2} {y:.2})\""),
                     };
                     let text = escaped(&text);
-                    // The font of a viewer is wider than the embedded one.
+                    // Viewers use a wider font than the embedded one, so reduce the size.
                     let size = 0.9 * size;
                     let down = CAPITAL_HEIGHT * size / 2.0;
                     writeln!(
@@ -242,7 +244,7 @@ impl Chart<'_> {
         (width, (HEIGHT * f64::from(width)).round() as u32)
     }
 
-    /// All parts of the chart in the order in which they are drawn.
+    /// Return all elements of the chart in drawing order.
     fn shapes(&self, lettering: &Lettering) -> Vec<Shape> {
         let (width, height) = self.size();
         let (width, height) = (f64::from(width), f64::from(height));
@@ -352,7 +354,7 @@ impl Chart<'_> {
             }
         }
         if self.series.len() > 1 {
-            // Lines between distant points count as well.
+            // Lines between distant points also occupy a corner, so sample each line.
             let step = |ends: &[[f64; 2]], k: usize| {
                 let share = k as f64 / LINE_SAMPLES as f64;
                 [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]))
@@ -419,7 +421,7 @@ impl Chart<'_> {
         }
     }
 
-    /// The range of an axis, with a margin.
+    /// Return the range of an axis, with a margin.
     fn range(&self, axis: usize) -> [f64; 2] {
         let all = self.series.iter().flat_map(|series| &series.points);
         let usable = all.filter(|point| point.iter().all(|number| number.is_finite()));
@@ -438,13 +440,13 @@ impl Chart<'_> {
     }
 }
 
-/// A scale with about `most` ticks.
+/// Create a scale with about `most` ticks.
 fn scale(low: f64, high: f64, unit: &str, most: f64) -> Scale {
     let magnitude = low.abs().max(high.abs()) / (1.0 + MARGIN);
     Scale::new(low, high, unit, magnitude, (most as usize).clamp(2, 9))
 }
 
-/// Curves through finite pixels, without points that lie on the one before.
+/// Return the curves through finite pixels, without points that coincide with the previous point.
 fn reduced(pixels: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
     let mut curves = vec![Vec::new()];
     for pixel in pixels {
@@ -486,7 +488,7 @@ fn mark(shapes: &mut Vec<Shape>, point: [f64; 2], number: usize, size: f64) {
     });
 }
 
-/// The dashes of a curve, of alternating lengths of dash and gap.
+/// Split a curve into dashes. `lengths` are the lengths of dash and gap.
 fn dashed(points: &[[f64; 2]], lengths: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     let (mut dashes, mut phase, mut left) = (Vec::new(), 0, lengths[0]);
     let mut dash: Vec<[f64; 2]> = points.first().copied().into_iter().collect();
@@ -514,12 +516,12 @@ fn dashed(points: &[[f64; 2]], lengths: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     dashes
 }
 
-/// A colour as `#rrggbb`.
+/// Format a colour as `#rrggbb`.
 fn hexadecimal([red, green, blue]: Colour) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// A text in XML.
+/// Escape a text for XML.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -568,7 +570,7 @@ mod tests {
         ];
         let image = chart(&series).image();
         let first = pixels(&image, COLOURS[0]);
-        // The legend has a sample of the curve in the upper half.
+        // The upper half also contains the legend, with a sample of the curve.
         let lower = first.iter().filter(|pixel| pixel[1] > image.height / 2);
         let leftmost = lower.min_by_key(|pixel| pixel[0]).unwrap();
         let lowest = first.iter().map(|pixel| pixel[1]).max().unwrap();
@@ -594,7 +596,7 @@ mod tests {
         ];
         let svg = chart(&series).svg();
         let curve = format!("stroke=\"{}\"", hexadecimal(COLOURS[0]));
-        // Two parts and the sample in the legend.
+        // Two parts of the curve, and a sample in the legend.
         assert_eq!(svg.matches(&curve).count(), 3, "{svg}");
         for words in [
             "a &lt; b",
@@ -616,10 +618,10 @@ mod tests {
         assert!(pixels(&chart(&single).image(), COLOURS[0]).len() >= 9);
         let none = [series("none", &[[1.0, f64::NAN], [f64::INFINITY, 0.0]])];
         assert!(!chart(&none).has_points());
-        // A curve crosses all corners of the frame: its part below the legend is hidden.
+        // A curve crosses all corners of the frame, so the legend hides a part of the curve.
         let corners = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
         let svg = chart(&[series("a", &corners), series("b", &[])]).svg();
-        // The legend leaves the corner at the top right, which only the line between two points crosses.
+        // The legend avoids the corner at the top right, which only the line between the two points crosses.
         let line = chart(&[series("a", &[[0.0, 0.0], [1.0, 1.0]]), series("b", &[])]).svg();
         let box_left = |svg: &str| -> f64 {
             let end = svg.rfind("fill=\"#ffffff\"").unwrap();

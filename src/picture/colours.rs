@@ -10,13 +10,12 @@ pub const NO_VALUE: Colour = [140, 142, 146];
 pub enum ColourMap {
     /// Dark violet over green to yellow, perceptually uniform ("viridis").
     General,
-    /// Light grey over orange and red to almost black: a crack stands out even if
-    /// it is one point wide.
+    /// Light grey over orange and red to almost black: even a crack of one point's width stands out.
     Damage,
 }
 
 impl ColourMap {
-    /// The map for a field, chosen by its name so that all pictures of a series
+    /// Return the map for a field. The name of the field selects the map, so that all pictures of a series
     /// use the same map.
     pub fn for_field(field: &str) -> Self {
         if field.to_lowercase().contains("damage") {
@@ -26,8 +25,8 @@ impl ColourMap {
         }
     }
 
-    /// The colour at `fraction` of the way from the low to the high end.
-    /// Fractions beyond an end are clamped; NaN is grey.
+    /// Return the colour at `fraction` of the way from the low to the high end. Fractions beyond an end are
+    /// clamped; NaN is grey.
     pub fn colour(self, fraction: f64) -> Colour {
         if fraction.is_nan() {
             return NO_VALUE;
@@ -40,7 +39,7 @@ impl ColourMap {
     }
 }
 
-/// The colour darkened to `brightness` (0 to 1), for faces turned from the light.
+/// Return the colour darkened to `brightness` (0 to 1), for faces turned away from the light.
 pub fn shaded(colour: Colour, brightness: f64) -> Colour {
     colour.map(|channel| (f64::from(channel) * brightness).round() as u8)
 }
@@ -56,7 +55,7 @@ const VIRIDIS: [[f64; 3]; 7] = [
     [-5.435_455_9, 4.645_852_6, 26.312_435_2],
 ];
 
-/// The "viridis" map.
+/// Return the colour of the "viridis" map.
 fn viridis(fraction: f64) -> Colour {
     let mut colour = [0.0; 3];
     for coefficients in VIRIDIS.iter().rev() {
@@ -77,7 +76,7 @@ const DAMAGE: [(f64, [f64; 3]); 6] = [
     (1.00, [44.0, 6.0, 44.0]),
 ];
 
-/// The damage map.
+/// Return the colour of the damage map.
 fn damage(fraction: f64) -> Colour {
     let upper = DAMAGE[1..DAMAGE.len() - 1]
         .iter()
@@ -96,7 +95,7 @@ fn damage(fraction: f64) -> Colour {
 mod tests {
     use super::*;
 
-    /// CIE lightness, 0 (black) to 100 (white).
+    /// Return the CIE lightness, 0 (black) to 100 (white).
     fn lightness(colour: Colour) -> f64 {
         let [red, green, blue] = colour.map(|channel| {
             let share = f64::from(channel) / 255.0;
@@ -110,7 +109,7 @@ mod tests {
         116.0 * luminance.cbrt() - 16.0
     }
 
-    /// The lightness of a map at 33 equally spaced fractions.
+    /// Return the lightness of a map at 33 equally spaced fractions.
     fn lightnesses(map: ColourMap) -> Vec<f64> {
         (0..=32)
             .map(|step| lightness(map.colour(f64::from(step) / 32.0)))

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::canvas::Image;
 
-/// An animated PNG file that is written a frame after the other and repeats without end.
+/// An animated PNG file that is written frame by frame and repeats without end.
 pub struct Film {
     writer: png::Writer<BufWriter<File>>,
 }
@@ -45,7 +45,7 @@ impl Film {
 }
 
 impl Image {
-    /// The picture with a white row or column more where its size is odd: encoders of films need even sizes.
+    /// Add a white row or column if the height or width is odd, because video encoders need even sizes.
     pub fn even(self) -> Self {
         let mut even = Self::new(
             self.width.next_multiple_of(2),

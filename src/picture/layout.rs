@@ -30,7 +30,7 @@ pub struct Bar {
     pub columns: [f64; 2],
     /// Top and bottom edge.
     pub rows: [f64; 2],
-    /// It is vertical at the right of the frame, instead of horizontal below it.
+    /// The bar is vertical at the right of the frame; otherwise it is horizontal below the frame.
     pub upright: bool,
 }
 
@@ -40,22 +40,21 @@ const LEFT: f64 = 5.2;
 const TOP: f64 = 3.4;
 /// Margin in text sizes that the labels below the frame need.
 const BOTTOM: f64 = 4.2;
-/// Room in text sizes for an upright colour bar and its labels.
+/// Room in text sizes for a vertical colour bar and its labels.
 const UPRIGHT_BAR: f64 = 8.0;
-/// Room in text sizes for a lying colour bar and its labels.
+/// Room in text sizes for a horizontal colour bar and its labels.
 const LYING_BAR: f64 = 5.4;
 /// Margin in text sizes without labels.
 const EMPTY: f64 = 2.2;
 /// Least height of the frame in text sizes.
 const LEAST_HEIGHT: f64 = 3.4;
-/// Least height of a frame in text sizes that an upright bar may stand beside.
+/// Least height of a frame with a vertical bar beside it, in text sizes.
 const UPRIGHT_HEIGHT: f64 = 11.0;
-/// Greatest height of the frame as a share of the width of the picture.
+/// Largest height of the frame as a fraction of the width of the picture.
 const GREATEST_HEIGHT: f64 = 1.1;
 
 impl Layout {
-    /// The arrangement for a drawing that extends between two places of the
-    /// drawing plane.
+    /// Create the arrangement for a drawing that extends between two positions in the drawing plane, m.
     pub fn new(width: u32, [low, high]: [[f64; 2]; 2], projection: Projection) -> Self {
         let width = f64::from(width);
         let text = (width * 0.0185).max(6.0);
@@ -114,7 +113,7 @@ impl Layout {
         }
     }
 
-    /// The pixel coordinates of a place in the drawing plane.
+    /// Return the pixel coordinates of a position in the drawing plane.
     pub fn pixel(&self, [across, up]: [f64; 2]) -> [f64; 2] {
         [
             self.columns[0] + (across - self.origin[0]) * self.scale,
@@ -122,7 +121,7 @@ impl Layout {
         ]
     }
 
-    /// Lower left and upper right corner of the frame in the drawing plane.
+    /// Return the lower left and upper right corner of the frame in the drawing plane.
     pub fn visible(&self) -> [[f64; 2]; 2] {
         let size = [
             self.columns[1] - self.columns[0],

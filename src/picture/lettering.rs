@@ -3,7 +3,7 @@
 use super::canvas::{Colour, Image};
 use ab_glyph::{Font, FontRef, Glyph, GlyphId, PxScale, ScaleFont, point};
 
-/// Height of capital letters and digits as a share of the text size.
+/// Height of capital letters and digits as a fraction of the text size.
 pub const CAPITAL_HEIGHT: f64 = 0.69;
 
 /// The direction in which text runs.
@@ -15,13 +15,13 @@ pub enum Running {
     Upwards,
 }
 
-/// The fonts: a proportional one, and one that fills in characters it lacks.
+/// The fonts: a proportional font, and a font for characters that the first font lacks.
 pub struct Lettering {
     fonts: [FontRef<'static>; 2],
 }
 
 impl Lettering {
-    /// Opens the embedded fonts.
+    /// Open the embedded fonts.
     pub fn new() -> Self {
         let open = |bytes| FontRef::try_from_slice(bytes).expect("embedded fonts are readable");
         Self {
@@ -32,8 +32,8 @@ impl Lettering {
         }
     }
 
-    /// The first font that has the character, or the last one, which then
-    /// shows its sign for a missing character.
+    /// Return the first font that has the character. Otherwise return the last font, which shows a sign for a
+    /// missing character.
     fn font_of(&self, character: char) -> &FontRef<'static> {
         let [usual, substitute] = &self.fonts;
         if usual.glyph_id(character) == GlyphId(0) {
@@ -43,8 +43,8 @@ impl Lettering {
         }
     }
 
-    /// Places the characters of `text` on a baseline that starts at the
-    /// origin; returns them with their fonts, and the length of the line.
+    /// Place the characters of `text` on a baseline that starts at the origin. Return the characters with
+    /// their fonts, and the length of the line in pixels.
     fn place(&self, text: &str, size: f64) -> (Vec<(Glyph, &FontRef<'static>)>, f64) {
         let mut glyphs = Vec::new();
         let mut cursor = 0.0;
@@ -67,12 +67,12 @@ impl Lettering {
         (glyphs, f64::from(cursor))
     }
 
-    /// The length of a line of text in pixels.
+    /// Return the length of a line of text in pixels.
     pub fn length(&self, text: &str, size: f64) -> f64 {
         self.place(text, size).1
     }
 
-    /// Draws a line of text whose capital letters are centred on `centre`.
+    /// Draw a line of text whose capital letters are centred on `centre`.
     pub fn draw(
         &self,
         image: &mut Image,
@@ -85,7 +85,7 @@ impl Lettering {
         let (glyphs, length) = self.place(text, size);
         let back = length / 2.0;
         let down = CAPITAL_HEIGHT * size / 2.0;
-        // A whole-pixel origin keeps the baseline of all labels equally sharp.
+        // Round the origin to a whole pixel, so that the baselines of all labels are equally sharp.
         let [column, row] = match running {
             Running::Across => [centre[0] - back, centre[1] + down],
             Running::Upwards => [centre[0] + down, centre[1] + back],
@@ -103,7 +103,7 @@ impl Lettering {
                     Running::Across => (column + along, row + below),
                     Running::Upwards => (column + below, row - 1 - along),
                 };
-                // The fonts are light; a little gamma gives them more weight.
+                // The fonts are light, so increase the coverage by a gamma curve.
                 let weight = f64::from(coverage).powf(0.7);
                 image.blend(column, row, weight, colour);
             });
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// Columns and rows that hold ink: first and last of each.
+    /// Return the first and last column, and the first and last row, with ink.
     fn inked(image: &Image) -> [u32; 4] {
         let dark: Vec<(u32, u32)> = (0..image.height)
             .flat_map(|row| (0..image.width).map(move |column| (column, row)))

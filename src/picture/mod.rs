@@ -1,5 +1,5 @@
-//! Pictures of point clouds: coloured cells in a frame with ticks, a title
-//! and a colour bar, as PNG files and without any other program.
+//! Pictures of point clouds as PNG files: coloured cells in a frame with ticks, a title and a colour bar. No
+//! other program is needed.
 //!
 //! ```
 //! # use fissure::picture::{Scene, View, render};
@@ -106,7 +106,7 @@ pub fn render(scene: &Scene) -> Image {
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
-/// Draws the lines of a scene.
+/// Draw the lines of a scene.
 fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
     let thickness = 2.0 * pen.thickness();
     for (number, line) in scene.lines {
@@ -119,7 +119,8 @@ fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) 
     }
 }
 
-/// Writes a line above the frame, smaller if it is too long. Size and distance from the frame are in text sizes.
+/// Write a line above the frame, smaller if the line is too long. `size` of the text and `rise` above the
+/// frame are in text sizes.
 fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)) {
     let size = size * layout.text;
     let available = layout.width - 2.0 * layout.text;
@@ -134,14 +135,13 @@ fn heading(pen: &mut Pen, layout: &Layout, title: &str, (size, rise): (f64, f64)
     pen.text = previous;
 }
 
-/// Number of ticks that fit on a ruler whose labels need `spacing` text sizes.
+/// Return the number of ticks that fit on a ruler whose labels need `spacing` text sizes each.
 fn ticks_on(from: [f64; 2], to: [f64; 2], spacing: f64, text: f64) -> usize {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     ((length / (spacing * text)) as usize).clamp(2, 10)
 }
 
-/// Draws the frame of a flat view with a ruler below it and, given a second
-/// axis, one on its left.
+/// Draw the frame of a flat view with a ruler below it. With a second axis, also draw a ruler on the left.
 fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
     pen.outline(layout.columns, layout.rows);
     let ([left, right], [top, bottom]) = (layout.columns, layout.rows);
@@ -166,7 +166,7 @@ fn flat_frame(pen: &mut Pen, layout: &Layout, axes: &[Axis]) {
     }
 }
 
-/// Draws the edges of the box that meet in the corner behind the points.
+/// Draw the edges of the box that meet in the corner behind the points.
 fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
     let place = |corner| layout.pixel(Projection::Isometric.project(bounds.corner(corner)));
     let hidden = [false, true, false];
@@ -179,7 +179,7 @@ fn hidden_edges(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
     }
 }
 
-/// Draws rulers along three outer edges of the box, and the axis triad.
+/// Draw rulers along three outer edges of the box, and the axis triad.
 fn box_rulers(pen: &mut Pen, layout: &Layout, bounds: &Bounds) {
     let place = |corner| layout.pixel(Projection::Isometric.project(bounds.corner(corner)));
     let magnitude = bounds.magnitude(&[Axis::X, Axis::Y, Axis::Z]);

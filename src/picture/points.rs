@@ -6,41 +6,40 @@ use super::layout::Layout;
 use super::projection::Projection;
 use super::scene::Mark;
 
-/// How values become colours.
+/// Mapping of values to colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Colouring {
     /// The colour map.
     pub map: ColourMap,
-    /// The values at its ends.
+    /// Values at the ends of the map.
     pub range: (f64, f64),
 }
 
 impl Colouring {
-    /// The colour of a value.
+    /// Return the colour of a value.
     pub fn of(&self, value: f64) -> Colour {
         let (low, high) = self.range;
         self.map.colour((value - low) / (high - low))
     }
 }
 
-/// Pixels by which cells are enlarged on each side in a first pass, so that
-/// the least strain does not open hairlines between rounded edges.
+/// Enlargement of cells on each side in a first pass, pixels. Otherwise a small strain would open gaps between
+/// rounded edges.
 const OVERLAP: f64 = 0.5;
 
-/// Pixels by which cells are enlarged on each side against rounding errors
-/// of positions and sizes.
+/// Enlargement of cells on each side against round-off of positions and sizes, pixels.
 const TOLERANCE: f64 = 0.01;
 
-/// Height of the strip that shows a bar, in text sizes.
+/// Height of the strip that represents a bar, in text sizes.
 const STRIP_HEIGHT: f64 = 1.9;
 
-/// Least edge in pixels of a cube with distinct faces.
+/// Smallest edge of a cube with distinct faces, pixels.
 const LEAST_CUBE: f64 = 2.0;
 
 /// Brightness of the top, the left and the right face of a cube.
 const BRIGHTNESS: [f64; 3] = [1.0, 0.86, 0.7];
 
-/// Paints all points in their order.
+/// Paint all points in the given order.
 pub fn paint(
     image: &mut Image,
     marks: &[&Mark],
@@ -71,9 +70,9 @@ pub fn paint(
     }
 }
 
-/// First pixel of a cell and first pixel after it.
+/// Return the first pixel of a cell, and the first pixel after the cell.
 ///
-/// Both edges are rounded alike: where one cell ends the next one begins.
+/// Both edges are rounded in the same way: where one cell ends, the next cell begins.
 fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     if width + 2.0 * enlargement < 1.0 {
         let pixel = centre.floor() as i64;
@@ -84,15 +83,15 @@ fn edges(centre: f64, width: f64, enlargement: f64) -> [i64; 2] {
     [first, ((centre + half).round() as i64).max(first + 1)]
 }
 
-/// Paints the three visible faces of a cube in the isometric view.
+/// Paint the three visible faces of a cube in the isometric view.
 fn paint_cube(image: &mut Image, centre: [f64; 2], edge: f64, colour: Colour) {
     if edge < LEAST_CUBE {
         let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
         image.fill_rectangle(columns, rows, colour);
         return;
     }
-    // Vectors on the picture from the corner nearest to the eye, which is
-    // seen in the middle of the cube, to its three neighbours.
+    // Vectors in the picture from the corner nearest to the eye, in the middle of the drawn cube, to the
+    // three neighbouring corners.
     let enlarged = edge + 2.0 * OVERLAP;
     let neighbours = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]].map(|direction| {
         let [across, up] = Projection::Isometric.project(direction);

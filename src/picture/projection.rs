@@ -5,7 +5,7 @@ use super::scene::{Axis, Mark, Scene, View};
 /// The projection to the drawing plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Projection {
-    /// The first coordinate only: a bar, drawn as a strip.
+    /// The first coordinate only: a 1-D body, drawn as a strip.
     Strip,
     /// Two coordinates, across and up.
     Flat([Axis; 2]),
@@ -13,15 +13,15 @@ pub enum Projection {
     Isometric,
 }
 
-/// Share of a unit step along x or y that goes sideways in the isometric view.
+/// Horizontal part of a unit step along x or y in the isometric view.
 const SIDEWAYS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Share of a unit step along z that goes upwards in the isometric view; one
-/// along x or y goes down or up by half of it.
+/// Vertical part of a unit step along z in the isometric view. A unit step along x goes down by half of this,
+/// one along y goes up by half.
 const UPWARDS: f64 = 0.816_496_580_927_726;
 
 impl Projection {
-    /// The projection that shows the scene.
+    /// Return the projection of a scene.
     pub fn of(scene: &Scene) -> Self {
         match scene.effective_view() {
             _ if scene.dimension < 2 => Self::Strip,
@@ -31,7 +31,7 @@ impl Projection {
         }
     }
 
-    /// The place of a position in the drawing plane: across and up.
+    /// Return the position in the drawing plane, across and up, m.
     pub fn project(self, position: [f64; 3]) -> [f64; 2] {
         match self {
             Self::Strip => [position[0], 0.0],
@@ -54,7 +54,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box of all cells with a margin; a box at the origin for no cells.
+    /// Return the box of all cells with a margin; a box at the origin without cells.
     pub fn of(marks: &[Mark]) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -76,7 +76,7 @@ impl Bounds {
             .fold(0.0, |farthest: f64, coordinate| {
                 farthest.max(coordinate.abs())
             });
-        // Coincident points still need a frame with a width.
+        // Coincident points also need a frame of finite width.
         let margin = match largest.max(1e-9 * farthest) {
             0.0 => 0.5,
             extent => 0.025 * extent,
@@ -87,7 +87,7 @@ impl Bounds {
         }
     }
 
-    /// The smallest box that holds this one and another.
+    /// Return the smallest box that contains `self` and `other`.
     pub fn union(self, other: Self) -> Self {
         Self {
             low: std::array::from_fn(|axis| self.low[axis].min(other.low[axis])),
@@ -95,12 +95,12 @@ impl Bounds {
         }
     }
 
-    /// Whether a position is in the box.
+    /// Test whether a position is in the box.
     pub fn holds(&self, position: [f64; 3]) -> bool {
         (0..3).all(|axis| (self.low[axis]..=self.high[axis]).contains(&position[axis]))
     }
 
-    /// The largest absolute coordinate along some axes.
+    /// Return the largest absolute coordinate along some axes.
     pub fn magnitude(&self, axes: &[Axis]) -> f64 {
         axes.iter().fold(0.0, |largest, axis| {
             let index = axis.index();
@@ -110,7 +110,7 @@ impl Bounds {
         })
     }
 
-    /// A corner: for each axis, whether it is at the high end.
+    /// Return a corner. For each axis, `high` selects the high end.
     pub fn corner(&self, high: [bool; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| {
             if high[axis] {
@@ -121,7 +121,7 @@ impl Bounds {
         })
     }
 
-    /// Lower left and upper right end of the projected box.
+    /// Return the lower left and upper right corner of the projected box.
     pub fn projected(&self, projection: Projection) -> [[f64; 2]; 2] {
         let mut ends = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for number in 0..8_u8 {

@@ -1,15 +1,15 @@
 //! Ticks at round numbers and units with SI prefixes.
 
-/// One marked place of a scale.
+/// A tick of a scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
-    /// Place from 0 (low end) to 1 (high end).
+    /// Position from 0 (low end) to 1 (high end).
     pub fraction: f64,
-    /// The number written there.
+    /// Text of the number at the tick.
     pub label: String,
 }
 
-/// The ticks between two numbers and the unit their labels are in.
+/// Ticks between two numbers, and the unit of their labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
     /// The ticks from low to high.
@@ -19,10 +19,10 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// A scale from `low` to `high` with about `most` ticks or fewer.
+    /// Create a scale from `low` to `high` with about `most` ticks or fewer.
     ///
-    /// `magnitude` is the largest number the prefix must suit; scales that
-    /// belong together are given the same one.
+    /// `magnitude` is the largest number that the prefix must suit. Scales that belong together get the same
+    /// magnitude.
     pub fn new(low: f64, high: f64, unit: &str, magnitude: f64, most: usize) -> Self {
         let (exponent, unit) = prefixed(unit, magnitude);
         let factor = 10_f64.powi(-exponent);
@@ -38,7 +38,7 @@ impl Scale {
         Self { ticks, unit }
     }
 
-    /// The name of a quantity followed by the unit in parentheses, if any.
+    /// Return the name of a quantity, followed by the unit in parentheses if there is a unit.
     pub fn caption(&self, name: &str) -> String {
         if self.unit.is_empty() {
             name.to_owned()
@@ -48,8 +48,8 @@ impl Scale {
     }
 }
 
-/// Multiples of a step of 1, 2 or 5 times a power of ten that lie within
-/// `low..=high`, at most `most + 1` of them, preceded by the step.
+/// Return a step of 1, 2 or 5 times a power of ten, and the multiples of the step within `low..=high`, at
+/// most `most + 1`.
 pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
     let coarse = (high - low) / most.max(1) as f64;
     if !(coarse.is_finite() && coarse > 0.0) {
@@ -83,12 +83,11 @@ const PREFIXES: [(i32, &str); 10] = [
     (12, "T"),
 ];
 
-/// Symbols that take a prefix. Others have one already (kg, MPa) or do not
-/// take one (°C, %).
+/// Unit symbols that take a prefix. Other symbols have a prefix already (kg, MPa) or take none (°C, %).
 const PREFIXABLE: [&str; 9] = ["m", "s", "N", "Pa", "J", "W", "V", "A", "Hz"];
 
-/// The power of ten that numbers as large as `magnitude` are written in, and
-/// the unit that says so: "MPa", or "×10⁻³" where no prefix is possible.
+/// Return a power of ten that suits numbers up to `magnitude`, and the unit with this power: "MPa", or
+/// "×10⁻³" if no prefix is possible.
 pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     let size = magnitude.abs();
     if !(size.is_finite() && size > 0.0) {
@@ -110,8 +109,7 @@ pub fn prefixed(unit: &str, magnitude: f64) -> (i32, String) {
     }
 }
 
-/// Whether a prefix before the unit scales the whole of it: true for "m/s",
-/// false for "m²", whose "mm²" would be a millionth.
+/// Test whether a prefix scales the whole unit: true for "m/s", false for "m²", because 1 mm² is 10⁻⁶ m².
 fn takes_prefix(unit: &str) -> bool {
     let end = unit
         .find(|character: char| !character.is_ascii_alphabetic())
@@ -120,7 +118,7 @@ fn takes_prefix(unit: &str) -> bool {
     PREFIXABLE.contains(&symbol) && (rest.is_empty() || rest.starts_with(['/', '·', ' ', '*']))
 }
 
-/// An integer in raised characters.
+/// Format an integer in superscript characters.
 fn superscript(number: i32) -> String {
     const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     number

@@ -3,7 +3,7 @@
 use super::colours::ColourMap;
 use super::projection::Bounds;
 
-/// A direction of space.
+/// A coordinate axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
     /// The first coordinate.
@@ -15,17 +15,17 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// The index of the coordinate in a position.
+    /// Return the index of the coordinate in a position.
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// The name of the coordinate.
+    /// Return the name of the coordinate.
     pub fn letter(self) -> &'static str {
         ["x", "y", "z"][self.index()]
     }
 
-    /// The other two directions, in order.
+    /// Return the other two axes, in order.
     pub fn others(self) -> [Self; 2] {
         match self {
             Self::X => [Self::Y, Self::Z],
@@ -35,13 +35,12 @@ impl Axis {
     }
 }
 
-/// The view of a 3-D scene. 1-D scenes are drawn as a strip, 2-D scenes in
-/// their plane.
+/// View of a 3-D scene. 1-D scenes are drawn as a strip, 2-D scenes in their plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
     /// Along z onto the x-y plane.
     Plane,
-    /// The layer of points at a coordinate, seen along that axis.
+    /// The layer of points at a coordinate, viewed along that axis.
     Slice {
         /// The normal of the layer.
         axis: Axis,
@@ -55,7 +54,7 @@ pub enum View {
 
 /// A point cloud with values, labels and view.
 ///
-/// The shortest slice sets the number of points; points with non-finite
+/// The shortest of the slices positions, sizes and values gives the number of points. Points with non-finite
 /// positions are omitted.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
@@ -65,15 +64,15 @@ pub struct Scene<'a> {
     pub positions: &'a [[f64; 3]],
     /// Edge length of the cell of each point (m).
     pub sizes: &'a [f64],
-    /// For each point whether it is one of scattered points, drawn as a Voronoi cell in flat views; others are drawn as
-    /// squares. May be empty, for none.
+    /// True for each scattered point, which is drawn as a Voronoi cell in flat views. Other points are drawn
+    /// as squares. Empty if no point is scattered.
     pub scattered: &'a [bool],
-    /// Value of each point, shown as its colour; NaN is shown grey.
+    /// Value of each point, which gives the colour; NaN is grey.
     pub values: &'a [f64],
-    /// Name of the values, for the colour bar; "damage" in it selects the
-    /// colour map that sets cracks off.
+    /// Name of the values, for the colour bar. A name that contains "damage" selects the colour map of
+    /// damage.
     pub field: &'a str,
-    /// Unit of the values without prefix, empty if they have none.
+    /// Unit of the values without prefix; empty if dimensionless.
     pub unit: &'a str,
     /// Line above the picture.
     pub title: &'a str,
@@ -83,33 +82,33 @@ pub struct Scene<'a> {
     pub view: View,
     /// Width of the picture in pixels, from 200 to 16384.
     pub width: u32,
-    /// Lines over the points of a flat view (m), each with the number of its colour.
+    /// Lines over the points of a flat view (m), each with the index of its colour.
     pub lines: &'a [(usize, Vec<[f64; 3]>)],
     /// Small line below the title; may be empty.
     pub note: &'a str,
-    /// The box that is drawn, as for all pictures of a series; points outside of it are omitted. `None` for the
-    /// box of the points.
+    /// Drawn box, for example a common box of a series of pictures. Points outside the box are omitted.
+    /// `None` for the box of the points.
     pub bounds: Option<Bounds>,
 }
 
-/// One point that is drawn.
+/// A point to draw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mark {
-    /// Its position (m).
+    /// Position (m).
     pub position: [f64; 3],
-    /// Edge length of its cell (m), zero if the given one was unusable.
+    /// Edge length of the cell (m); zero if the given length is unusable.
     pub size: f64,
-    /// Its value.
+    /// Value of the point.
     pub value: f64,
-    /// It is one of scattered points.
+    /// The point is one of scattered points.
     pub scattered: bool,
 }
 
-/// Largest coordinate; points beyond it are omitted as results of a failed run.
+/// Largest coordinate. Points beyond it are omitted, because they result from a failed run.
 const LARGEST_COORDINATE: f64 = 1e100;
 
 impl Scene<'_> {
-    /// The view, limited by the dimension.
+    /// Return the view; always the plane view below 3-D.
     pub fn effective_view(&self) -> View {
         if self.dimension < 3 {
             View::Plane
@@ -118,7 +117,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The points to draw, in the order in which they are painted.
+    /// Return the points to draw, in painting order.
     pub fn marks(&self) -> Vec<Mark> {
         let scattered = self.scattered.iter().copied();
         let mut marks: Vec<Mark> = self
@@ -145,14 +144,14 @@ impl Scene<'_> {
             .collect();
         match self.effective_view() {
             View::Plane if self.dimension == 3 => sort_by_key(&mut marks, |mark| mark.position[2]),
-            // Where cells overlap or share a pixel, damage must stay visible.
+            // Paint the largest damage last, because cells can overlap or share a pixel.
             View::Plane if self.colours() == ColourMap::Damage => {
                 sort_by_key(&mut marks, |mark| mark.value.max(0.0));
             }
             View::Plane => {}
             View::Slice { axis, position } => {
-                // Deformed layers can have gaps, so the reach exceeds half a cell;
-                // the nearest points are painted last.
+                // Deformed layers can have gaps, so the layer includes points farther than half a cell away.
+                // The nearest points are painted last.
                 let distance = |mark: &Mark| (mark.position[axis.index()] - position).abs();
                 marks.retain(|mark| distance(mark) <= 0.75 * mark.size);
                 sort_by_key(&mut marks, |mark| -distance(mark));
@@ -164,7 +163,7 @@ impl Scene<'_> {
         marks
     }
 
-    /// Distance of a point from the drawn plane, m; 0 without a slice.
+    /// Return the distance of a point from the drawn plane, m; 0 without a slice.
     pub fn depth(&self, mark: &Mark) -> f64 {
         match self.effective_view() {
             View::Slice { axis, position } => mark.position[axis.index()] - position,
@@ -172,18 +171,18 @@ impl Scene<'_> {
         }
     }
 
-    /// The box of the points that are drawn, with a margin.
+    /// Return the box of the drawn points, with a margin.
     pub fn extent(&self) -> Bounds {
         Bounds::of(&self.marks())
     }
 
-    /// The finite values of the points that are drawn.
+    /// Return the finite values of the drawn points.
     pub fn drawn_values(&self) -> Vec<f64> {
         let values = self.marks().into_iter().map(|mark| mark.value);
         values.filter(|value| value.is_finite()).collect()
     }
 
-    /// The position with zero for coordinates the body does not have.
+    /// Return the position with zeros for coordinates that the body does not have.
     fn without_unused(&self, mut position: [f64; 3]) -> [f64; 3] {
         for coordinate in position.iter_mut().skip(self.dimension.max(1)) {
             *coordinate = 0.0;
@@ -191,12 +190,12 @@ impl Scene<'_> {
         position
     }
 
-    /// The colour map of the field.
+    /// Return the colour map of the field.
     pub fn colours(&self) -> ColourMap {
         ColourMap::for_field(self.field)
     }
 
-    /// The values at the ends of the colour bar, the first less than the second.
+    /// Return the values at the ends of the colour bar; the first is less than the second.
     pub fn colour_range(&self, marks: &[Mark]) -> (f64, f64) {
         let given = self
             .range
@@ -225,7 +224,7 @@ fn sort_by_key(marks: &mut [Mark], key: impl Fn(&Mark) -> f64) {
     marks.sort_by(|one, other| key(one).total_cmp(&key(other)));
 }
 
-/// The range, or a wider one if its ends are equal up to rounding.
+/// Return the range, or a wider range if the ends are equal up to round-off.
 fn widened(low: f64, high: f64, colours: ColourMap) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     let spread = high - low;
