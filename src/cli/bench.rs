@@ -177,7 +177,7 @@ fn deck(arguments: &BenchArguments) -> String {
     )
 }
 
-/// Number of warm-up steps.
+/// Return the number of warm-up steps.
 fn warm_up(arguments: &BenchArguments) -> u32 {
     arguments.steps.div_ceil(10)
 }

@@ -67,7 +67,7 @@ pub fn body(report: &mut Report, problem: &Problem, body: &Body) {
                     report.line("critical energy", format_args!("{:.4e} J/m⁶", law.critical));
                 }
             }
-            // Without a damage section, this law comes from a softening material, which has no alpha.
+            // A softening material has a damage law without a damage section, and no alpha.
             if body.damage.is_some() {
                 report.line("alpha", damage.alpha());
             }

@@ -54,7 +54,7 @@ fn bandwidth(comm: &dyn Communicator, threads: usize) -> f64 {
             std::cell::RefCell::new([const { Vec::new() }; 3])
         };
     }
-    // First touch: each thread's arrays are allocated in its local memory.
+    // Each thread is the first to write its arrays, so the system allocates the arrays in local memory.
     rayon::broadcast(|_| {
         ARRAYS.with_borrow_mut(|arrays| *arrays = [0.0, 1.0, 2.0].map(|value| vec![value; length]));
     });

@@ -259,7 +259,7 @@ struct BenchArguments {
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0", value_parser = bench::touching_share)]
     contact: Option<f64>,
 
-    /// Number of points of a cube, rounded to the nearest cube, or edges X,Y,Z of a block in points.
+    /// Number of points, rounded to a cube, or edges X,Y,Z of a block in points.
     #[arg(short, long, value_name = "N", default_value = "262144", value_parser = bench::edges)]
     points: [u64; 3],
 

@@ -165,7 +165,7 @@ enum Data {
 struct Instance {
     translation: Vector3<f64>,
     rotation: Rotation3<f64>,
-    /// Numbers of an element whose nodes continue on the next line.
+    /// A point on the axis of rotation.
     pivot: Vector3<f64>,
     lines: usize,
 }
@@ -786,7 +786,7 @@ impl Reader {
         Ok(Runs::new(members))
     }
 
-    /// Find the members of a set that another set names.
+    /// Find the members of a set by its name, in `known` or among the groups of the mesh.
     fn find_set(
         &self,
         of: Of,
@@ -827,8 +827,8 @@ impl Reader {
         Ok(self.mesh)
     }
 
-    /// Add the union of the sets of one name in all instances under this bare name, unless the assembly has
-    /// such a set.
+    /// Add a group for each set name of the instances, with the members of all instances. A set of the
+    /// assembly with this name takes precedence.
     fn add_bare_names(&mut self) {
         let prefixes: FxHashSet<String> = self
             .placed

@@ -1,7 +1,7 @@
 //! Exact volume and centroid of an element, which becomes a point.
 //!
-//! An element is the image of its reference element under its shape functions. Volume ∫ det J and first moments
-//! ∫ x det J are integrals of polynomials, for which the Gauss rules here are exact.
+//! An element is the image of its reference element under its shape functions. Volume ∫ det J and first
+//! moments ∫ x det J are integrals of polynomials, for which the Gauss rules here are exact.
 
 use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;

@@ -1,7 +1,7 @@
-//! Meshes of finite elements in the formats of other programs, for points from their elements.
+//! Meshes of finite elements in the formats of other programs. Elements become points.
 //!
-//! A reader checks every count in its file against the number of remaining bytes. A damaged file therefore needs no
-//! more memory than a valid one of its size.
+//! A reader checks every count in its file against the number of remaining bytes. A damaged file therefore
+//! needs no more memory than a valid file of the same size.
 
 mod abaqus;
 mod exodus;

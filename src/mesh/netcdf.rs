@@ -176,7 +176,7 @@ struct Variable {
     kind: u32,
     begin: usize,
     attributes: FxHashMap<String, String>,
-    /// The variable is a record variable: its entries are interleaved with those of others.
+    /// The variable is a record variable: its entries are interleaved with the entries of other variables.
     is_record: bool,
 }
 

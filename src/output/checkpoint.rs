@@ -146,8 +146,8 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Open the newest intact checkpoint of the folder; `warn` receives a message per damaged one.
-    /// Collective.
+    /// Open the newest intact checkpoint of the folder. `warn` receives a message for each damaged
+    /// checkpoint. Collective.
     ///
     /// # Errors
     /// If no checkpoint is intact, or a file is unreadable. An unreadable file may be the newest checkpoint,

@@ -18,14 +18,14 @@ const OBJECT_BYTES: u64 = 8192;
 
 /// An HDF5 file written collectively; without MPI, a serial file.
 ///
-/// Every method that returns a `Result` is collective. If it fails on one rank, it fails on all ranks
+/// Every method that returns a `Result` is collective. A method that fails on one rank fails on all ranks
 /// with the same message: file, object and HDF5's innermost cause.
 ///
 /// # After a failure
-/// The file is abandoned: further calls fail. Its handles are leaked on purpose, because HDF5 writes
-/// when it drops a file, which would fail or hang again. The state of the last successful
-/// [`flush`](Self::flush) stays readable. The process can continue and call `MPI_Finalize`, provided
-/// that [`initialise`](super::transfer::initialise) was called before MPI.
+/// The file is abandoned: further calls fail. The handles of the file are leaked on purpose: closing them
+/// makes HDF5 write, which would fail or hang again. The state of the last successful [`flush`](Self::flush)
+/// stays readable. The process can continue and call `MPI_Finalize`, provided that
+/// [`initialise`](super::transfer::initialise) was called before MPI.
 ///
 /// # Full disk
 /// Rank 0 reserves the space before the ranks write (see [`Reservation`]). A full disk inside a
@@ -36,7 +36,7 @@ const OBJECT_BYTES: u64 = 8192;
 /// A loss of power leaves at least the state of the last [fsync](Self::sync). After that, writes
 /// change values in place only; a flush after growth includes an fsync.
 ///
-/// Drop closes a serial file; all ranks must [close](Self::close) a collective one.
+/// Drop closes a serial file; all ranks must [close](Self::close) a collective file.
 pub struct CollectiveFile<'a> {
     inner: ManuallyDrop<hdf5::File>,
     transfer: Transfer,

@@ -297,8 +297,8 @@ impl Outputs<'_> {
     }
 }
 
-/// Points of a block of both results: pairs with the same id, as indices into the block, and numbers of
-/// points that the block uses up.
+/// Points of a block of both results. `pairs` are the points with the same id, as indices into the block.
+/// `used` is the number of points of each result that the block uses up.
 struct Block {
     pairs: Vec<[usize; 2]>,
     used: [usize; 2],

@@ -62,8 +62,8 @@ pub struct StoredColumn {
 
 /// A result file open for reading.
 ///
-/// Errors are of kind [`Input`](crate::error::ErrorKind::Input) if the file is missing, damaged or not
-/// a result, and of kind [`Run`](crate::error::ErrorKind::Run) if the system fails to read it.
+/// Errors are of kind [`Input`](crate::error::ErrorKind::Input) if the file is missing, damaged or not a
+/// result. Errors are of kind [`Run`](crate::error::ErrorKind::Run) if the system fails to read the file.
 #[derive(Debug)]
 pub struct ResultReader {
     file: hdf5::File,

@@ -30,8 +30,8 @@ pub fn render(
     text
 }
 
-/// The side-car of a growing result. It is written with the first step and updated as the result grows,
-/// so it exists even if the process is killed. For one process.
+/// The side-car of a growing result. The side-car is written with the first step and updated as the result
+/// grows, so it exists even if the process is killed. For one process.
 pub struct SideCar {
     path: PathBuf,
     file_name: String,
@@ -40,7 +40,7 @@ pub struct SideCar {
     fields: Vec<StoredField>,
     /// Times of the steps, s.
     times: Vec<f64>,
-    /// Numbers of points of the steps.
+    /// Number of points of each step.
     points: Vec<usize>,
     /// Time and duration of the last write.
     written: Option<(Instant, Duration)>,

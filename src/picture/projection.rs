@@ -9,15 +9,15 @@ pub enum Projection {
     Strip,
     /// Two coordinates, across and up.
     Flat([Axis; 2]),
-    /// All three coordinates, seen along the diagonal from +x, -y, +z.
+    /// All three coordinates, viewed along the diagonal from +x, −y, +z.
     Isometric,
 }
 
 /// Horizontal part of a unit step along x or y in the isometric view.
 const SIDEWAYS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Vertical part of a unit step along z in the isometric view. A unit step along x goes down by half of this,
-/// one along y goes up by half.
+/// Vertical part of a unit step along z in the isometric view. A unit step along x goes down by half of this
+/// part, and a unit step along y goes up by half.
 const UPWARDS: f64 = 0.816_496_580_927_726;
 
 impl Projection {

@@ -48,8 +48,8 @@ impl Scale {
     }
 }
 
-/// Return a step of 1, 2 or 5 times a power of ten, and the multiples of the step within `low..=high`, at
-/// most `most + 1`.
+/// Return a step of 1, 2 or 5 times a power of ten, and the multiples of the step within `low..=high`. There
+/// are at most `most + 1` multiples.
 pub fn round_numbers(low: f64, high: f64, most: usize) -> (f64, Vec<f64>) {
     let coarse = (high - low) / most.max(1) as f64;
     if !(coarse.is_finite() && coarse > 0.0) {

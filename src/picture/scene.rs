@@ -54,7 +54,7 @@ pub enum View {
 
 /// A point cloud with values, labels and view.
 ///
-/// The shortest of the slices positions, sizes and values gives the number of points. Points with non-finite
+/// The shortest of `positions`, `sizes` and `values` gives the number of points. Points with non-finite
 /// positions are omitted.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
@@ -100,7 +100,7 @@ pub struct Mark {
     pub size: f64,
     /// Value of the point.
     pub value: f64,
-    /// The point is one of scattered points.
+    /// The point belongs to a body with scattered points.
     pub scattered: bool,
 }
 

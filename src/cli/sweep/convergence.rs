@@ -3,7 +3,7 @@
 /// Largest absolute rate of the search.
 const LARGEST_RATE: f64 = 30.0;
 
-/// Number of bisections, which reduce the interval to round-off of [`LARGEST_RATE`].
+/// Number of bisections, after which the interval is as small as the round-off of [`LARGEST_RATE`].
 const BISECTIONS: usize = 60;
 
 /// Compute the rate of convergence p of each row of a series of pairs (h, f); `None` if a row has no rate.

@@ -87,7 +87,7 @@ pub struct ResultFile<'a> {
     history: Option<History>,
 }
 
-/// A table of steps whose values are known in advance.
+/// A table with one row per step, and values that are known in advance.
 struct Table {
     dataset: Dataset,
     rule: Rule,

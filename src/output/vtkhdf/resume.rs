@@ -24,7 +24,7 @@ struct Retained {
     rows: Option<u64>,
 }
 
-/// The history of a result and its number of retained rows, if it has one.
+/// The history of a result and the number of its retained rows; `None` without a history.
 type KeptHistory<'a, 'b> = Option<(&'a HistoryContents<'b>, u64)>;
 
 impl<'a> ResultFile<'a> {
