@@ -32,7 +32,7 @@ pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
     let mut points = 0.0;
     for i in 0..DISTANCES {
         let distance = middle(i, DISTANCES);
-        // Per bond: opening at which it breaks (s0 = 1), ω r cos φ dV, and ω r² dV.
+        // Per bond: the opening at which it breaks for s0 = 1, ω r cos φ dV, and ω r² dV.
         let mut crossing = Vec::with_capacity((LENGTHS * ANGLES) as usize);
         for j in 0..LENGTHS {
             let r = distance + (1.0 - distance) * middle(j, LENGTHS);
@@ -51,7 +51,8 @@ pub fn pull_apart(dimension: i32, influence: Influence) -> [f64; 2] {
             }
         }
         crossing.sort_unstable_by(|a, b| b[0].total_cmp(&a[0]));
-        // From the last bond to break to the first: the bonds before it in this order are still intact.
+        // The bonds are sorted from the last to break to the first. When a bond breaks, those before it in
+        // this order are still intact.
         let mut intact = 0.0;
         for [opening, growth, moment] in crossing {
             let dilatation = factor * opening * (intact + 0.5 * growth);

@@ -104,8 +104,7 @@ pub fn damage(
                 translation.log.left_out(&model.node, note);
                 return Ok(None);
             };
-            // Critical stretch of a state-based solid (Silling & Askari 2005): G0 = s0² δ (3 G + (3/4)⁴ (k −
-            // 5 G/3)).
+            // Silling & Askari (2005), for a state-based solid: G0 = s0² δ (3 G + (3/4)⁴ (k − 5 G/3)).
             let energy = stretch
                 * stretch
                 * horizon

@@ -28,7 +28,7 @@ pub type Names<'a> = &'a dyn Fn(&str) -> Option<String>;
 /// Translate an expression.
 ///
 /// # Errors
-/// If the result is not an expression of these variables; the error is a message.
+/// If the result is not an expression of these variables; `Err` holds a message.
 pub fn rewrite(
     text: &str,
     dialect: Dialect,
@@ -191,8 +191,8 @@ impl Rewriter<'_> {
         value.ok_or_else(|| "`value` is not set".to_owned())
     }
 
-    /// Translate the statements from `at` to the end or a `}`. Return `value` after them, and the index after
-    /// them.
+    /// Translate the statements from `at` to the end or a `}`. Return the new `value` and the index after the
+    /// last statement.
     fn block(
         &self,
         tokens: &[Token],
@@ -213,7 +213,7 @@ impl Rewriter<'_> {
         Ok((value, at))
     }
 
-    /// Translate the statement at `at`. Return `value` after it, and the index after it.
+    /// Translate the statement at `at`. Return the new `value` and the index after the statement.
     fn statement(
         &self,
         tokens: &[Token],

@@ -11,7 +11,7 @@ use crate::error::{Result, excerpt};
 struct Defined<'n> {
     name: String,
     node: &'n Node,
-    /// Whether name or position mark this entry as a node set in the source code.
+    /// Whether Peridigm or PeriLab treats this entry as a node set, because of its name or position.
     is_declared: bool,
     /// Name of the set in the new deck; `None` until the first use.
     written: Option<String>,

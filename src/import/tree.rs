@@ -1,6 +1,6 @@
 //! Parameter trees, the common form of YAML decks and XML parameter lists.
 
-/// Maximum number of nodes of a tree, which bounds the memory of a deck.
+/// Maximum number of nodes of a tree; limits the memory that a deck can take.
 pub const MOST_NODES: usize = 1 << 20;
 
 /// Maximum depth of a tree.

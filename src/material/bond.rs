@@ -1,4 +1,4 @@
-//! Geometry of eight deformed bonds. At small strains it needs no square root and no division.
+//! Geometry of eight deformed bonds, without square roots and divisions at small strains.
 //!
 //! With γ = η·(2ξ + η) and x = γ/|ξ|², the deformed length is |Y|² = |ξ|² (1 + x).
 //! Laws need two functions of x:
@@ -76,9 +76,8 @@ pub enum Weights {
 }
 
 impl Weights {
-    /// One bit per bond within the horizon of point i, and one within that of point j. Intact and broken
-    /// bonds count.
-    /// The force state of an end acts only on these bonds.
+    /// Return two masks, for points i and j: one bit per bond within the horizon of the point. Broken bonds
+    /// are included. The force state of an end acts only on the bonds of its mask.
     #[inline(always)]
     pub fn acting(self) -> [u8; 2] {
         match self {
@@ -261,7 +260,7 @@ pub fn deform<S: Simd, const ONLY_NEAR: bool, const D: usize>(
 }
 
 impl<const D: usize> Bond<D> {
-    /// Compute the stretches, for loops that need them only for some groups of bonds.
+    /// Compute the stretches. Loops call this only for the groups of bonds that need stretches.
     pub fn with_stretch(mut self, linear: bool) -> Self {
         if !linear {
             let one = Lanes::splat(1.0);

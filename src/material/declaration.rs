@@ -32,7 +32,7 @@ pub struct Declaration {
     /// Return the elastic constants that follow from the law's own keys, if the deck gives these keys. Such a
     /// deck must give no other elastic constants.
     pub elastic: Option<fn(&Values, Dimension) -> Option<Isotropic>>,
-    /// Whether a criterion on the work of bonds can break them.
+    /// Whether the energy criterion can break bonds of this law.
     pub breaks_by_energy: bool,
     /// Return the critical stretch of a fracture energy (J/m²); `None` if no stretch criterion can break the
     /// bonds.

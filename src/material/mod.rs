@@ -1,14 +1,15 @@
-//! Material laws, one per file. A law evaluates bonds, eight at a time. It is independent of decks, points,
-//! ranks and fields.
+//! Material laws, one per file. A law evaluates bonds, eight at a time. Laws are independent of decks,
+//! points, ranks and fields.
 //!
 //! The force density that a bond exerts on point i is f = T_i⟨ξ⟩ − T_j⟨−ξ⟩ (Silling et al. 2007).
-//! The force state T_i of an end depends on three inputs:
+//! The force state T_i depends on three inputs:
 //!
 //! - the bond;
-//! - the *numbers* of the point, which the law stores per point, such as the dilatation of its family;
+//! - the *numbers* of point i, which the law stores per point, such as the dilatation of its family;
 //! - the *bond history*, which the law stores per bond and end, such as a plastic stretch.
 //!
-//! A law declares the count of both, and how to compute them.
+//! A law declares the count of the numbers and of the history, and computes both.
+//! An *end* of a bond is point i or point j.
 //! An *untruncated* family is a full ball of neighbours, without surfaces or cracks. The *initial* family of
 //! a point has all its bonds before any bond breaks.
 
@@ -206,8 +207,8 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Whether a pass reads the bond history of the end of the step. Otherwise it reads that of the
-    /// beginning.
+    /// Whether a pass reads the bond history after the step. Otherwise the pass reads the history before the
+    /// step.
     fn reads_advanced_history(&self, _pass: usize) -> bool {
         false
     }
@@ -229,7 +230,7 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
     fn force(&self, bond: &Bond<D>, end: &Self::Point, history: &Self::BondHistory) -> Self::Force;
 
     /// Force density of bonds per volume of j, T_i⟨ξ⟩ − T_j⟨−ξ⟩, with the weights of both ends. Both ends
-    /// compute the same bits, up to the sign. Laws may override this function with one of fewer operations.
+    /// compute the same bits, up to the sign. Laws may override this function to save operations.
     #[inline(always)]
     fn bond_force<S: Simd>(
         _simd: S,
@@ -347,9 +348,10 @@ pub trait Law<const D: usize>: Copy + Send + Sync {
         false
     }
 
-    /// Energy per bond of a point divided by that of an interior point at the same strain, from the sums of
-    /// [`Self::reference_contribution`]. It exceeds 1 for truncated families of laws that keep the energy of
-    /// a point; otherwise it is 1.
+    /// Energy per bond of a point, divided by that of an interior point at the same strain, from the sums of
+    /// [`Self::reference_contribution`].
+    ///
+    /// The factor exceeds 1 in truncated families if the law keeps the energy of a point; otherwise it is 1.
     fn truncation_factor(&self, _sums: &[f64]) -> f64 {
         1.0
     }

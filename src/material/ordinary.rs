@@ -195,8 +195,8 @@ pub(super) fn critical_stretch(given: &Given, energy: f64) -> f64 {
     CriticalStretch::from_energy_ordinary(&law, influence(given), energy, given.horizon)
 }
 
-/// Return the force state of a bond with A/m and d κ θ/m (N/m⁷). `taken` is the inelastic part of its
-/// deviatoric extension, divided by |ξ|.
+/// Return the force state of bonds with an inelastic deviatoric extension. `extension_factor` is A/m and
+/// `volume_factor` is d κ θ/m, both N/m⁷. `taken` is the inelastic extension over |ξ|.
 #[inline(always)]
 pub(super) fn eased_force<const D: usize>(
     bond: &Bond<D>,

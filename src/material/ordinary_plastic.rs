@@ -36,7 +36,7 @@ use crate::lanes::{IsaSet, Lanes};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrdinaryPlastic {
     elastic: Ordinary,
-    /// Product ψ₀ m, J²/m: the yield value of a point is this product divided by its weighted volume.
+    /// Product ψ₀ m, Pa²: the yield value ψ₀ of a point is this product divided by its weighted volume.
     strength: f64,
     /// m of an untruncated family (m⁵), if it determines the yield value of all points; `None` for the m of
     /// each point.

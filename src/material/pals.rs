@@ -82,7 +82,7 @@ impl Pals {
     }
 }
 
-/// Decks have no name for this law: they write `ordinary` with `surface_correction = "pals"`.
+/// No deck name: decks write `ordinary` with `surface_correction = "pals"`.
 impl Declared for Pals {
     const DECLARATIONS: &'static [Declaration] = &[];
 }

@@ -72,7 +72,8 @@ const RESIDUAL: f64 = 0.01;
 /// Number of decay stretches from s0 to sc, ln(1/r).
 const DECAYS: f64 = 4.605_170_185_988_092;
 
-/// β and γ of a straight line; then those of concrete (Petersson 1981), ⅓ f_t at 0.8 G_F/f_t of 3.6 G_F/f_t.
+/// β and γ of a straight line; then β and γ of concrete (Petersson 1981): ⅓ f_t at 0.8 G_F/f_t, 0 at 3.6
+/// G_F/f_t.
 const STRAIGHT: [f64; 2] = [0.5, 0.5];
 const CONCRETE: [f64; 2] = [1.0 / 3.0, 2.0 / 9.0];
 
@@ -334,8 +335,8 @@ fn build(given: &Given) -> Built {
 /// Number of directions between the axis and the plane normal to the axis, in the quadrature of the stress.
 const DIRECTIONS: usize = 64;
 
-/// Factor of the strain from one sample to the next, fraction of the largest stress that ends the search, and
-/// the maximum number of samples.
+/// Search for the largest stress: factor of the strain from one sample to the next; fraction of the largest
+/// stress at which the search ends; maximum number of samples.
 const STRAIN_GROWTH: f64 = 1.02;
 const PAST_LARGEST: f64 = 0.95;
 const MOST_STRAINS: usize = 400;

@@ -63,7 +63,7 @@ impl TensorPmb {
     }
 }
 
-/// Decks have no name for this law: they write `pmb` with `surface_correction = "tensor"`.
+/// No deck name: decks write `pmb` with `surface_correction = "tensor"`.
 impl Declared for TensorPmb {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
@@ -115,9 +115,9 @@ fn fit<const D: usize>(sums: &[f64], micromodulus: f64, shear_modulus: f64) -> S
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
-    // A row is weighted by the square root of the number of components that it represents. Then the fit does
-    // not depend on the axes. Columns have the same weights, so the solution of smallest norm does not depend
-    // on the axes either.
+    // A row stands for several equal tensor components. Its weight is the square root of their number, so
+    // that the fit does not depend on the axes. Columns have the same weights; then the solution of smallest
+    // norm is independent of the axes, too.
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |r, c| {
         let both = std::array::from_fn(|d| rows[r][d] + columns[c][d]);
         let weight = (multiplicity(rows[r]) * multiplicity(columns[c])).sqrt();
@@ -209,7 +209,7 @@ impl<const D: usize> Law<D> for TensorPmb {
         bond.stretch * bond.stretch * bond.length * along(bond, end) * (0.5 * self.micromodulus)
     }
 
-    /// Bound by the largest absolute row sum of H, which no eigenvalue exceeds.
+    /// Spring constant with the largest absolute row sum of H, an upper bound on the eigenvalues.
     #[inline(always)]
     fn stiffness(&self, length: Lanes, (diagonal, others): &Symmetric<D>) -> Lanes {
         let mut rows = *diagonal;

@@ -10,10 +10,11 @@ use crate::lanes::{LaneTuple, Lanes};
 /// the same trace.
 const SINGULAR: f64 = 1e-2;
 
-/// The intact part of a family carries no force if it is this many times as stiff as the initial family.
+/// Limit of the stiffness of a family's intact part, relative to the initial family. A stiffer part carries
+/// no force.
 ///
-/// The time step is stable for initial families only. Without the limit, points of torn plates moved without
-/// bound; with a limit of 16 they did not.
+/// The time step is stable for initial families only. Without a limit, points of torn plates moved without
+/// bound; a limit of 16 prevented this.
 const STIFFEST: f64 = 8.0;
 
 /// Contribution of a bond to the shape tensor (diagonal and mixed entries) and to Σ ω η⊗ξ Ṽ (row by row).

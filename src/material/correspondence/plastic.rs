@@ -75,8 +75,8 @@ pub const STRAIN_MEASURE: Key = Key {
 /// again because of round-off.
 const SURFACE: f64 = 1e-12;
 
-/// Tolerance for logarithmic strains; the round-off of b_e after a return scales with the square of the
-/// stretches.
+/// Tolerance of the yield surface for logarithmic strains. The round-off of b_e after a return is larger,
+/// because it scales with the square of the stretches.
 const LOGARITHMIC_SURFACE: f64 = 1e-9;
 
 /// Return the error in the values of the keys.
