@@ -8,7 +8,7 @@ use super::translation::Translation;
 use super::tree::{Node, is_key};
 use crate::error::Result;
 
-/// Output variables: their name, the field, and the difference of the field.
+/// Output variables: name, name of the field, and how the field differs from the variable.
 const FIELDS: [(&str, &str, &str); 33] = [
     ("Displacement", "displacement", ""),
     ("Displacements", "displacement", ""),
@@ -113,7 +113,7 @@ pub enum Interval {
 pub(super) struct FieldOf {
     /// Name of the field.
     pub(super) name: &'static str,
-    /// Difference between variable and field; empty if there is none.
+    /// How the field differs from the variable; empty if both are equal.
     pub(super) difference: &'static str,
     /// Tensor component that the variable selects, in upper case.
     pub(super) part: Option<&'static str>,

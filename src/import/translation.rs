@@ -129,7 +129,7 @@ impl<'a> Translation<'a> {
         })
     }
 
-    /// Translate an expression of position and time, or of position only; the error is a message.
+    /// Translate an expression of position and time, or of position only; `Err` holds a message.
     pub fn expression(&self, text: &str, of_time: bool) -> std::result::Result<Value, String> {
         let start = self.start;
         let names = |name: &str| match name {

@@ -25,7 +25,7 @@ pub trait ForceState<const D: usize>: Copy {
     fn dyad(self, bond: &Bond<D>, a: usize, b: usize) -> Lanes;
 
     /// Return the work ½ T·(Y − R ξ) of the force on the bond, J/m⁶, with the rotation R of the family. Both
-    /// ends compute the same bits. The work of a central force is that on the extension, for every rotation.
+    /// ends compute the same bits. A central force works on the extension, so R does not matter.
     fn work<S: Simd>(
         self,
         simd: S,

@@ -8,7 +8,7 @@ use crate::import::elastic::Constants;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: their name, the law, and the difference of the law.
+/// Material models: name, the law, and how the law differs from the model.
 const MATERIALS: [(&str, &str, &str); 20] = [
     ("Elastic", "ordinary", ""),
     ("Elastic Bond Based", "pmb", ""),

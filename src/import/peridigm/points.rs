@@ -127,7 +127,7 @@ pub(super) struct Influence {
     pub(super) known: Option<&'static str>,
     /// Value of the new key `influence`; `None` for the default.
     pub(super) written: Option<&'static str>,
-    /// Difference of the function; empty if there is none.
+    /// How the new function differs from Peridigm's; empty if both are equal.
     pub(super) difference: &'static str,
 }
 

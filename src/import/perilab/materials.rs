@@ -7,7 +7,8 @@ use crate::import::elastic::Constants;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
-/// Material models: a part of their name, the law, and the difference of the law. The first match is used.
+/// Material models: a part of the name, the law, and how the law differs from the model. The first match is
+/// used.
 const MATERIALS: [(&str, &str, &str); 9] = [
     (
         "unified bond-based",

@@ -98,7 +98,7 @@ impl<const D: usize> ShapeTensor<D> {
     }
 }
 
-/// Compute the rotation of a family from sums of type [`FamilyShare`]. The identity if the shape tensor is
+/// Compute the rotation of a family from its [`FamilyShare`] sums; the identity if the shape tensor is
 /// singular.
 pub fn family_rotation<const D: usize>(sums: &[f64]) -> Rotation {
     let inverse = ShapeTensor::<D>::new(sums).inverse();
